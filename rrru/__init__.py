@@ -1,0 +1,1 @@
+"""Calibration and sim-to-real diagnosis of parallel robots."""

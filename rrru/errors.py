@@ -1,0 +1,47 @@
+"""Errors that a user can meet; each says what, where, the value and what is allowed."""
+
+
+class RrruError(Exception):
+    """Base of every error that rrru raises on purpose."""
+
+
+class ConfigError(RrruError):
+    """The configuration asks for something that does not exist or does not fit together."""
+
+
+class IngestError(RrruError):
+    """A measurement file is refused.
+
+    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number of the data row,
+    counted from 1 below the header, or None where the whole file or column is meant.
+    """
+
+    def __init__(self, problems):
+        self.problems = tuple(problems)
+        super().__init__("\n".join(_problem_text(p) for p in self.problems))
+
+
+class UnreachableError(RrruError):
+    """A commanded pose lies outside the reachable workspace."""
+
+
+class FitError(RrruError):
+    """A fit failed; `result` carries what it had reached."""
+
+    def __init__(self, message, result=None):
+        super().__init__(message)
+        self.result = result
+
+
+class TableError(RrruError):
+    """A result table does not fit its schema."""
+
+
+def _problem_text(problem):
+    """One line: file, row, column, value, allowed."""
+    where = [str(problem["file"])]
+    if problem.get("row") is not None:
+        where.append(f"row {problem['row']}")
+    if problem.get("column") is not None:
+        where.append(f"column {problem['column']}")
+    return f"{', '.join(where)}: got {problem['value']}; allowed: {problem['allowed']}"

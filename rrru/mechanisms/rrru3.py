@@ -1,0 +1,279 @@
+"""3-RRRU translational parallel robot (paper A): what its controller believes.
+
+Robot frame: origin at the centre of the static platform, z DOWN. Leg i stands at azimuth phi_i; with u the radial and v the tangential
+coordinate of the platform's centre in leg i,
+
+    X = u + r - R - L1 cos(theta),  Z = z - L1 sin(theta),  rho = L2 + sqrt(L3^2 - v^2),  X^2 + Z^2 - rho^2 = 0      (eq. 8)
+
+R and r enter only as r - R: of the 14 published errors, tied across the legs to 8, 7 can be identified. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rrru.errors import ConfigError, UnreachableError
+from rrru.mechanisms import kernels
+from rrru.parameters import Parameter, ParameterSet
+
+LEG_COLUMNS = ("dtheta_rad", "L1_mm", "L2_mm", "L3_mm", "r_minus_R_mm")
+ELBOW_SIGN = {"out": -1.0, "in": 1.0}
+
+# ASSUME the paper prints no search bounds; these hold Table 6 read in radians (0.0201 rad) and twice the largest printed length error.
+_ANGLE_LIMIT_RAD = 0.03
+_LENGTH_LIMIT_MM = 4.0
+_SOURCE = "paper A, section 2.2; bounds assumed"
+
+
+def _errors(*names):
+    """Error parameters, nominally zero, with the default bounds."""
+    return ParameterSet(
+        tuple(
+            Parameter(
+                name,
+                "rad" if name.startswith("dtheta") else "mm",
+                0.0,
+                *((-_ANGLE_LIMIT_RAD, _ANGLE_LIMIT_RAD) if name.startswith("dtheta") else (-_LENGTH_LIMIT_MM, _LENGTH_LIMIT_MM)),
+                _SOURCE,
+            )
+            for name in names
+        )
+    )
+
+
+_ANGLES = ("dtheta1", "dtheta2", "dtheta3")
+PUBLISHED = _errors(*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr")
+TIED = _errors(*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr")
+# The gauge: R and r shift every leg by the same r - R, so that one number, da = dr - dR, stands for both.
+IDENTIFIABLE = _errors(*_ANGLES, "dL1", "dL2", "dL3", "da")
+PARAMETER_SETS = {"published": PUBLISHED, "tied": TIED, "identifiable": IDENTIFIABLE}
+
+
+def _leg_map(names):
+    """Matrix (3, 5, p) from the named errors to changes of the legs' numbers."""
+    matrix = np.zeros((3, 5, len(names)))
+    for column, name in enumerate(names):
+        if name.startswith("dtheta"):
+            matrix[int(name[-1]) - 1, 0, column] = 1.0
+        elif name.startswith("dL") and len(name) == 4:
+            matrix[int(name[2]) - 1, int(name[3]), column] = 1.0
+        elif name.startswith("dL"):
+            matrix[:, int(name[2]), column] = 1.0
+        else:
+            matrix[:, 4, column] = {"dR": -1.0, "dr": 1.0, "da": 1.0}[name]
+    return matrix
+
+
+def to_identifiable(values):
+    """Mapping of the 7 identifiable errors from a mapping of published or tied ones.
+
+    Raises ConfigError where the legs' link errors differ, since the identifiable set ties them.
+    """
+    result = {name: float(values.get(name, 0.0)) for name in _ANGLES}
+    for link in (1, 2, 3):
+        seen = {float(values[key]) for key in (f"dL{link}", *(f"dL{leg}{link}" for leg in (1, 2, 3))) if key in values}
+        if len(seen) > 1:
+            raise ConfigError(f"dL{link}: the legs' errors differ ({sorted(seen)}); the tied model has one number for all three")
+        result[f"dL{link}"] = seen.pop() if seen else 0.0
+    result["da"] = float(values.get("da", values.get("dr", 0.0) - values.get("dR", 0.0)))
+    return result
+
+
+@dataclass(frozen=True)
+class Rrru3:
+    """The robot with its nominal dimensions and the choice of error parameters.
+
+    Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8) or "identifiable" (7).
+    """
+
+    L1_mm: float = 400.0
+    L2_mm: float = 100.0
+    L3_mm: float = 800.0
+    R_mm: float = 400.0
+    r_mm: float = 400.0
+    azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
+    errors: str = "identifiable"
+    name: str = field(default="rrru3", init=False)
+
+    def __post_init__(self):
+        for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm"):
+            if not getattr(self, key) > 0.0:
+                raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive length")
+        if self.errors not in PARAMETER_SETS:
+            raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(PARAMETER_SETS)}")
+
+    @property
+    def parameters(self):
+        """The error parameters: the meaning of every `errors` vector."""
+        return PARAMETER_SETS[self.errors]
+
+    @property
+    def turn(self):
+        """Cosines and sines of the legs' azimuths, shape (2, 3)."""
+        return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
+
+    @property
+    def leg_map(self):
+        """Derivative of the legs' numbers with respect to the errors, shape (3, 5, p)."""
+        return _leg_map(self.parameters.names)
+
+    def legs(self, errors=None):
+        """Numbers of the legs (LEG_COLUMNS), shape (..., 3, 5), under errors of shape (..., p)."""
+        nominal = np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
+        if errors is None:
+            return nominal
+        return nominal + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(errors, dtype=float))
+
+    def inverse(self, position_mm, errors=None, elbow="out"):
+        """Drive angles (n, 3) in rad for positions (n, 3) in mm; NaN where a leg cannot reach (eqs. 5, 6).
+
+        `elbow` is "out" (the robot's assembly), "in", or one of these per leg.
+        """
+        return self.inverse_of_legs(position_mm, self.legs(errors), elbow)
+
+    def inverse_of_legs(self, position_mm, legs, elbow="out"):
+        """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
+        position = _points(position_mm)
+        signs = np.array([ELBOW_SIGN[e] for e in ((elbow,) * 3 if isinstance(elbow, str) else elbow)])
+        u, v = self._radial_tangential(position)
+        reach = u + legs[:, 4]
+        d = np.hypot(reach, position[:, 2:])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rho = legs[:, 2] + np.sqrt(legs[:, 3] ** 2 - v**2)
+            cosine = (legs[:, 1] ** 2 + d**2 - rho**2) / (2.0 * legs[:, 1] * d)
+            # beyond the reach arccos gives NaN, which is the mask the callers rely on
+            return np.arctan2(position[:, 2:], reach) + signs * np.arccos(cosine) - legs[:, 0]
+
+    def require_reachable(self, position_mm, errors=None):
+        """Drive angles as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
+        theta = self.inverse(position_mm, errors)
+        bad = np.flatnonzero(np.isnan(theta).any(axis=1))
+        if bad.size:
+            point = np.asarray(position_mm, dtype=float)[bad[0]]
+            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(theta[bad[0]])))
+            raise UnreachableError(
+                f"point {bad[0] + 1} at ({point[0]:.3f}, {point[1]:.3f}, {point[2]:.3f}) mm is out of reach of leg {legs}; "
+                f"{bad.size} of {len(theta)} points cannot be reached"
+            )
+        return theta
+
+    def forward(self, theta_rad, errors=None, guess_mm=None):
+        """Positions (n, 3) in mm of drive angles (n, 3); NaN where Newton does not converge (eq. 8).
+
+        `guess_mm` (n, 3) selects the assembly; without it Newton starts from the lower intersection of three spheres, see `first_guess`.
+        """
+        return self.forward_batch(theta_rad, None if errors is None else np.asarray(errors)[None], guess_mm)[0]
+
+    def forward_batch(self, theta_rad, errors=None, guess_mm=None):
+        """Positions (m, n, 3) in mm of n drive-angle triples under m error vectors (m, p); see `forward`."""
+        legs = self.legs(errors) if errors is not None else self.legs()[None]
+        return self.forward_of_legs(theta_rad, legs, guess_mm)
+
+    def first_guess(self, theta_rad):
+        """Positions (n, 3) in mm of the nominal robot if joints 2 and 3 stood at one point: the lower intersection of three spheres.
+
+        With rho = L2 + L3 on every leg each closure is a sphere about the elbow, shifted by r - R. Where the spheres do not meet, the point
+        nearest to all three is taken.
+        """
+        theta = _points(theta_rad)
+        cx, cy = self.turn
+        radial = self.L1_mm * np.cos(theta) - (self.r_mm - self.R_mm)
+        centre = np.stack([radial * cx, radial * cy, self.L1_mm * np.sin(theta)], axis=-1)
+        first, second, third = centre[:, 0], centre[:, 1], centre[:, 2]
+        normal = np.cross(second - first, third - first)
+        area = np.linalg.norm(normal, axis=1, keepdims=True)
+        # the circumcentre of the elbows is as far from each of them
+        b, c = second - first, third - first
+        to_circumcentre = np.cross((b**2).sum(1, keepdims=True) * c - (c**2).sum(1, keepdims=True) * b, normal) / (2.0 * area**2)
+        height = np.sqrt(np.maximum((self.L2_mm + self.L3_mm) ** 2 - (to_circumcentre**2).sum(1, keepdims=True), 0.0))
+        down = np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
+        return first + to_circumcentre + down * normal / area * height
+
+    def forward_of_legs(self, theta_rad, legs, guess_mm=None):
+        """Positions (m, n, 3) in mm of drive angles (n, 3) under m sets of leg numbers (m, 3, 5)."""
+        theta = _points(theta_rad)
+        start = self.first_guess(theta) if guess_mm is None else _points(guess_mm)
+        solved = kernels.forward(
+            np.ascontiguousarray(legs, dtype=float),
+            self.turn,
+            np.ascontiguousarray(np.cos(theta).T),
+            np.ascontiguousarray(np.sin(theta).T),
+            np.ascontiguousarray(start.T),
+        )
+        return solved.transpose(0, 2, 1)
+
+    def closure(self, position_mm, theta_rad, errors=None):
+        """Left sides (n, 3) of eq. (8) in mm^2, zero where position and drive angles fit."""
+        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.legs(errors))
+        return big_x**2 + big_z**2 - rho**2
+
+    def closure_jacobians(self, position_mm, theta_rad, errors=None):
+        """Derivatives of the closures with respect to the position (n, 3, 3) in mm and to the legs' numbers (n, 3, 5)."""
+        legs = self.legs(errors)
+        big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
+        cx, cy = self.turn
+        by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
+        arm, forearm = legs[:, 1], legs[:, 3]
+        by_leg = 2.0 * np.stack(
+            [
+                arm * (big_x * np.sin(angle) - big_z * np.cos(angle)),
+                -(big_x * np.cos(angle) + big_z * np.sin(angle)),
+                -rho,
+                -rho * forearm / s,
+                big_x,
+            ],
+            axis=-1,
+        )
+        return by_position, by_leg
+
+    def leg_jacobian(self, position_mm, theta_rad, errors=None):
+        """Derivative of the position with respect to the legs' numbers, shape (n, 3 axes, 3 legs, 5)."""
+        by_position, by_leg = self.closure_jacobians(position_mm, theta_rad, errors)
+        return -np.einsum("nal,nlc->nalc", np.linalg.inv(by_position), by_leg)
+
+    def actuator_jacobian(self, position_mm, theta_rad, errors=None):
+        """Derivative of the position with respect to the drive angles, shape (n, 3, 3), mm per rad."""
+        return self.leg_jacobian(position_mm, theta_rad, errors)[..., 0]
+
+    def error_jacobian(self, position_mm, theta_rad, errors=None):
+        """Derivative of the position with respect to the errors, shape (n, 3, p)."""
+        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, theta_rad, errors), self.leg_map)
+
+    def passive_angles(self, position_mm, theta_rad, errors=None):
+        """Angles (n, 3 legs, 4) of joints 2 to 5 in rad; theta3 = arcsin(v / L3) keeps the sign that eq. (6) loses.
+
+        Joint 4 undoes joint 3 and joint 5 undoes joints 1 and 2, so that the platform does not turn.
+        """
+        legs = self.legs(errors)
+        big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
+        _, v = self._radial_tangential(_points(position_mm))
+        plane = np.arctan2(big_z, big_x)
+        second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
+        third = np.arcsin(v / legs[:, 3])
+        return np.stack([second, third, -third, -(angle + second)], axis=-1)
+
+    def _radial_tangential(self, position):
+        """Coordinates u and v (n, 3) of the points in the three legs."""
+        cx, cy = self.turn
+        x, y = position[:, :1], position[:, 1:2]
+        return x * cx + y * cy, y * cx - x * cy
+
+    def _chain(self, position_mm, theta_rad, legs):
+        """X, Z, rho v / s, rho, s and the true drive angle of every leg at every point, each (n, 3)."""
+        position = _points(position_mm)
+        angle = _points(theta_rad) + legs[:, 0]
+        u, v = self._radial_tangential(position)
+        with np.errstate(invalid="ignore"):
+            s = np.sqrt(legs[:, 3] ** 2 - v**2)
+        rho = legs[:, 2] + s
+        big_x = u + legs[:, 4] - legs[:, 1] * np.cos(angle)
+        big_z = position[:, 2:] - legs[:, 1] * np.sin(angle)
+        return big_x, big_z, rho * v / s, rho, s, angle
+
+
+def _points(array):
+    """The argument as a float array of shape (n, 3); raises ValueError for another shape."""
+    array = np.asarray(array, dtype=float)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"expected shape (n, 3), got {array.shape}")
+    return array

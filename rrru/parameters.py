@@ -1,0 +1,100 @@
+"""Named parameters and the map between names and vectors."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rrru.errors import ConfigError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a model: name, unit, nominal value, bounds and where these come from."""
+
+    name: str
+    unit: str
+    nominal: float = 0.0
+    low: float = -np.inf
+    high: float = np.inf
+    source: str = ""
+
+    def __post_init__(self):
+        if not self.low <= self.nominal <= self.high:
+            raise ConfigError(
+                f"parameter {self.name}: nominal {self.nominal} {self.unit} lies outside its bounds [{self.low}, {self.high}]"
+            )
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """An ordered set of parameters: the meaning of a parameter vector's entries."""
+
+    parameters: tuple[Parameter, ...]
+
+    def __post_init__(self):
+        if len(set(self.names)) != len(self.names):
+            raise ConfigError(f"parameter names are not unique: {self.names}")
+
+    def __len__(self):
+        return len(self.parameters)
+
+    def __iter__(self):
+        return iter(self.parameters)
+
+    def __getitem__(self, name):
+        return self.parameters[self.index(name)]
+
+    @property
+    def names(self):
+        """Names in the order of the vector."""
+        return tuple(p.name for p in self.parameters)
+
+    @property
+    def units(self):
+        """Units in the order of the vector."""
+        return tuple(p.unit for p in self.parameters)
+
+    @property
+    def nominal(self):
+        """Nominal values, shape (p,)."""
+        return np.array([p.nominal for p in self.parameters], dtype=float)
+
+    @property
+    def low(self):
+        """Lower bounds, shape (p,)."""
+        return np.array([p.low for p in self.parameters], dtype=float)
+
+    @property
+    def high(self):
+        """Upper bounds, shape (p,)."""
+        return np.array([p.high for p in self.parameters], dtype=float)
+
+    def index(self, name):
+        """Position of a name in the vector; raises ConfigError for an unknown name."""
+        if name not in self.names:
+            raise ConfigError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def vector(self, values=None):
+        """Vector, shape (p,), from a mapping of names to values; absent names are nominal."""
+        result = self.nominal
+        for name, value in dict(values or {}).items():
+            result[self.index(name)] = value
+        return result
+
+    def mapping(self, vector):
+        """Dict of names to values from a vector of shape (p,)."""
+        vector = np.asarray(vector, dtype=float)
+        if vector.shape != (len(self),):
+            raise ConfigError(f"expected {len(self)} values for {', '.join(self.names)}, got shape {vector.shape}")
+        return dict(zip(self.names, vector.tolist(), strict=True))
+
+    def with_bounds(self, bounds):
+        """New set with the bounds of some names replaced: {name: (low, high)}."""
+        changed = {self.index(name): limits for name, limits in bounds.items()}
+        return ParameterSet(
+            tuple(
+                replace(p, low=float(changed[i][0]), high=float(changed[i][1])) if i in changed else p
+                for i, p in enumerate(self.parameters)
+            )
+        )
