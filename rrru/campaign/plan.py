@@ -1,0 +1,121 @@
+"""What the robot is told to do: runs along trajectories, with time stamps, speed, payload and the path between the sampled points.
+
+Lengths in mm, times in s, angles in rad.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.interpolate import CubicSpline
+
+from rrru.campaign.motion import Trapezoid
+from rrru.campaign.trajectories import sample
+
+# Points of the path between two sampled points: enough for a drive that turns back between them to be seen by the play.
+_PATH_STEPS = 16
+_CURVE_SHARES = np.linspace(0.0, 1.0, 4001)
+
+
+@dataclass(frozen=True)
+class Run:
+    """One pass along a trajectory: its points (n, 3) in order, the profile, and the path it takes."""
+
+    trajectory: str
+    points_mm: np.ndarray
+    path_mm: np.ndarray
+    path_index: np.ndarray
+    time_s: np.ndarray
+    velocity_mm_s: np.ndarray
+    acceleration_mm_s2: np.ndarray
+    speed_mm_s: float
+    payload_kg: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Runs in the order in which they are driven, with the rest between them."""
+
+    runs: tuple[Run, ...]
+    dwell_s: float
+
+    def commands(self, mechanism):
+        """Table of the commanded points: run, trajectory, point, time, position, drive angles, speed, payload.
+
+        Raises UnreachableError where a point is out of the mechanism's reach.
+        """
+        frames, start = [], 0.0
+        for number, run in enumerate(self.runs, start=1):
+            theta = mechanism.require_reachable(run.points_mm)
+            frames.append(
+                pd.DataFrame(
+                    {
+                        "run": number,
+                        "trajectory": run.trajectory,
+                        "point": np.arange(1, len(run.points_mm) + 1),
+                        "time_s": start + run.time_s,
+                        **{f"command_{axis}_mm": run.points_mm[:, k] for k, axis in enumerate("xyz")},
+                        **{f"theta{k + 1}_rad": theta[:, k] for k in range(3)},
+                        "speed_mm_s": run.speed_mm_s,
+                        "payload_kg": run.payload_kg,
+                    }
+                )
+            )
+            start += run.time_s[-1] + self.dwell_s
+        return pd.concat(frames, ignore_index=True)
+
+    def path(self):
+        """Positions (N, 3) along everything that is driven, transfers between runs included, and the rows (n,) of the sampled points.
+
+        # ASSUME the robot goes straight from the end of a run to the start of the next.
+        """
+        pieces, index, length, last = [], [], 0, None
+        for run in self.runs:
+            if last is not None and not np.allclose(last, run.path_mm[0]):
+                transfer = last + np.linspace(0.0, 1.0, 2 * _PATH_STEPS)[1:-1, None] * (run.path_mm[0] - last)
+                pieces.append(transfer)
+                length += len(transfer)
+            pieces.append(run.path_mm)
+            index.append(length + run.path_index)
+            length += len(run.path_mm)
+            last = run.path_mm[-1]
+        return np.concatenate(pieces), np.concatenate(index)
+
+
+def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse=False):
+    """One pass along a trajectory, forward or in reverse, with the trapezoidal profile over its arc length."""
+    dense = trajectory.curve(_CURVE_SHARES[::-1] if reverse else _CURVE_SHARES)
+    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
+    spline = CubicSpline(arc, dense)
+    profile = Trapezoid(float(arc[-1]), speed_mm_s, acceleration_mm_s2)
+    points = sample(trajectory)[::-1] if reverse else sample(trajectory)
+    at_points = np.interp(np.linspace(0.0, 1.0, trajectory.count), _CURVE_SHARES, arc)
+    at_path = np.interp(np.linspace(0.0, 1.0, (trajectory.count - 1) * _PATH_STEPS + 1), _CURVE_SHARES, arc)
+    time = profile.time(at_points)
+    speed, along = profile.speed(time)[:, None], profile.acceleration(time)[:, None]
+    tangent, curvature = spline(at_points, 1), spline(at_points, 2)
+    return Run(
+        trajectory=trajectory.name,
+        points_mm=points,
+        path_mm=spline(at_path),
+        path_index=np.arange(trajectory.count) * _PATH_STEPS,
+        time_s=time,
+        velocity_mm_s=speed * tangent,
+        acceleration_mm_s2=along * tangent + speed**2 * curvature,
+        speed_mm_s=speed_mm_s,
+        payload_kg=payload_kg,
+    )
+
+
+def make_plan(trajectories, passes, speed_mm_s, acceleration_mm_s2, dwell_s):
+    """Plan of a campaign: every pass drives its trajectories one after another.
+
+    passes: mappings with the keys `reverse`, `speed_mm_s` (absent: the campaign's), `payload_kg` and `trajectories` (absent: all).
+    """
+    by_name = {trajectory.name: trajectory for trajectory in trajectories}
+    runs = []
+    for entry in passes:
+        for name in entry.get("trajectories", list(by_name)):
+            speed = entry.get("speed_mm_s", speed_mm_s)
+            runs.append(make_run(by_name[name], speed, acceleration_mm_s2, entry["payload_kg"], entry["reverse"]))
+    return Plan(tuple(runs), dwell_s)
