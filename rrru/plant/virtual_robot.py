@@ -1,0 +1,126 @@
+"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from rrru.effects.protocol import GRAVITY_MM_S2, Contribution, Motion
+from rrru.effects.registry import active_effects
+from rrru.errors import ConfigError
+from rrru.mechanisms import singularity
+from rrru.mechanisms.rrru3 import PUBLISHED, TIED, Rrru3
+from rrru.plant.spatial import PLACES, SpatialGeometry
+from rrru.plant.tracker import measure
+
+
+@dataclass(frozen=True)
+class VirtualRobot:
+    """A robot whose truth is known.
+
+    errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6): displacements of every axis;
+    effects: active effects; scatter_mm: joint wobble that does not repeat, 1 sigma per axis; masses in kg; singularity_margin:
+    constraint measure below which a command is reported; rotation_limit_rad: a larger platform rotation counts as unsolved.
+    """
+
+    mechanism: Rrru3 = field(default_factory=Rrru3)
+    errors: dict = field(default_factory=dict)
+    deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
+    effects: tuple = ()
+    scatter_mm: float = 0.0
+    platform_mass_kg: float = 3.0
+    forearm_mass_kg: float = 1.2
+    singularity_margin: float = 0.1
+    rotation_limit_rad: float = 0.05
+
+    @property
+    def drive_errors_rad(self):
+        """Constant errors (3,) of the drive angles."""
+        return np.array([self.errors.get(f"dtheta{k}", 0.0) for k in (1, 2, 3)])
+
+    @property
+    def geometry(self):
+        """The chains' lengths and displacements."""
+        robot = self.mechanism
+        nominal = (robot.R_mm, robot.L1_mm, robot.L2_mm, robot.L3_mm, robot.r_mm)
+        lengths = np.tile(nominal, (3, 1))
+        for leg in range(3):
+            for link in (1, 2, 3):
+                lengths[leg, link] += self.errors.get(f"dL{leg + 1}{link}", self.errors.get(f"dL{link}", 0.0))
+            lengths[leg, 0] += self.errors.get("dR", 0.0)
+            lengths[leg, 4] += self.errors.get("dr", 0.0)
+        return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.deviations)
+
+    def run(self, plan, noise_mm, generator, controller=None):
+        """Drive a plan; returns (measurements, truth) as frames.
+
+        controller: positions (n, 3) to drive angles (n, 3), by default the nominal inverse kinematics. `measurements` fits the schema of
+        that name with the commanded positions of the plan and the angles that the controller sent; `truth` holds the exact position,
+        the platform's rotation and both singularity measures. Noise is drawn for every row, solved or not, so that one lost
+        point does not change the others.
+        """
+        controller = controller or self.mechanism.inverse
+        commands = plan.commands(self.mechanism)
+        target = commands[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
+        motion = self.motion(plan, controller)
+        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        ideal = self.mechanism.inverse(target)
+        passive = self.mechanism.passive_angles(target, ideal)
+        drive = motion.theta_rad + self.drive_errors_rad + change.drive_rad
+        solution = self.geometry.solve(drive, passive, change.joint_mm)
+        turned = np.linalg.norm(solution.rotation_rad, axis=1)
+        solved = solution.converged & (turned <= self.rotation_limit_rad)
+        constraint = singularity.constraint_measure(self.mechanism, target, ideal)
+        position = np.where(solved[:, None], solution.position_mm + self.scatter_mm * generator.standard_normal(target.shape), np.nan)
+        measured = measure(position, noise_mm, generator)
+        measurements = commands.assign(
+            **{f"theta{k + 1}_rad": motion.theta_rad[:, k] for k in range(3)},
+            **{f"measured_{axis}_mm": measured[:, k] for k, axis in enumerate("xyz")},
+            status=np.where(~solved, "unsolved", np.where(constraint < self.singularity_margin, "near_singularity", "ok")),
+        )
+        truth = commands[["run", "trajectory", "point"]].assign(
+            **{f"true_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")},
+            platform_rotation_rad=turned,
+            translational_measure=singularity.translational_measure(self.mechanism, target, ideal),
+            constraint_measure=constraint,
+        )
+        return measurements, truth
+
+    def motion(self, plan, controller):
+        """What the effects may know about a plan driven through a controller."""
+        path, index = plan.path()
+        path_theta = controller(path)
+        target = np.concatenate([run.points_mm for run in plan.runs])
+        acceleration = np.concatenate([run.acceleration_mm_s2 for run in plan.runs])
+        payload = np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs])
+        direction = singularity.leg_forces(self.mechanism, target, self.mechanism.inverse(target))
+        mass = self.platform_mass_kg + payload + 1.5 * self.forearm_mass_kg
+        # N = kg m / s^2; half of each forearm hangs on the platform
+        load = mass[:, None] * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
+        force = -np.linalg.solve(direction.transpose(0, 2, 1), load[..., None])[..., 0]
+        return Motion(controller(target), path_theta, index, force, direction)
+
+
+def from_config(mechanism, section):
+    """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
+    known = (*PUBLISHED.names, *TIED.names)
+    for name in section["errors"]:
+        if name not in known:
+            raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(dict.fromkeys(known))}")
+    return VirtualRobot(
+        mechanism=mechanism,
+        errors={name: float(value) for name, value in section["errors"].items()},
+        deviations=_deviations(section["axis_errors"]),
+        effects=active_effects(section["effects"]),
+        scatter_mm=section["scatter_mm"],
+        platform_mass_kg=section["platform_mass_kg"],
+        forearm_mass_kg=section["forearm_mass_kg"],
+        singularity_margin=section["singularity_margin"],
+        rotation_limit_rad=section["rotation_limit_rad"],
+    )
+
+
+def _deviations(section):
+    """Displacements (3, 6 places, 6): normal draws of the stated sizes from the stated seed."""
+    generator = np.random.default_rng(section["seed"])
+    draw = generator.standard_normal((3, len(PLACES), 6))
+    return draw * np.repeat([section["position_mm"], section["angle_rad"]], 3)
