@@ -21,7 +21,7 @@ def elite_count(size, share):
 
 
 def child_counts(size, elites, crossover_fraction):
-    """Numbers of children by crossover and by mutation: the fraction, rounded half up, of the places that the elites leave, and the rest."""
+    """Numbers of children by crossover (the fraction, rounded half up, of the places that the elites leave) and by mutation (the rest)."""
     places = size - elites
     crossed = math.floor(round(crossover_fraction * places, 9) + 0.5)
     return crossed, places - crossed
@@ -33,8 +33,8 @@ def shift_linear(score, parents):
 
     Affine in the score, with mean d = parents / n over the feasible individuals; the best gets SURVIVAL_RATE d, unless the worst would fall
     below zero: then the worst gets zero. Where all scores are equal, or none is finite, everyone gets the same.
-    # ASSUME an infeasible individual (score not finite) gets no place as long as anyone is feasible, and does not enter mean and extremes.
     """
+    # ASSUME an infeasible individual (score not finite) gets no place as long as anyone is feasible, and does not enter mean and extremes.
     n = score.size
     feasible = 0
     best, worst = np.inf, -np.inf
@@ -94,9 +94,9 @@ def shuffled(values, uniform):
 
 @_compiled
 def scattered(population, parents, coin):
-    """Children (k, p) of consecutive pairs among the parents' indices (2 k,): a gene of the first where coin (k, p) < 1/2, else the second's.
+    """Children (k, p) of consecutive pairs among the parents' indices (2 k,), with a population of shape (n, p).
 
-    Population of shape (n, p).
+    A gene is the first parent's where coin (k, p) < 1/2, else the second's.
     """
     children = np.empty(coin.shape)
     for i in range(coin.shape[0]):
@@ -107,12 +107,10 @@ def scattered(population, parents, coin):
 
 @_compiled
 def gaussian(population, parents, step):
-    """Mutants (k, p) of the parents' indices (k,) in a population (n, p), every gene moved by step (k, p) and folded back into 0..1.
-
-    # ASSUME the paper does not name its mutation. MATLAB's Gaussian mutation knows no bounds, and its default with bounds ("adaptive
-    # feasible") is another operator. Reflection at the bounds keeps the step's symmetric distribution inside; clipping would put three of
-    # four first-generation genes exactly onto a bound (step of one range) and make "at the bound" meaningless as a sign of a bad fit.
-    """
+    """Mutants (k, p) of the parents' indices (k,) in a population (n, p), every gene moved by step (k, p) and folded back into 0..1."""
+    # ASSUME the paper names neither its mutation nor its bounds. MATLAB's Gaussian mutation knows no bounds, and its default with bounds
+    # ("adaptive feasible") is another operator. Genes are reflected at the bounds: with steps of one range, clipping would put nearly two
+    # of three mutated genes exactly onto a bound, finds worse minima, and makes "at the bound" meaningless as the sign of a bad fit.
     children = np.empty(step.shape)
     for i in range(step.shape[0]):
         for q in range(step.shape[1]):
@@ -122,11 +120,8 @@ def gaussian(population, parents, step):
 
 
 def mutation_sigma(generation, generations, scale, shrink):
-    """Standard deviation of the mutation, in units of the range, in generation 1..generations: scale (1 - shrink generation / generations).
-
-    A shrink above one reaches zero early and stays there.
-    """
-    return max(scale * (1.0 - shrink * generation / generations), 0.0)
+    """Standard deviation of the mutation, in units of the range, in generation g = 1..generations: scale (1 - shrink g / generations)."""
+    return scale * (1.0 - shrink * generation / generations)
 
 
 def draws_needed(plan, genes):

@@ -14,7 +14,7 @@ from rrru.campaign.trajectories import sample
 
 # Points of the path between two sampled points: enough for a drive that turns back between them to be seen by the play.
 _PATH_STEPS = 16
-_CURVE_SHARES = np.linspace(0.0, 1.0, 4001)
+_CURVE_SHARES = np.linspace(0.0, 1.0, 1001)
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,10 @@ class Plan:
             )
             start += run.time_s[-1] + self.dwell_s
         return pd.concat(frames, ignore_index=True)
+
+    def targets(self):
+        """Commanded positions (n, 3) of all sampled points in order."""
+        return np.concatenate([run.points_mm for run in self.runs])
 
     def path(self):
         """Positions (N, 3) along everything that is driven, transfers between runs included, and the rows (n,) of the sampled points.

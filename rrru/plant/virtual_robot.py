@@ -60,17 +60,13 @@ class VirtualRobot:
         """
         controller = controller or self.mechanism.inverse
         commands = plan.commands(self.mechanism)
-        target = commands[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
+        target = plan.targets()
         motion = self.motion(plan, controller)
-        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        position, turned = self.positions(motion, target)
+        solved = np.isfinite(position).all(axis=1)
         ideal = self.mechanism.inverse(target)
-        passive = self.mechanism.passive_angles(target, ideal)
-        drive = motion.theta_rad + self.drive_errors_rad + change.drive_rad
-        solution = self.geometry.solve(drive, passive, change.joint_mm)
-        turned = np.linalg.norm(solution.rotation_rad, axis=1)
-        solved = solution.converged & (turned <= self.rotation_limit_rad)
         constraint = singularity.constraint_measure(self.mechanism, target, ideal)
-        position = np.where(solved[:, None], solution.position_mm + self.scatter_mm * generator.standard_normal(target.shape), np.nan)
+        position = position + self.scatter_mm * generator.standard_normal(target.shape)
         measured = measure(position, noise_mm, generator)
         measurements = commands.assign(
             **{f"theta{k + 1}_rad": motion.theta_rad[:, k] for k in range(3)},
@@ -85,11 +81,24 @@ class VirtualRobot:
         )
         return measurements, truth
 
+    def positions(self, motion, target):
+        """Platform centres (n, 3) and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
+
+        NaN where the chains do not close near the target or the platform would turn by more than the limit.
+        """
+        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
+        drive = motion.theta_rad + self.drive_errors_rad + change.drive_rad
+        solution = self.geometry.solve(drive, passive, change.joint_mm)
+        turned = np.linalg.norm(solution.rotation_rad, axis=1)
+        solved = solution.converged & (turned <= self.rotation_limit_rad)
+        return np.where(solved[:, None], solution.position_mm, np.nan), turned
+
     def motion(self, plan, controller):
         """What the effects may know about a plan driven through a controller."""
         path, index = plan.path()
         path_theta = controller(path)
-        target = np.concatenate([run.points_mm for run in plan.runs])
+        target = plan.targets()
         acceleration = np.concatenate([run.acceleration_mm_s2 for run in plan.runs])
         payload = np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs])
         direction = singularity.leg_forces(self.mechanism, target, self.mechanism.inverse(target))
