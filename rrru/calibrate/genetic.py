@@ -16,7 +16,7 @@ from rrru.calibrate import islands, operators
 from rrru.errors import ConfigError, FitError
 
 # PyGAD logs every exception before raising it again; the exception is enough
-_LOGGER = logging.getLogger(__name__)
+_LOGGER = logging.getLogger(f"{__name__}.pygad")
 _LOGGER.addHandler(logging.NullHandler())
 _LOGGER.propagate = False
 

@@ -9,6 +9,7 @@ from scipy import optimize
 from rrru.calibrate.identifiability import Identifiability, analyse
 from rrru.errors import FitError
 
+_OUT_OF_REACH_MM = 1e6
 LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 
 
@@ -80,7 +81,9 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
         residual_mm=residual,
         noise_mm=estimated if noise_mm is None else noise_mm,
         noise_from="residuals" if noise_mm is None else "given",
-        at_bound=np.isclose(errors, parameters.low, rtol=1e-6, atol=0.0) | np.isclose(errors, parameters.high, rtol=1e-6, atol=0.0) | outside,
+        at_bound=np.isclose(errors, parameters.low, rtol=1e-6, atol=0.0)
+        | np.isclose(errors, parameters.high, rtol=1e-6, atol=0.0)
+        | outside,
         identifiability=analyse(residuals.mechanism, residuals.jacobian(errors)),
         evaluations=int(solution.nfev),
     )
@@ -114,6 +117,9 @@ def least_mean_distance(residuals, start):
     def parts(key):
         errors = start + seen @ np.frombuffer(key)
         residual = residuals.residual(errors)
+        if not np.isfinite(residual).all():
+            # a trial step left the reach: a value that the trust region turns away from
+            return np.full(len(residuals), _OUT_OF_REACH_MM), np.zeros((len(residuals), ident.rank)), np.zeros((1, 3, ident.rank))
         distance = np.maximum(np.linalg.norm(residual, axis=1), 1e-12)
         jacobian = residuals.jacobian(errors) @ seen
         return distance, np.einsum("na,nap->np", residual / distance[:, None], jacobian), jacobian
@@ -126,7 +132,7 @@ def least_mean_distance(residuals, start):
 
     def hessian(q):
         distance, along, jacobian = parts(q.tobytes())
-        weighted = jacobian / np.sqrt(distance)[:, None, None]
+        weighted = jacobian / np.sqrt(distance[: len(jacobian)])[:, None, None]
         flat, along = weighted.reshape(-1, weighted.shape[-1]), along / np.sqrt(distance)[:, None]
         return (flat.T @ flat - along.T @ along) / len(residuals)
 

@@ -27,6 +27,9 @@ class Residuals:
             bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
             if bad.size:
                 raise FitError(f"{name} is not finite at {bad.size} of {len(self)} points, the first is point {bad[0] + 1}")
+        lost = np.flatnonzero(np.isnan(self.nominal_mm).any(axis=1))
+        if lost.size:
+            raise FitError(f"the nominal robot cannot take {lost.size} of {len(self)} poses, the first is point {lost[0] + 1}")
 
     def __len__(self):
         return len(self.theta_rad)

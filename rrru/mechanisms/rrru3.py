@@ -9,6 +9,7 @@ R and r enter only as r - R: of the 14 published errors, tied across the legs to
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -20,33 +21,24 @@ LEG_COLUMNS = ("dtheta_rad", "L1_mm", "L2_mm", "L3_mm", "r_minus_R_mm")
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
 
 # ASSUME the paper prints no search bounds; these hold Table 6 read in radians (0.0201 rad) and twice the largest printed length error.
-_ANGLE_LIMIT_RAD = 0.03
-_LENGTH_LIMIT_MM = 4.0
+ANGLE_LIMIT_RAD = 0.03
+LENGTH_LIMIT_MM = 4.0
 _SOURCE = "paper A, section 2.2; bounds assumed"
-
-
-def _errors(*names):
-    """Error parameters, nominally zero, with the default bounds."""
-    return ParameterSet(
-        tuple(
-            Parameter(
-                name,
-                "rad" if name.startswith("dtheta") else "mm",
-                0.0,
-                *((-_ANGLE_LIMIT_RAD, _ANGLE_LIMIT_RAD) if name.startswith("dtheta") else (-_LENGTH_LIMIT_MM, _LENGTH_LIMIT_MM)),
-                _SOURCE,
-            )
-            for name in names
-        )
-    )
-
-
 _ANGLES = ("dtheta1", "dtheta2", "dtheta3")
-PUBLISHED = _errors(*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr")
-TIED = _errors(*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr")
-# The gauge: R and r shift every leg by the same r - R, so that one number, da = dr - dR, stands for both.
-IDENTIFIABLE = _errors(*_ANGLES, "dL1", "dL2", "dL3", "da")
-PARAMETER_SETS = {"published": PUBLISHED, "tied": TIED, "identifiable": IDENTIFIABLE}
+# The gauge: R and r shift every leg by the same r - R, so that in the identifiable set one number, da = dr - dR, stands for both.
+ERROR_NAMES = {
+    "published": (*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr"),
+    "tied": (*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr"),
+    "identifiable": (*_ANGLES, "dL1", "dL2", "dL3", "da"),
+}
+
+
+def _error_parameter(name, angle_limit_rad, length_limit_mm):
+    """One error parameter, nominally zero; da, which stands for two lengths, has twice a length's limit."""
+    if name in _ANGLES:
+        return Parameter(name, "rad", 0.0, -angle_limit_rad, angle_limit_rad, _SOURCE)
+    limit = length_limit_mm * (2.0 if name == "da" else 1.0)
+    return Parameter(name, "mm", 0.0, -limit, limit, _SOURCE)
 
 
 def _leg_map(names):
@@ -93,26 +85,28 @@ class Rrru3:
     r_mm: float = 400.0
     azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
     errors: str = "identifiable"
+    angle_limit_rad: float = ANGLE_LIMIT_RAD
+    length_limit_mm: float = LENGTH_LIMIT_MM
     name: str = field(default="rrru3", init=False)
 
     def __post_init__(self):
-        for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm"):
+        for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
             if not getattr(self, key) > 0.0:
-                raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive length")
-        if self.errors not in PARAMETER_SETS:
-            raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(PARAMETER_SETS)}")
+                raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive number")
+        if self.errors not in ERROR_NAMES:
+            raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
 
-    @property
+    @cached_property
     def parameters(self):
         """The error parameters: the meaning of every `errors` vector."""
-        return PARAMETER_SETS[self.errors]
+        return ParameterSet(tuple(_error_parameter(name, self.angle_limit_rad, self.length_limit_mm) for name in ERROR_NAMES[self.errors]))
 
-    @property
+    @cached_property
     def turn(self):
         """Cosines and sines of the legs' azimuths, shape (2, 3)."""
         return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
 
-    @property
+    @cached_property
     def leg_map(self):
         """Derivative of the legs' numbers with respect to the errors, shape (3, 5, p)."""
         return _leg_map(self.parameters.names)

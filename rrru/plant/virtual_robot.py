@@ -8,7 +8,7 @@ from rrru.effects.protocol import GRAVITY_MM_S2, Contribution, Motion
 from rrru.effects.registry import active_effects
 from rrru.errors import ConfigError
 from rrru.mechanisms import singularity
-from rrru.mechanisms.rrru3 import PUBLISHED, TIED, Rrru3
+from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3
 from rrru.plant.spatial import PLACES, SpatialGeometry
 from rrru.plant.tracker import measure
 
@@ -111,10 +111,10 @@ class VirtualRobot:
 
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
-    known = (*PUBLISHED.names, *TIED.names)
+    known = tuple(dict.fromkeys((*ERROR_NAMES["tied"], *ERROR_NAMES["published"])))
     for name in section["errors"]:
         if name not in known:
-            raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(dict.fromkeys(known))}")
+            raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")
     return VirtualRobot(
         mechanism=mechanism,
         errors={name: float(value) for name, value in section["errors"].items()},

@@ -46,6 +46,17 @@ def _xyz(prefix, suffix, text, nullable=False):
     return tuple(Column(f"{prefix}_{axis}_{suffix}", "float64", f"{text}, {axis}", nullable) for axis in "xyz")
 
 
+_CAMPAIGN = Column("campaign", "str", "name of the campaign in the configuration")
+_CALIBRATION = Column("calibration", "str", "set of trajectories that was calibrated on; none before any calibration")
+_METHOD = Column("method", "str", "how: least_squares, least_mean_distance (the optimum of the paper's objective), genetic; none before")
+_MODE = Column(
+    "mode",
+    "str",
+    "before: measured minus commanded; model: measured minus calibrated model; closed_loop: driven again with corrected commands",
+    allowed=("before", "model", "closed_loop"),
+)
+_NUMBER = "float64"
+
 STATUS = ("ok", "outlier", "near_singularity", "unsolved")
 
 _ALL = (
@@ -66,6 +77,180 @@ _ALL = (
             Column("status", "str", "ok: used in fits; every other point is kept, reported and left out of fits", allowed=STATUS),
         ),
         ("run", "point"),
+    ),
+    Table(
+        "truth",
+        "campaigns/{campaign}/truth.parquet",
+        "What only the virtual robot knows, one row per commanded point.",
+        (
+            Column("run", "int64", "as in measurements"),
+            Column("trajectory", "str", "as in measurements"),
+            Column("point", "int64", "as in measurements"),
+            *_xyz("true", "mm", "true position, wobble included; null where the chains do not close", True),
+            Column("platform_rotation_rad", _NUMBER, "angle by which the platform has turned; null where the chains do not close", True),
+        ),
+        ("run", "point"),
+    ),
+    Table(
+        "singularity",
+        "tables/singularity.parquet",
+        "Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: 0 at it, 1 at best).",
+        (
+            _CAMPAIGN,
+            Column("run", "int64", "as in measurements"),
+            Column("trajectory", "str", "as in measurements"),
+            Column("point", "int64", "as in measurements"),
+            Column("translational_measure", _NUMBER, "0 where the platform can move with locked drives"),
+            Column("constraint_measure", _NUMBER, "0 where the platform can turn with locked drives; eq. (8) does not see it"),
+            Column("constraint_determinant", _NUMBER, "changes its sign across a constraint singularity"),
+            Column("status", "str", "as in measurements", allowed=STATUS),
+        ),
+        ("campaign", "run", "point"),
+    ),
+    Table(
+        "campaigns",
+        "tables/campaigns.parquet",
+        "One row per campaign: where it came from and what state it is in.",
+        (
+            _CAMPAIGN,
+            Column("robot", "str", "mechanism"),
+            Column("source", "str", "virtual robot or file"),
+            Column("points", "int64", "commanded points"),
+            Column("runs", "int64", "passes"),
+            *(Column(name, "int64", f"points with status {name}") for name in STATUS),
+            Column("noise_mm", _NUMBER, "measuring noise per axis, 1 sigma"),
+            Column(
+                "noise_from",
+                "str",
+                "given: by the configuration; repeats: pooled over repeated points; residuals: from the fit of all points",
+                allowed=("given", "repeats", "residuals"),
+            ),
+            Column("registration_rms_mm", _NUMBER, "residual of the frame registration; null where the frame was the robot's", True),
+            Column("registration_max_mm", _NUMBER, "largest residual of the frame registration", True),
+            Column("min_translational_measure", _NUMBER, "nearest approach to a translational singularity"),
+            Column("min_constraint_measure", _NUMBER, "nearest approach to a constraint singularity"),
+            Column("notes", "str", "what was computed or missing on ingest; empty where nothing was"),
+        ),
+        ("campaign",),
+    ),
+    Table(
+        "calibrations",
+        "tables/calibrations.parquet",
+        "One row per calibration: how well it fits and how well the points determine it.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            Column("points", "int64", "points fitted"),
+            Column("mean_mm", _NUMBER, "mean distance: the paper's objective"),
+            Column("rms_mm", _NUMBER, "root mean square distance"),
+            Column("max_mm", _NUMBER, "largest distance"),
+            Column("noise_mm", _NUMBER, "noise per axis that the standard errors assume"),
+            Column("noise_from", "str", "given, or residuals", allowed=("given", "residuals")),
+            Column("rank", "int64", "parameter combinations that the points see, of 7"),
+            Column("condition", _NUMBER, "condition number of the scaled Jacobian (angles as arcs at the end of the drive arm)"),
+            *(
+                Column(f"O{k}_observability", _NUMBER, text)
+                for k, text in enumerate(
+                    (
+                        "geometric mean of the singular values over sqrt(points)",
+                        "inverse condition",
+                        "smallest singular value",
+                        "smallest squared over largest",
+                        "inverse sum of inverse singular values",
+                    ),
+                    start=1,
+                )
+            ),
+            Column("evaluations", "int64", "evaluations of the residuals"),
+            Column("parameters_at_bound", "int64", "parameters that ended at a bound"),
+        ),
+        ("campaign", "calibration", "method"),
+    ),
+    Table(
+        "parameters",
+        "tables/parameters.parquet",
+        "Fitted errors of the mechanism; da = dr - dR, since R and r enter only as r - R.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            Column("parameter", "str", "name of the error"),
+            Column("unit", "str", "unit of the value", allowed=("rad", "mm")),
+            Column("value", _NUMBER, "fitted error"),
+            Column("standard_error", _NUMBER, "1 sigma; null for methods without one and for unseen parameters", True),
+            Column("seen", "bool", "false where the points do not determine the parameter; its value then is the nominal one in part"),
+            Column("at_bound", "bool", "true where the fit ended at a bound"),
+            Column("true_value", _NUMBER, "the virtual robot's; null where nobody knows", True),
+        ),
+        ("campaign", "calibration", "method", "parameter"),
+    ),
+    Table(
+        "correlations",
+        "tables/correlations.parquet",
+        "Correlation of the least-squares estimates.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            Column("parameter_a", "str", "name"),
+            Column("parameter_b", "str", "name"),
+            Column("correlation", _NUMBER, "-1 to 1; null where a parameter is not seen", True),
+        ),
+        ("campaign", "calibration", "parameter_a", "parameter_b"),
+    ),
+    Table(
+        "observability",
+        "tables/observability.parquet",
+        "Directions of parameter space from the best seen to the worst, and what each is made of.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            Column("direction", "int64", "1: best seen"),
+            Column("singular_value", _NUMBER, "mm of the stacked positions per mm along the direction"),
+            Column("standard_error_mm", _NUMBER, "1 sigma along the direction; null where it is not seen", True),
+            Column("parameter", "str", "name"),
+            Column("weight", _NUMBER, "entry of the unit direction, angles as arcs at the end of the drive arm"),
+        ),
+        ("campaign", "calibration", "direction", "parameter"),
+    ),
+    Table(
+        "errors",
+        "tables/errors.parquet",
+        "Error of every point before calibration and under every calibration.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            _MODE,
+            Column("run", "int64", "as in measurements"),
+            Column("trajectory", "str", "as in measurements"),
+            Column("point", "int64", "as in measurements"),
+            *_xyz("error", "mm", "error; null where the point was not used", True),
+            Column("error_mm", _NUMBER, "size of the error", True),
+        ),
+        ("campaign", "calibration", "method", "mode", "run", "point"),
+    ),
+    Table(
+        "error_summary",
+        "tables/error_summary.parquet",
+        "The errors per trajectory (and all_lines, all), with accuracies after ISO 9283.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            _MODE,
+            Column("trajectory", "str", "trajectory, all_lines or all"),
+            Column("points", "int64", "points with an error"),
+            *(
+                Column(f"{name}_mm", _NUMBER, f"{text} of the error's size", True)
+                for name, text in (("min", "minimum"), ("mean", "mean"), ("rms", "root mean square"), ("max", "maximum"))
+            ),
+            Column("repeats", "int64", "smallest number of passes under the same conditions"),
+            Column("pose_accuracy_mm", _NUMBER, "ISO 9283 AP: largest distance of a barycentre from its command", True),
+            Column("path_accuracy_mm", _NUMBER, "ISO 9283 AT: the same, across the path only", True),
+            Column("repeatability_mm", _NUMBER, "ISO 9283 RP: largest l + 3 S_l; null without repeats", True),
+        ),
+        ("campaign", "calibration", "method", "mode", "trajectory"),
     ),
 )
 

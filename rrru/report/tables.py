@@ -1,6 +1,5 @@
 """Result tables on disk: parquet with a schema that is checked on writing; a table is either whole or absent."""
 
-import os
 from pathlib import Path
 
 import pandera.errors
@@ -11,6 +10,11 @@ from rrru.errors import TableError
 from rrru.report.schemas import TABLES
 
 _ARROW = {"int64": arrow.int64(), "float64": arrow.float64(), "str": arrow.string(), "bool": arrow.bool_()}
+
+
+def columns(name):
+    """Names of a table's columns in order."""
+    return [column.name for column in TABLES[name].columns]
 
 
 def check(name, frame):
@@ -35,7 +39,7 @@ def write(name, frame, path):
     partial = path.parent / f".{path.name}.partial"
     try:
         parquet.write_table(data, partial, compression="zstd")
-        os.replace(partial, path)
+        partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
 
@@ -43,4 +47,3 @@ def write(name, frame, path):
 def read(path):
     """The table at a path as a frame."""
     return parquet.read_table(path).to_pandas()
-

@@ -1,0 +1,23 @@
+import sys
+
+from snakemake.utils import min_version, validate
+
+min_version("9.0")
+
+
+configfile: "config.yaml"
+
+
+validate(config, "workflow/schemas/config.schema.yaml")
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/campaign.smk"
+include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/compensate.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        study_tables(),

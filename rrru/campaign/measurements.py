@@ -1,0 +1,64 @@
+"""Reading columns of a measurement table as arrays, and choosing rows of it. Lengths in mm, angles in rad."""
+
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+USED = ("ok", "near_singularity")
+
+
+def command(measurements):
+    """Commanded positions (n, 3)."""
+    return measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+
+
+def measured(measurements):
+    """Measured positions (n, 3), NaN where not measured."""
+    return measurements[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+
+
+def theta(measurements):
+    """Commanded drive angles (n, 3)."""
+    return measurements[[f"theta{k}_rad" for k in (1, 2, 3)]].to_numpy(dtype=float)
+
+
+def on_trajectories(measurements, patterns):
+    """Rows (n,) on trajectories whose name fits one of the patterns (* matches anything)."""
+    names = measurements["trajectory"].unique()
+    chosen = [name for name in names if any(fnmatchcase(name, pattern) for pattern in patterns)]
+    return measurements["trajectory"].isin(chosen).to_numpy()
+
+
+def usable(measurements, use_near_singularity=True):
+    """Rows (n,) that fits may use: measured, no outlier and, if so asked, not near a singularity."""
+    allowed = USED if use_near_singularity else USED[:1]
+    return measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1)
+
+
+def repeat_noise(measurements):
+    """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
+
+    Repeats share the trajectory, the commanded position, the neighbour before it (direction of motion), speed and payload. NaN and 0
+    where nothing repeats. What moves the robot from pass to pass counts as noise here.
+    """
+    frame = measurements.loc[usable(measurements)].copy()
+    axes = [f"measured_{axis}_mm" for axis in "xyz"]
+    frame["direction"] = direction(frame)
+    keys = ["trajectory", "direction", *(f"command_{axis}_mm" for axis in "xyz"), "speed_mm_s", "payload_kg"]
+    groups = frame.groupby(keys, dropna=False, sort=False)[axes]
+    deviation = (frame[axes] - groups.transform("mean")).to_numpy()
+    freedom = 3 * int(len(frame) - groups.ngroups)
+    return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
+
+
+def direction(measurements):
+    """+1 or -1 (n,): whether a run passes its trajectory in the direction of the first run along it or against it."""
+    result = np.ones(len(measurements), dtype=int)
+    first = {}
+    position = command(measurements)
+    for (trajectory, _), rows in measurements.reset_index(drop=True).groupby(["trajectory", "run"], sort=False):
+        points = position[rows.index.to_numpy()]
+        start = first.setdefault(trajectory, points[0])
+        if np.linalg.norm(points[0] - start) > np.linalg.norm(points[-1] - start):
+            result[rows.index.to_numpy()] = -1
+    return result

@@ -1,0 +1,149 @@
+"""From a validated configuration to the objects of a study. The only module that knows the configuration as a whole."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from rrru.calibrate.campaign_fit import select
+from rrru.calibrate.least_squares import least_squares
+from rrru.campaign import measurements as rows
+from rrru.campaign import trajectories
+from rrru.campaign.plan import make_plan
+from rrru.errors import ConfigError
+from rrru.mechanisms import singularity
+from rrru.mechanisms.protocol import make_mechanism
+from rrru.plant import virtual_robot
+from rrru.seeds import stream
+
+_INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points", "extra_columns", "elbow")
+
+
+def mechanism(config, campaign, errors="identifiable"):
+    """The nominal robot of a campaign with the chosen error parameters and the configuration's bounds."""
+    name = config["campaigns"][campaign]["robot"]
+    bounds = config["calibration"]["bounds"]
+    return make_mechanism(
+        name,
+        config["robots"].get(name, {}),
+        errors=errors,
+        angle_limit_rad=bounds["angle_rad"],
+        length_limit_mm=bounds["length_mm"],
+    )
+
+
+@dataclass(frozen=True)
+class VirtualCampaign:
+    """A campaign of a virtual robot: the robot, what it is told to do, the tracker's noise and a generator per purpose."""
+
+    robot: virtual_robot.VirtualRobot
+    plan: object
+    noise_mm: float
+    seed: int
+    name: str
+
+    def generator(self, *labels):
+        """Random stream of this campaign for a purpose."""
+        return stream(self.seed, "campaign", self.name, *labels)
+
+    def run(self):
+        """Measurements and truth with the nominal controller."""
+        return self.robot.run(self.plan, self.noise_mm, self.generator("measure"))
+
+
+def is_virtual(config, campaign):
+    """True where the campaign is simulated, False where it is read from a file."""
+    return "virtual" in config["campaigns"][campaign]
+
+
+def virtual_campaign(config, campaign):
+    """The virtual campaign of that name; raises ConfigError where a name that it refers to does not exist."""
+    section = config["campaigns"][campaign]
+    robot = _entry(config, "virtual_robots", section["virtual"], campaign)
+    motion = config["motion"]
+    plan = make_plan(
+        trajectories.from_config(_entry(config, "trajectories", section["trajectories"], campaign)),
+        section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
+        motion["speed_mm_s"],
+        motion["acceleration_mm_s2"],
+        motion["dwell_s"],
+    )
+    return VirtualCampaign(
+        virtual_robot.from_config(mechanism(config, campaign), robot), plan, section["noise_mm"], config["seed"], campaign
+    )
+
+
+def ingest_campaign(config, campaign):
+    """The ingested file of a campaign; raises IngestError where it is refused."""
+    from rrru.campaign.ingest import IngestSpec, ingest
+
+    section = config["campaigns"][campaign]
+    options = {key: section[key] for key in _INGEST_KEYS if key in section}
+    if "registration_points" in options:
+        options["registration_points"] = tuple(tuple(pair) for pair in options["registration_points"])
+    return ingest(IngestSpec(path=section["ingest"], **options), mechanism(config, campaign))
+
+
+def true_errors(config, campaign):
+    """The virtual robot's true errors by name, or None for an ingested campaign."""
+    if not is_virtual(config, campaign):
+        return None
+    return _entry(config, "virtual_robots", config["campaigns"][campaign]["virtual"], campaign)["errors"]
+
+
+def noise(config, campaign, measurements):
+    """Noise per axis in mm and where it is from: given in the configuration, else from repeated points, else from the fit of all points."""
+    given = config["campaigns"][campaign].get("noise_mm")
+    if given is not None:
+        return given, "given"
+    repeated, freedom = rows.repeat_noise(measurements)
+    if freedom >= 30 and repeated > 0.0:
+        return repeated, "repeats"
+    residuals = select(measurements, mechanism(config, campaign), ["*"])
+    if residuals is None:
+        raise ConfigError(f"campaigns.{campaign}: too few usable points to estimate noise_mm; give it")
+    return least_squares(residuals).noise_mm, "residuals"
+
+
+def singularity_table(robot, measurements):
+    """Rows of `singularity` (without the campaign's name)."""
+    position, theta = rows.command(measurements), rows.theta(measurements)
+    return measurements[["run", "trajectory", "point", "status"]].assign(
+        translational_measure=singularity.translational_measure(robot, position, theta),
+        constraint_measure=singularity.constraint_measure(robot, position, theta),
+        constraint_determinant=singularity.constraint_determinant(robot, position, theta),
+    )
+
+
+def campaign_row(config, campaign, measurements, singular, ingested=None):
+    """The row of `campaigns`."""
+    noise_mm, noise_from = noise(config, campaign, measurements)
+    section = config["campaigns"][campaign]
+    registration = ingested.registration if ingested else None
+    counts = measurements["status"].value_counts()
+    return pd.DataFrame(
+        [
+            {
+                "campaign": campaign,
+                "robot": section["robot"],
+                "source": f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}",
+                "points": len(measurements),
+                "runs": measurements["run"].nunique(),
+                **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "near_singularity", "unsolved")},
+                "noise_mm": noise_mm,
+                "noise_from": noise_from,
+                "registration_rms_mm": registration.rms_mm if registration else np.nan,
+                "registration_max_mm": registration.max_mm if registration else np.nan,
+                "min_translational_measure": singular["translational_measure"].min(),
+                "min_constraint_measure": singular["constraint_measure"].min(),
+                "notes": "; ".join(ingested.notes) if ingested else "",
+            }
+        ]
+    )
+
+
+def _entry(config, section, name, campaign):
+    """config[section][name]; raises ConfigError naming campaign, section and what exists."""
+    if name not in config[section]:
+        raise ConfigError(f"campaigns.{campaign}: {section} has no {name!r}; known: {', '.join(config[section])}")
+    return config[section][name]

@@ -1,0 +1,39 @@
+CAMPAIGN_ROOMS = ("errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
+
+
+def campaign_file(wildcards):
+    """The file of an ingested campaign, nothing for a virtual one."""
+    return config["campaigns"][wildcards.campaign].get("ingest", [])
+
+
+rule campaign:
+    input:
+        file=campaign_file,
+    output:
+        measurements=part("measurements"),
+        truth=part("truth"),
+        singularity=part("singularity"),
+        campaigns=part("campaigns"),
+    log:
+        f"{RESULTS}/logs/campaign/{{campaign}}.log",
+    params:
+        section=lambda wildcards: config["campaigns"][wildcards.campaign],
+        settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
+        code=code_digest(*CAMPAIGN_ROOMS),
+    script:
+        "../scripts/campaign.py"
+
+
+rule gather:
+    input:
+        lambda wildcards: [part(wildcards.table, campaign) for campaign in CAMPAIGNS],
+    output:
+        table("{table}"),
+    wildcard_constraints:
+        table="|".join(CAMPAIGN_TABLES),
+    log:
+        f"{RESULTS}/logs/gather/{{table}}.log",
+    params:
+        code=code_digest("report/tables", "report/schemas"),
+    script:
+        "../scripts/gather.py"

@@ -1,0 +1,14 @@
+rule compensate:
+    input:
+        measurements=part("measurements"),
+        parameters=part("parameters"),
+    output:
+        errors=part("errors"),
+        error_summary=part("error_summary"),
+    log:
+        f"{RESULTS}/logs/compensate/{{campaign}}.log",
+    params:
+        settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
+        code=code_digest(*CALIBRATE_ROOMS, "compensate"),
+    script:
+        "../scripts/compensate.py"

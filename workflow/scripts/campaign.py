@@ -1,0 +1,27 @@
+"""One campaign: driven by a virtual robot or read from a file."""
+
+import pandas as pd
+
+from rrru import study
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, campaign, outputs):
+    """Write measurements, truth (empty for a file), singularity measures and the campaign's row."""
+    ingested = None
+    if study.is_virtual(config, campaign):
+        measurements, truth = study.virtual_campaign(config, campaign).run()
+    else:
+        ingested = study.ingest_campaign(config, campaign)
+        measurements, truth = ingested.measurements, pd.DataFrame(columns=tables.columns("truth"))
+    singular = study.singularity_table(study.mechanism(config, campaign), measurements)
+    tables.write("measurements", measurements, outputs["measurements"])
+    tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
+    tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])
+    tables.write("campaigns", study.campaign_row(config, campaign, measurements, singular, ingested), outputs["campaigns"])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.wildcards.campaign, snakemake.output)
