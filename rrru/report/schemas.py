@@ -57,6 +57,18 @@ _MODE = Column(
 )
 _NUMBER = "float64"
 
+_SETTING = (
+    Column("parameter", "str", "swept setting", allowed=("crossover_fraction", "migration_fraction")),
+    Column("population", "str", "one population, or islands", allowed=("one", "islands")),
+    Column("value", _NUMBER, "value of the setting"),
+)
+_HISTORY = (
+    Column("seed", "int64", "number of the run"),
+    Column("generation", "int64", "0: initial population"),
+    Column("best_mm", _NUMBER, "lowest mean distance so far"),
+    Column("mean_mm", _NUMBER, "mean over the population; infinite where a member is out of reach"),
+)
+
 STATUS = ("ok", "outlier", "near_singularity", "unsolved")
 
 _ALL = (
@@ -251,6 +263,158 @@ _ALL = (
             Column("repeatability_mm", _NUMBER, "ISO 9283 RP: largest l + 3 S_l; null without repeats", True),
         ),
         ("campaign", "calibration", "method", "mode", "trajectory"),
+    ),
+    Table(
+        "genetic",
+        "tables/genetic.parquet",
+        "One row per run of the genetic algorithm with the chosen settings, beside the least mean distance that it should find.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            Column("seed", "int64", "number of the run"),
+            Column("objective_mm", _NUMBER, "mean distance that the run reached"),
+            Column("generations", "int64", "generations done"),
+            Column("evaluations", "int64", "evaluations of the objective"),
+            Column("stopped", "str", "why it stopped", allowed=("generations", "stalled")),
+            Column("polished_mm", _NUMBER, "mean distance after a local polish from where the run ended"),
+            Column("optimum_mm", _NUMBER, "least mean distance, found from the least-squares fit"),
+            Column("excess", _NUMBER, "objective_mm / optimum_mm - 1"),
+            Column("polished_excess", _NUMBER, "polished_mm / optimum_mm - 1"),
+            *(
+                Column(name, _NUMBER, "error that the run found, rad" if name.startswith("dtheta") else "error that the run found, mm")
+                for name in ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dR", "dr")
+            ),
+            Column("da", _NUMBER, "dr - dR, the part of both that can be identified, mm"),
+        ),
+        ("campaign", "calibration", "seed"),
+    ),
+    Table(
+        "genetic_history",
+        "tables/genetic_history.parquet",
+        "Convergence of the runs in `genetic`: every generation up to 100, every 10th after it, and the last.",
+        (_CAMPAIGN, _CALIBRATION, *_HISTORY),
+        ("campaign", "calibration", "seed", "generation"),
+    ),
+    Table(
+        "genetic_against_least_squares",
+        "tables/genetic_against_least_squares.parquet",
+        "Methods side by side on every calibration; the genetic algorithm's entries are medians over its seeds.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            Column("runs", "int64", "seeds; 1 for what has none"),
+            Column("mean_mm", _NUMBER, "mean distance reached (median over the seeds)"),
+            Column("worst_mean_mm", _NUMBER, "mean distance of the worst seed"),
+            Column("excess", _NUMBER, "mean_mm over the least mean distance - 1"),
+            Column("evaluations", _NUMBER, "evaluations of all residuals (median over the seeds)"),
+            Column("angle_error_rad", _NUMBER, "RMS deviation of the drive-angle errors from the truth; null where nobody knows it", True),
+            Column("length_error_mm", _NUMBER, "RMS deviation of dL1, dL2, dL3 and da from the truth", True),
+        ),
+        ("campaign", "calibration", "method"),
+    ),
+    Table(
+        "timings",
+        "timings/timings.parquet",
+        "Time of one calibration by each method on this machine; the only table whose bytes differ from run to run.",
+        (
+            _CAMPAIGN,
+            _CALIBRATION,
+            _METHOD,
+            Column("seconds", _NUMBER, "wall time of one calibration (median over the seeds)"),
+        ),
+        ("campaign", "calibration", "method"),
+    ),
+    Table(
+        "sweep_runs",
+        "tables/sweep_runs.parquet",
+        "One row per run of the sweeps of the crossover and migration fraction.",
+        (
+            *_SETTING,
+            Column("seed", "int64", "number of the run"),
+            Column("objective_mm", _NUMBER, "mean distance that the run reached"),
+            Column("generations", "int64", "generations done"),
+            Column("evaluations", "int64", "evaluations of the objective"),
+            Column("stopped", "str", "why it stopped", allowed=("generations", "stalled")),
+            *(
+                Column(name, _NUMBER, "error that the run found, rad" if name.startswith("dtheta") else "error that the run found, mm")
+                for name in ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dR", "dr")
+            ),
+        ),
+        ("parameter", "population", "value", "seed"),
+    ),
+    Table(
+        "sweep_history",
+        "tables/sweep_history.parquet",
+        "Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th after it, and the last.",
+        (*_SETTING, *_HISTORY),
+        ("parameter", "population", "value", "seed", "generation"),
+    ),
+    Table(
+        "sweep_effect",
+        "tables/sweep_effect.parquet",
+        "Whether a setting's effect can be told from the seeds' scatter: Kruskal-Wallis test over all values.",
+        (
+            *_SETTING[:2],
+            Column("settings", "int64", "values compared"),
+            Column("runs", "int64", "runs compared"),
+            Column("statistic", _NUMBER, "H"),
+            Column("p_value", _NUMBER, "chance of such differences if the setting did nothing"),
+            Column("epsilon_squared", _NUMBER, "share of the rank variance that the setting explains"),
+            Column("statistic_mutating", _NUMBER, "H without the crossover fraction 1.0, where nothing mutates"),
+            Column("p_value_mutating", _NUMBER, "the same"),
+            Column("epsilon_squared_mutating", _NUMBER, "the same"),
+            Column("distinguishable_mutating", "bool", "p_value_mutating below 5 %"),
+        ),
+        ("parameter", "population"),
+    ),
+    Table(
+        "sweep_pairs",
+        "tables/sweep_pairs.parquet",
+        "Every value against the one with the lowest median: Mann-Whitney test, corrected after Holm.",
+        (
+            *_SETTING,
+            Column("best_value", _NUMBER, "value with the lowest median"),
+            Column("median_mm", _NUMBER, "median mean distance"),
+            Column("difference_mm", _NUMBER, "median minus that of the best value"),
+            Column("difference_low_mm", _NUMBER, "lower end of the 95 % bootstrap interval", True),
+            Column("difference_high_mm", _NUMBER, "upper end", True),
+            Column("p_value", _NUMBER, "Mann-Whitney, two-sided"),
+            Column("p_holm", _NUMBER, "corrected for the number of values"),
+            Column("distinguishable", "bool", "p_holm below 5 %"),
+        ),
+        ("parameter", "population", "value"),
+    ),
+    Table(
+        "published",
+        "tables/published.parquet",
+        "Every number that paper A prints, beside what this study gives.",
+        (
+            Column("item", "str", "what the number is"),
+            Column("source", "str", "table, figure, section or sentence of the paper"),
+            Column("unit", "str", "unit as printed"),
+            Column("published", _NUMBER, "printed number"),
+            Column("here", _NUMBER, "this study's number; null where it has none", True),
+            Column("ratio", _NUMBER, "here / published; null where either is null or zero", True),
+            Column("note", "str", "what differs, and why"),
+        ),
+        ("item", "source"),
+    ),
+    Table(
+        "audit",
+        "tables/audit.parquet",
+        "Misprints and contradictions of paper A, each recomputed.",
+        (
+            Column("where", "str", "place in the paper"),
+            Column("printed", "str", "what stands there"),
+            Column("right", "str", "what should"),
+            Column("check", "str", "what is computed to show it"),
+            Column("unit", "str", "unit of the two values"),
+            Column("value_printed", _NUMBER, "what the printed form gives"),
+            Column("value_right", _NUMBER, "what the right form or the independent check gives"),
+            Column("shown", "bool", "true where the numbers show the misprint or contradiction"),
+        ),
+        ("where", "check"),
     ),
 )
 

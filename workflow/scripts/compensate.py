@@ -21,9 +21,7 @@ def main(config, campaign, inputs, outputs):
         if virtual is not None:
             # every calibration is driven with the same draws, so that differences are the calibrations'
             generator = virtual.generator("closed_loop")
-            frames.append(
-                evaluate.closed_loop(virtual.robot, virtual.plan, errors, virtual.noise_mm, generator, calibration, method)
-            )
+            frames.append(evaluate.closed_loop(virtual.robot, virtual.plan, errors, virtual.noise_mm, generator, calibration, method))
     result = pd.concat(frames, ignore_index=True)
     tables.write("errors", result.assign(campaign=campaign), outputs["errors"])
     tables.write("error_summary", evaluate.summarise(result, measurements).assign(campaign=campaign), outputs["error_summary"])
