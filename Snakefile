@@ -15,9 +15,10 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/campaign.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/compensate.smk"
+include: "workflow/rules/report.smk"
 
 
 rule all:
     default_target: True
     input:
-        study_tables(),
+        [table(name) for name in STUDY_TABLES],

@@ -135,6 +135,7 @@ def has_stalled(best_history, stall_generations, tolerance):
     Elites survive, so the sum is f_(g-S) - f_g. MATLAB stops (since R2014a) on the "average relative change in the best fitness function
     value over MaxStallGenerations"; older versions weighted the changes by powers of 1/2.
     """
+    # ASSUME "relative" is to max(1, |f_g|), as in MATLAB's other relative tolerances: absolute, in mm, for objectives below 1 mm.
     generation = len(best_history) - 1
     if stall_generations == 0 or generation < stall_generations:
         return False

@@ -55,7 +55,7 @@ def run_sweep(objective, low, high, settings, parameter, value, seeds, names, st
             | {"evaluations": result.evaluations, "stopped": result.stopped}
             | dict(zip(names, result.errors.tolist(), strict=True))
         )
-        kept = _kept_generations(result.generations)
+        kept = kept_generations(result.generations)
         columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}
         history.append(pd.DataFrame(labels | columns))
     return pd.DataFrame(runs), pd.concat(history, ignore_index=True)
@@ -110,7 +110,7 @@ def setting_pairs(runs, seed=0):
     return pd.DataFrame(rows)
 
 
-def _kept_generations(last):
+def kept_generations(last):
     """Generations whose history is kept: every one up to 100, every 10th after it, and the last."""
     kept = np.arange(last + 1)
     return kept[(kept <= _EVERY_UNTIL) | (kept % _THEN_EVERY == 0) | (kept == last)]

@@ -5,6 +5,7 @@ are the robot's. A broken beam gives one to three points that fit neither side. 
 """
 
 import numpy as np
+from scipy.interpolate import barycentric_interpolate
 from scipy.ndimage import median_filter
 
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
@@ -22,12 +23,13 @@ _BAD_SHARE, _JUMP_FACTOR, _LOOSEST_MM = 0.1, 2.0, 1.5
 _END_PREFERENCE = 1.5
 
 
-def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0):
+def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
     """Mark (n,) of the points that do not fit their neighbours in the run; rows in the order driven.
 
     deviation_mm: measured minus commanded position (n, 3) in mm; rows with a NaN are left out and not marked.
     run: number of the run (n,). noise_mm: the instrument's noise, one sigma per axis; None takes it as below 0.1 mm.
-    threshold: how many scales of the neighbourhood a point must be off.
+    threshold: how many scales of the neighbourhood a point must be off. place: where the points lie along their run (n,), growing; None takes
+    them as equally spaced.
 
     A block of one to three points is marked where each of its points lies off the curve through the two points before and the two after the
     block, and off the running median of seven points, which follows steps. A block at a run's end is marked where it lies off all that the
@@ -36,19 +38,20 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0):
     deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
     if deviation.ndim != 2 or deviation.shape[1] != 3 or run.shape != deviation.shape[:1]:
         raise ValueError(f"expected deviations (n, 3) and runs (n,), got {deviation.shape} and {run.shape}")
+    place = np.arange(len(deviation), dtype=float) if place is None else np.asarray(place, dtype=float)
     marked = np.zeros(len(deviation), dtype=bool)
     known = np.isfinite(deviation).all(axis=1)
     for number in np.unique(run[known]):
         rows = np.flatnonzero(known & (run == number))
-        marked[rows[_bad_points(deviation[rows], noise_mm or 0.0, threshold)]] = True
+        marked[rows[_bad_points(place[rows], deviation[rows], noise_mm or 0.0, threshold)]] = True
     return marked
 
 
-def _bad_points(deviation, noise_mm, threshold):
+def _bad_points(place, deviation, noise_mm, threshold):
     """Indices of the bad points of one run: the worst block first, then again without it, until none is left."""
     kept, bad = np.arange(len(deviation)), []
     while len(kept) >= _WINDOW:
-        block = _worst_block(kept, deviation[kept], noise_mm, threshold)
+        block = _worst_block(place[kept], deviation[kept], noise_mm, threshold)
         if block is None:
             break
         bad.extend(kept[block])
@@ -57,13 +60,13 @@ def _bad_points(deviation, noise_mm, threshold):
 
 
 def _worst_block(place, deviation, noise_mm, threshold):
-    """Indices of the block that is farthest off among those beyond their limits, or None; `place` (n,) numbers the points along the run."""
+    """Indices of the block that is farthest off among those beyond their limits, or None."""
     jump = np.linalg.norm(np.diff(deviation, axis=0), axis=1)
     usual = np.sort(jump)[::-1][min(2 * max(1, round(_BAD_SHARE * len(place))), len(jump) - 1)]
     loose = min(_JUMP_FACTOR * usual, threshold * max(_LOOSEST_MM, noise_mm))
     inner, end = (
         max(((off, block) for off, limit, block in found if off > max(limit, loose)), key=lambda one: one[0], default=(0.0, None))
-        for found in (_inner_blocks(place, deviation, noise_mm, threshold), _end_blocks(deviation, jump, noise_mm, threshold))
+        for found in (_inner_blocks(place, deviation, noise_mm, threshold), _end_blocks(place, deviation, jump, noise_mm, threshold))
     )
     return end[1] if end[0] > _END_PREFERENCE * inner[0] else inner[1]
 
@@ -96,18 +99,19 @@ def _off_curve(place, deviation, blocks):
     return np.linalg.norm(deviation[blocks] - predicted, axis=2)
 
 
-def _end_blocks(deviation, jump, noise_mm, threshold):
+def _end_blocks(place, deviation, jump, noise_mm, threshold):
     """Per end and length of block: the block's least distance from what the next points foretell, the limit for it, its indices.
 
     Foretold are the next point, the line through two and the parabola through three. Errors grow fast towards a singularity, where runs
-    often end: twice the next good jump is allowed.
+    often end: twice the growth between the next two points is allowed.
     """
     for order in (1, -1):
-        values, steps, index = deviation[::order], jump[::order], np.arange(len(deviation))[::order]
+        along, values, steps, index = place[::order], deviation[::order], jump[::order], np.arange(len(deviation))[::order]
         for length in range(1, _LONGEST + 1):
-            first, second, third = values[length : length + 3]
-            ahead = np.arange(length, 0, -1)[:, None]
-            line = first + ahead * (first - second)
-            parabola = line + ahead * (ahead + 1) / 2 * (first - 2.0 * second + third)
-            off = min(np.linalg.norm(values[:length] - guess, axis=1).min() for guess in (first, line, parabola))
-            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * steps[length]), index[:length]
+            guesses = (
+                barycentric_interpolate(along[length : length + count], values[length : length + count], along[:length])
+                for count in (1, 2, 3)
+            )
+            off = min(np.linalg.norm(values[:length] - guess, axis=1).min() for guess in guesses)
+            stretch = (along[length] - along[length - 1]) / (along[length + 1] - along[length])
+            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * stretch * steps[length]), index[:length]

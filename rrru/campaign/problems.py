@@ -5,6 +5,7 @@ from collections import defaultdict
 from rrru.errors import IngestError
 
 LISTED = 20
+_LENGTH = 500
 
 
 class Problems:
@@ -20,7 +21,13 @@ class Problems:
     def add(self, kind, *, row=None, column=None, value, allowed):
         """Note one problem: data row from 1 or None, the file's column name or None, the value as the file has it, what is allowed."""
         self._by_kind[kind].append(
-            {"file": self._file, "row": row if row is None else int(row), "column": column, "value": value, "allowed": allowed}
+            {
+                "file": self._file,
+                "row": None if row is None else int(row),
+                "column": None if column is None else _short(column),
+                "value": _short(value),
+                "allowed": _short(allowed),
+            }
         )
 
     def refuse(self):
@@ -39,3 +46,8 @@ class Problems:
         """Raise IngestError for a problem that leaves nothing more to look at."""
         self.add("file", **problem)
         self.refuse()
+
+
+def _short(text):
+    """Text that fits into a message; a broken file can make one cell of everything below it."""
+    return text if len(text) <= _LENGTH else f"{text[:_LENGTH]}... ({len(text)} characters)"

@@ -1,4 +1,5 @@
 CALIBRATE_ROOMS = (*CAMPAIGN_ROOMS, "calibrate")
+SWEPT = ("crossover_fraction", "migration_fraction")
 
 
 rule calibrate:
@@ -17,3 +18,73 @@ rule calibrate:
         code=code_digest(*CALIBRATE_ROOMS),
     script:
         "../scripts/calibrate.py"
+
+
+rule genetic:
+    input:
+        measurements=part("measurements"),
+        calibrations=part("calibrations"),
+        parameters=part("parameters"),
+    output:
+        genetic=part("genetic"),
+        genetic_history=part("genetic_history"),
+        genetic_against_least_squares=part("genetic_against_least_squares"),
+        timings=f"{RESULTS}/timings/{{campaign}}.parquet",
+    log:
+        f"{RESULTS}/logs/genetic/{{campaign}}.log",
+    params:
+        settings=settings("seed", "robots", "calibration", "genetic"),
+        code=code_digest(*CALIBRATE_ROOMS),
+    script:
+        "../scripts/genetic.py"
+
+
+rule sweep:
+    input:
+        measurements=part("measurements", config["sweep"]["campaign"]),
+    output:
+        sweep_runs=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_runs.parquet",
+        sweep_history=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_history.parquet",
+    log:
+        f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}/{{value}}.log",
+    params:
+        settings=settings("seed", "robots", "calibration", "genetic", "sweep"),
+        code=code_digest(*CALIBRATE_ROOMS),
+    script:
+        "../scripts/sweep.py"
+
+
+rule gather_sweep:
+    input:
+        expand(
+            f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_{{{{kind}}}}.parquet",
+            parameter=SWEPT,
+            population=sorted(config["sweep"]["populations"]),
+            value=config["sweep"]["values"],
+        ),
+    output:
+        table("sweep_{kind}"),
+    wildcard_constraints:
+        kind="runs|history",
+    log:
+        f"{RESULTS}/logs/gather/sweep_{{kind}}.log",
+    params:
+        table="sweep_{kind}",
+        code=code_digest("report/tables", "report/schemas"),
+    script:
+        "../scripts/gather.py"
+
+
+rule sweep_tests:
+    input:
+        sweep_runs=table("sweep_runs"),
+    output:
+        sweep_effect=table("sweep_effect"),
+        sweep_pairs=table("sweep_pairs"),
+    log:
+        f"{RESULTS}/logs/sweep_tests.log",
+    params:
+        seed=config["seed"],
+        code=code_digest("calibrate", "report/tables", "report/schemas"),
+    script:
+        "../scripts/sweep_tests.py"

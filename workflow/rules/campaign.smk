@@ -34,6 +34,21 @@ rule gather:
     log:
         f"{RESULTS}/logs/gather/{{table}}.log",
     params:
+        table="{table}",
         code=code_digest("report/tables", "report/schemas"),
     script:
         "../scripts/gather.py"
+
+
+rule workspace:
+    input:
+        measurements=part("measurements"),
+    output:
+        part("workspace"),
+    log:
+        f"{RESULTS}/logs/workspace/{{campaign}}.log",
+    params:
+        settings=settings("robots", "calibration"),
+        code=code_digest("mechanisms"),
+    script:
+        "../scripts/workspace.py"

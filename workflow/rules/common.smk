@@ -12,7 +12,11 @@ CAMPAIGN_TABLES = [
     "observability",
     "errors",
     "error_summary",
+    "genetic",
+    "genetic_history",
+    "genetic_against_least_squares",
 ]
+STUDY_TABLES = [*CAMPAIGN_TABLES, "sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs", "published", "audit"]
 
 
 wildcard_constraints:
@@ -32,7 +36,3 @@ def table(name):
 def settings(*keys):
     """What a rule depends on in the configuration: its text, so that a change reruns the rule."""
     return {key: config[key] for key in keys}
-
-
-def study_tables():
-    return [table(name) for name in CAMPAIGN_TABLES]

@@ -2,6 +2,7 @@ rule compensate:
     input:
         measurements=part("measurements"),
         parameters=part("parameters"),
+        genetic=part("genetic"),
     output:
         errors=part("errors"),
         error_summary=part("error_summary"),

@@ -4,6 +4,7 @@ import pandas as pd
 
 from rrru import study
 from rrru.calibrate.campaign_fit import errors_vector
+from rrru.calibrate.genetic_study import typical_parameters
 from rrru.compensate import evaluate
 from rrru.report import tables
 from rrru.report.job import job
@@ -11,8 +12,9 @@ from rrru.report.job import job
 
 def main(config, campaign, inputs, outputs):
     """Write the campaign's errors point by point and summed up."""
-    measurements, parameters = tables.read(inputs["measurements"]), tables.read(inputs["parameters"])
-    mechanism = study.mechanism(config, campaign)
+    measurements, mechanism = tables.read(inputs["measurements"]), study.mechanism(config, campaign)
+    typical = typical_parameters(tables.read(inputs["genetic"]), mechanism.parameters.names)
+    parameters = pd.concat([tables.read(inputs["parameters"])[typical.columns], typical], ignore_index=True)
     virtual = study.virtual_campaign(config, campaign) if study.is_virtual(config, campaign) else None
     frames = [evaluate.before(measurements)]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):

@@ -15,4 +15,4 @@ def main(name, inputs, output):
 
 if __name__ == "__main__":
     with job(snakemake.log[0]):
-        main(snakemake.wildcards.table, list(snakemake.input), snakemake.output[0])
+        main(snakemake.params.table, list(snakemake.input), snakemake.output[0])

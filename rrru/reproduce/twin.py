@@ -15,7 +15,8 @@ from rrru.calibrate.least_squares import least_mean_distance, least_squares
 from rrru.calibrate.residuals import Residuals
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
-from rrru.compensate.study_numbers import PUBLISHED_MM, UPPER_LIMITS, group_orders, study_numbers
+from rrru.reproduce.paper_a import ERRORS_MM
+from rrru.reproduce.study_numbers import UPPER_LIMITS, group_orders, study_numbers
 from rrru.effects.protocol import Contribution
 from rrru.effects.registry import active_effects
 from rrru.errors import FitError, UnreachableError
@@ -156,7 +157,7 @@ def simulate(mechanism, twin, noise_mm, seed, kind=TranslationalRobot):
 def misfit(numbers, orders):
     """How far a candidate is from the paper: fourth powers of the relative deviations in units of 15 %, plus what breaks an order."""
     total = 0.0
-    for item, published in PUBLISHED_MM.items():
+    for item, published in ERRORS_MM.items():
         ratio = max(numbers[item] / published, 1e-3)
         deviation = max(ratio - 1.0, 0.0) if item in UPPER_LIMITS else abs(np.log(ratio))
         total += min(deviation / 0.14, 20.0) ** 4

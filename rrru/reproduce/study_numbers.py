@@ -2,32 +2,12 @@
 
 import numpy as np
 
-# (item, published value in mm); the sentence each comes from stands in rrru.report.published
-PUBLISHED_MM = {
-    "group1_before_min": 4.232,
-    "group1_before_max": 8.356,
-    "group1_after_min": 0.294,
-    "group1_after_max": 1.220,
-    "lines_after_min": 0.14,
-    "lines_after_max": 1.34,
-    "lines_before_max": 9.36,
-    "spiral_under_lines_x_min": -5.03,
-    "spiral_under_lines_x_max": 4.78,
-    "spiral_under_lines_z_abs_max": 3.0,
-    "spiral_under_lines_max": 5.08,
-    "spiral_under_spiral_component_min": -1.63,
-    "spiral_under_spiral_component_max": 1.52,
-    "spiral_under_spiral_max": 1.56,
-    "lines_2_7_under_spiral_min": 0.08,
-    "lines_2_7_under_spiral_max": 1.12,
-    "lines_objective": 0.5112,
-}
 # printed as "less than": reached when not above
 UPPER_LIMITS = ("spiral_under_lines_z_abs_max",)
 
 
 def study_numbers(trajectory, before_mm, under_lines_mm, under_spiral_mm):
-    """Numbers of PUBLISHED_MM by item (without the objective), in mm.
+    """Numbers of paper_a.ERRORS by item (without the objective), in mm.
 
     trajectory: (n,) names `line_1` to `line_7` and `spiral`; the others: error vectors (n, 3), NaN where a point was not measured.
     """

@@ -1,0 +1,131 @@
+"""The genetic algorithm on the calibrations of one campaign, beside the optimum that it should find."""
+
+from time import perf_counter
+
+import numpy as np
+import pandas as pd
+
+from rrru.calibrate.campaign_fit import select
+from rrru.calibrate.genetic import GeneticSettings, minimise
+from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.sweep import kept_generations
+from rrru.mechanisms.rrru3 import to_identifiable
+from rrru.seeds import stream_seed
+
+SETTING_KEYS = tuple(GeneticSettings.__dataclass_fields__)
+
+
+def settings_from_config(section, **changes):
+    """GeneticSettings of the configuration's `genetic` section with some values replaced."""
+    values = {key: section[key] for key in SETTING_KEYS if key in section} | changes
+    return GeneticSettings(**values | {"populations": tuple(values["populations"])})
+
+
+def study_set(measurements, tied, identifiable, calibration, patterns, settings, seeds, study_seed, use_near_singularity):
+    """Runs of the genetic algorithm on one calibration set.
+
+    tied, identifiable: the mechanism with 8 and with 7 error parameters; seeds: number of runs. Returns (runs, history, timings) as frames
+    without the campaign's name, or None where the campaign has too few points for the set.
+    """
+    residuals = select(measurements, tied, patterns, use_near_singularity)
+    if residuals is None:
+        return None
+    reduced = select(measurements, identifiable, patterns, use_near_singularity)
+    fit, fit_seconds = _timed(lambda: least_squares(reduced))
+    (_, optimum), polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.errors))
+    names, bounds = tied.parameters.names, (tied.parameters.low, tied.parameters.high)
+    # the compiled objective is loaded before anything is timed
+    residuals.mean_distance(tied.parameters.nominal[None])
+    runs, history, seconds = [], [], []
+    for number in range(1, seeds + 1):
+        seed = stream_seed(study_seed, "genetic", calibration, number) % 2**32
+        start = perf_counter()
+        result = minimise(residuals.mean_distance, *bounds, settings, seed)
+        seconds.append(perf_counter() - start)
+        values = dict(zip(names, result.errors.tolist(), strict=True))
+        shared = to_identifiable(values)
+        _, polished = least_mean_distance(reduced, identifiable.parameters.vector(shared))
+        runs.append(
+            {"calibration": calibration, "seed": number, "objective_mm": result.objective, "generations": result.generations}
+            | {"evaluations": result.evaluations, "stopped": result.stopped, "polished_mm": polished, "optimum_mm": optimum}
+            | {"excess": result.objective / optimum - 1.0, "polished_excess": polished / optimum - 1.0}
+            | values
+            | {"da": shared["da"]}
+        )
+        kept = kept_generations(result.generations)
+        columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}
+        history.append(pd.DataFrame({"calibration": calibration, "seed": number} | columns))
+    timings = pd.DataFrame(
+        {
+            "calibration": calibration,
+            "method": ["least_squares", "least_mean_distance", "genetic"],
+            "seconds": [fit_seconds, fit_seconds + polish_seconds, float(np.median(seconds))],
+        }
+    )
+    return pd.DataFrame(runs), pd.concat(history, ignore_index=True), timings
+
+
+def typical_parameters(runs, names):
+    """Rows of `parameters` for method "genetic": of each calibration the run whose objective is the (lower) median of the seeds.
+
+    runs: rows of `genetic` of one campaign; names: identifiable parameters. A single run is what the paper has.
+    """
+    frames = []
+    for calibration, part in runs.groupby("calibration", sort=False):
+        typical = part.sort_values(["objective_mm", "seed"]).iloc[(len(part) - 1) // 2]
+        frames.append(
+            pd.DataFrame({"calibration": calibration, "method": "genetic", "parameter": names, "value": [typical[n] for n in names]})
+        )
+    return pd.concat(frames, ignore_index=True)
+
+
+def against_least_squares(runs, calibrations, parameters, truth):
+    """Rows of `genetic_against_least_squares` of one campaign (without its name).
+
+    runs, calibrations, parameters: rows of `genetic`, `calibrations` and `parameters` of that campaign; truth: the true errors by
+    identifiable name, or None where nobody knows them.
+    """
+    result = []
+    for calibration, part in runs.groupby("calibration", sort=False):
+        optimum = part["optimum_mm"].iloc[0]
+        fits = calibrations[calibrations["calibration"] == calibration]
+        for row in fits.itertuples():
+            values = parameters[(parameters["calibration"] == calibration) & (parameters["method"] == row.method)]
+            found = dict(zip(values["parameter"], values["value"], strict=True))
+            result.append(
+                {"calibration": calibration, "method": row.method, "runs": 1, "mean_mm": row.mean_mm, "worst_mean_mm": row.mean_mm}
+                | {"excess": row.mean_mm / optimum - 1.0, "evaluations": float(row.evaluations)}
+                | _parameter_error(pd.DataFrame([found]), truth)
+            )
+        for method, column in (("genetic", "objective_mm"), ("genetic_polished", "polished_mm")):
+            middle = part[column].median()
+            result.append(
+                {"calibration": calibration, "method": method, "runs": len(part), "mean_mm": middle, "worst_mean_mm": part[column].max()}
+                | {"excess": middle / optimum - 1.0, "evaluations": float(part["evaluations"].median())}
+                | (_parameter_error(part, truth) if method == "genetic" else {"angle_error_rad": np.nan, "length_error_mm": np.nan})
+            )
+    return pd.DataFrame(result)
+
+
+def _parameter_error(values, truth):
+    """RMS deviation of angles and lengths from the truth over all rows of a frame of identifiable parameters."""
+    if truth is None:
+        return {"angle_error_rad": np.nan, "length_error_mm": np.nan}
+    error = {
+        kind: np.sqrt(
+            np.mean([(values[name] - value) ** 2 for name, value in truth.items() if name.startswith("dtheta") == (kind == "rad")])
+        )
+        for kind in ("rad", "mm")
+    }
+    return {"angle_error_rad": float(error["rad"]), "length_error_mm": float(error["mm"])}
+
+
+def _timed(function):
+    """Result of a call and the median of three wall times in s, compilation excluded."""
+    result = function()
+    seconds = []
+    for _ in range(3):
+        start = perf_counter()
+        function()
+        seconds.append(perf_counter() - start)
+    return result, float(np.median(seconds))

@@ -1,0 +1,39 @@
+"""The genetic algorithm with the chosen settings on every calibration set of one campaign, beside least squares."""
+
+import pandas as pd
+from tqdm import tqdm
+
+from rrru import study
+from rrru.calibrate import genetic_study
+from rrru.mechanisms.rrru3 import to_identifiable
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, campaign, inputs, outputs):
+    """Write the campaign's runs, their history, the comparison with least squares and the times."""
+    measurements = tables.read(inputs["measurements"])
+    tied, identifiable = (study.mechanism(config, campaign, errors) for errors in ("tied", "identifiable"))
+    settings = genetic_study.settings_from_config(config["genetic"])
+    results = []
+    for name, patterns in tqdm(config["calibration"]["sets"].items(), desc=f"genetic {campaign}", unit="set"):
+        seed = f"{config['seed']}:{campaign}"
+        use = config["calibration"]["use_near_singularity"]
+        result = genetic_study.study_set(measurements, tied, identifiable, name, patterns, settings, config["genetic"]["seeds"], seed, use)
+        if result is not None:
+            results.append(result)
+    runs, history, timings = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))
+    truth = study.true_errors(config, campaign)
+    compared = genetic_study.against_least_squares(
+        runs,
+        tables.read(inputs["calibrations"]),
+        tables.read(inputs["parameters"]),
+        None if truth is None else to_identifiable(truth),
+    )
+    for name, frame in (("genetic", runs), ("genetic_history", history), ("genetic_against_least_squares", compared), ("timings", timings)):
+        tables.write(name, frame.assign(campaign=campaign), outputs[name])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.wildcards.campaign, snakemake.input, snakemake.output)

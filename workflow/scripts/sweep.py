@@ -1,0 +1,38 @@
+"""All seeds of one value of one swept setting."""
+
+from tqdm import tqdm
+
+from rrru import study
+from rrru.calibrate.campaign_fit import select
+from rrru.calibrate.genetic_study import settings_from_config
+from rrru.calibrate.sweep import run_sweep
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, parameter, population, value, inputs, outputs):
+    """Write the runs and their history."""
+    section = config["sweep"]
+    mechanism = study.mechanism(config, section["campaign"], "tied")
+    patterns = config["calibration"]["sets"][section["calibration"]]
+    residuals = select(tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"])
+    settings = settings_from_config(config["genetic"], populations=section["populations"][population])
+    runs, history = run_sweep(
+        residuals.mean_distance,
+        mechanism.parameters.low,
+        mechanism.parameters.high,
+        settings,
+        parameter,
+        float(value),
+        tqdm(range(1, section["seeds"] + 1), desc=f"{parameter} {value} {population}", unit="run"),
+        mechanism.parameters.names,
+        study_seed=config["seed"],
+    )
+    tables.write("sweep_runs", runs, outputs["sweep_runs"])
+    tables.write("sweep_history", history, outputs["sweep_history"])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        names = snakemake.wildcards
+        main(snakemake.config, names.parameter, names.population, names.value, snakemake.input, snakemake.output)
