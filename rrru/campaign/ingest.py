@@ -10,11 +10,11 @@ import pandas as pd
 import pyarrow
 import pyarrow.parquet as parquet
 
-from rrru.campaign.ingest_checks import check_runs, check_speed, number_runs, resolution
+from rrru.campaign.ingest_checks import check_runs, check_speed, number_runs, path_length, resolution
 from rrru.campaign.ingest_columns import COMMAND, KNOWN, MEASURED, MM, RAD, THETA, convert, resolve
 from rrru.campaign.ingest_geometry import check_commands, check_measured, check_sizes, frame_limit
 from rrru.campaign.ingest_text import looks_like, text_cells
-from rrru.campaign.outliers import flag_outliers
+from rrru.campaign.outliers import flag_outliers, reproduced
 from rrru.campaign.problems import Problems
 from rrru.campaign.registration import Registration, register
 from rrru.errors import ConfigError, FitError
@@ -86,7 +86,8 @@ def ingest(spec, mechanism):
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
     frame, more = number_runs(convert(spec, found, cells, rows, problems))
     notes += more + _notes_on_columns(frame, found, spec, mechanism)
-    check_runs(frame, found, len(mechanism.parameters), MM[spec.unit] * resolution(frame[[*MEASURED]].to_numpy() / MM[spec.unit]), problems)
+    digit_mm = MM[spec.unit] * resolution(frame[[*MEASURED]].to_numpy() / MM[spec.unit])
+    check_runs(frame, found, len(mechanism.parameters), digit_mm, problems)
     if check_commands(frame, found, spec, mechanism, problems):
         check_speed(frame, found, problems)
         if check_sizes(frame, found, problems) and spec.frame == "robot":
@@ -94,7 +95,7 @@ def ingest(spec, mechanism):
     problems.refuse()
     registration = None
     if spec.frame == "register":
-        registration = _register(frame, found, spec, mechanism, problems)
+        registration = _register(frame, found, spec, mechanism, digit_mm, problems)
         frame[[*MEASURED]] = registration.apply(frame[[*MEASURED]])
         check_measured(frame, found, mechanism, problems)
         problems.refuse()
@@ -103,7 +104,7 @@ def ingest(spec, mechanism):
             f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most; "
             "the part of the robot's errors that looks like a rigid motion is gone"
         )
-    return Ingested(_table(frame, spec, mechanism, notes), tuple(notes), registration)
+    return Ingested(_table(frame, spec, mechanism, digit_mm, notes), tuple(notes), registration)
 
 
 def _read(path, problems):
@@ -155,7 +156,7 @@ def _notes_on_columns(frame, found, spec, mechanism):
     return notes
 
 
-def _register(frame, found, spec, mechanism, problems):
+def _register(frame, found, spec, mechanism, digit_mm, problems):
     """Registration from the chosen points, without those that a first registration shows to be outliers."""
     measured, command = frame[[*MEASURED]].to_numpy(), frame[[*COMMAND]].to_numpy()
     pairs = list(zip(frame["run"], frame["point"], strict=True))
@@ -169,8 +170,8 @@ def _register(frame, found, spec, mechanism, problems):
     problems.refuse()
     chosen = np.array([not wanted or pair in wanted for pair in pairs])
     try:
-        deviation = register(measured[chosen], command[chosen]).apply(measured) - command
-        chosen &= ~flag_outliers(deviation, frame["run"])
+        first = register(measured[chosen], command[chosen])
+        chosen &= ~_outliers(frame.assign(**dict(zip(MEASURED, first.apply(measured).T, strict=True))), digit_mm)
         result = register(measured[chosen], command[chosen])
     except FitError as error:
         value, _, allowed = str(error).partition("; allowed: ")
@@ -179,7 +180,7 @@ def _register(frame, found, spec, mechanism, problems):
     if _mirrored(measured, command):
         problems.refuse_now(
             column=column,
-            value=f"positions in a left-handed frame ({result.rms_mm:.6g} mm rms off after registration, a fifth of it or less if mirrored)",
+            value=f"positions in a left-handed frame ({result.rms_mm:.6g} mm rms off when registered, a fifth of that if mirrored)",
             allowed="a right-handed frame: turn the sign of one axis round",
         )
     if result.rms_mm > limit:
@@ -197,11 +198,19 @@ def _mirrored(measured, command):
     return straight > 1.0 and mirrored < 0.2 * straight
 
 
-def _table(frame, spec, mechanism, notes):
+def _outliers(frame, digit_mm):
+    """Rows (n,) that a broken beam spoilt, measured positions being in the robot frame; `digit_mm` is the last digit of the file."""
+    command, run = frame[[*COMMAND]].to_numpy(), frame["run"].to_numpy()
+    deviation = frame[[*MEASURED]].to_numpy() - command
+    marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(command))
+    return marked & ~reproduced(marked, deviation, command, run)
+
+
+def _table(frame, spec, mechanism, digit_mm, notes):
     """Frame in the form of the schema `measurements`; adds to the notes how many outliers were marked."""
     if not set(THETA) <= set(frame):
         frame[[*THETA]] = mechanism.inverse(frame[[*COMMAND]].to_numpy(), elbow=spec.elbow)
-    outlier = flag_outliers(frame[[*MEASURED]].to_numpy() - frame[[*COMMAND]].to_numpy(), frame["run"])
+    outlier = _outliers(frame, digit_mm)
     frame["status"] = np.where(outlier, "outlier", "ok")
     if outlier.any():
         where = ", ".join(f"run {run:g} point {point:g}" for run, point in frame.loc[outlier, ["run", "point"]].to_numpy()[:10])

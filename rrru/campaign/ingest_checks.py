@@ -12,22 +12,49 @@ _COARSE_MM = 0.005
 def number_runs(frame):
     """The frame with `run` and `point`, and what was done to get them.
 
-    Without a `run` a new one begins where the trajectory's name changes or the point's number does not grow; without a `point` they are
-    counted within the run.
+    Without a `run` a new one begins where the trajectory's name changes and where the point's number falls or, without a `point`, where the
+    commanded path turns back on itself or starts again. Without a `point` they are counted within the run.
     """
     notes = []
     frame = frame.copy()
     if "run" not in frame:
-        change = frame["trajectory"] != frame["trajectory"].shift()
-        if "point" in frame:
-            change |= frame["point"].diff() < 0
+        change = (frame["trajectory"] != frame["trajectory"].shift()).to_numpy()
+        change = change | ((frame["point"].diff() < 0).to_numpy() if "point" in frame else _turns(frame[[*COMMAND]].to_numpy(), change))
         frame["run"] = change.cumsum().astype(float)
-        where = "the trajectory's name changes" + (" or the point's number starts again" if "point" in frame else "")
-        notes.append(f"no column run: a new run wherever {where}, {int(frame['run'].max())} runs")
+        where = "the point's number falls" if "point" in frame else "the commanded path turns back or starts again"
+        notes.append(f"no column run: a new run wherever the trajectory's name changes or {where}, {int(frame['run'].max())} runs")
     if "point" not in frame:
         frame["point"] = frame.groupby("run").cumcount().astype(float) + 1.0
         notes.append("no column point: counted within the run")
     return frame, notes
+
+
+def path_length(command):
+    """Length in mm along commanded positions (n, 3), growing by at least a little where the robot stands still."""
+    step = np.nan_to_num(np.linalg.norm(np.diff(command, axis=0), axis=1))
+    least = 0.2 * np.median(step[step > 0.0]) if (step > 0.0).any() else 1.0
+    return np.concatenate([[0.0], np.cumsum(np.maximum(step, least))])
+
+
+def _turns(command, change):
+    """Rows (n,) where the path of commanded positions (n, 3) turns back or starts again within what `change` (n,) sets apart."""
+    result = np.zeros(len(command), dtype=bool)
+    last, begun = None, 0
+    for i in range(1, len(command)):
+        step = command[i] - command[i - 1]
+        length = np.linalg.norm(step)
+        if change[i]:
+            last, begun = None, i
+        elif i + 1 < len(command) and i > begun + 1 and np.array_equal(command[i : i + 2], command[begun : begun + 2]):
+            result[i], last, begun = True, None, i
+        elif length > 0.0:
+            if last is not None and step @ last < -0.9 * length * np.linalg.norm(last):
+                # a point commanded twice at the turn belongs to the way back
+                begun = i - 1 if i > begun + 1 and np.array_equal(command[i - 1], command[i - 2]) else i
+                result[begun] = True
+            jump = last is not None and length > 2.0 * np.linalg.norm(last)
+            last = None if jump else step
+    return result
 
 
 def check_runs(frame, found, parameter_count, resolution_mm, problems):

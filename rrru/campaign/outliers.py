@@ -5,7 +5,6 @@ are the robot's. A broken beam gives one to three points that fit neither side. 
 """
 
 import numpy as np
-from scipy.interpolate import barycentric_interpolate
 from scipy.ndimage import median_filter
 
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
@@ -28,8 +27,8 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
 
     deviation_mm: measured minus commanded position (n, 3) in mm; rows with a NaN are left out and not marked.
     run: number of the run (n,). noise_mm: the instrument's noise, one sigma per axis; None takes it as below 0.1 mm.
-    threshold: how many scales of the neighbourhood a point must be off. place: where the points lie along their run (n,), growing; None takes
-    them as equally spaced.
+    threshold: how many scales of the neighbourhood a point must be off.
+    place: where the points lie along their run (n,), growing; None takes them as equally spaced.
 
     A block of one to three points is marked where each of its points lies off the curve through the two points before and the two after the
     block, and off the running median of seven points, which follows steps. A block at a run's end is marked where it lies off all that the
@@ -45,6 +44,19 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
         rows = np.flatnonzero(known & (run == number))
         marked[rows[_bad_points(place[rows], deviation[rows], noise_mm or 0.0, threshold)]] = True
     return marked
+
+
+def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
+    """Which marked points (n,) another run came back to: a broken beam does not repeat itself, a spike near a singularity does.
+
+    Compares deviations (n, 3) in mm at the same commanded position (n, 3) in another run (n,); they repeat within `tolerance_mm`.
+    """
+    deviation, command, run = np.asarray(deviation_mm), np.asarray(command_mm), np.asarray(run)
+    result = np.zeros(len(deviation), dtype=bool)
+    for i in np.flatnonzero(marked):
+        others = (run != run[i]) & (np.abs(command - command[i]) < 1e-3).all(axis=1)
+        result[i] = (np.linalg.norm(deviation[others] - deviation[i], axis=1) < tolerance_mm).any()
+    return result
 
 
 def _bad_points(place, deviation, noise_mm, threshold):
@@ -77,23 +89,23 @@ def _inner_blocks(place, deviation, noise_mm, threshold):
     for length in range(1, _LONGEST + 1):
         floor = max(noise_mm, _SPIKE_MM if length == 1 else _FLIP_MM)
         blocks = np.arange(1, len(place) - length)[:, None] + np.arange(length)
-        off = _off_curve(place, deviation, blocks)
+        nodes = np.stack([blocks[:, 0] - 2, blocks[:, 0] - 1, blocks[:, -1] + 1, blocks[:, -1] + 2])
+        off = _off_curve(place, deviation, blocks, nodes)
         limit = threshold * max(np.median(off) / _MEDIAN_OF_CHI3, floor)
         least = np.where(off_median[blocks].min(axis=1) > threshold * floor, off.min(axis=1), 0.0)
         yield least.max(), limit, blocks[np.argmax(least)]
 
 
-def _off_curve(place, deviation, blocks):
-    """Distances (m, length) of blocks (m, length) from the cubic through two points on each side (parabola where one side has one)."""
-    nodes = np.stack([blocks[:, 0] - 2, blocks[:, 0] - 1, blocks[:, -1] + 1, blocks[:, -1] + 2])
+def _off_curve(place, deviation, blocks, nodes):
+    """Distances (m, length) of blocks (m, length) from the polynomials through nodes (k, m); nodes beyond the run's ends are left out."""
     there = (nodes >= 0) & (nodes < len(place))
     nodes = np.clip(nodes, 0, len(place) - 1)
     predicted = np.zeros((*blocks.shape, 3))
-    for i in range(4):
+    for i in range(len(nodes)):
         weight = np.repeat(there[i].astype(float)[:, None], blocks.shape[1], axis=1)
-        for j in set(range(4)) - {i}:
+        for j in set(range(len(nodes))) - {i}:
             both = there[i] & there[j]
-            step = np.where(both, place[nodes[i]] - place[nodes[j]], 1)[:, None]
+            step = np.where(both, place[nodes[i]] - place[nodes[j]], 1.0)[:, None]
             weight *= np.where(both[:, None], (place[blocks] - place[nodes[j]][:, None]) / step, 1.0)
         predicted += weight[..., None] * deviation[nodes[i]][:, None]
     return np.linalg.norm(deviation[blocks] - predicted, axis=2)
@@ -106,12 +118,9 @@ def _end_blocks(place, deviation, jump, noise_mm, threshold):
     often end: twice the growth between the next two points is allowed.
     """
     for order in (1, -1):
-        along, values, steps, index = place[::order], deviation[::order], jump[::order], np.arange(len(deviation))[::order]
+        index, steps, gaps = np.arange(len(place))[::order], jump[::order], np.diff(place)[::order]
         for length in range(1, _LONGEST + 1):
-            guesses = (
-                barycentric_interpolate(along[length : length + count], values[length : length + count], along[:length])
-                for count in (1, 2, 3)
-            )
-            off = min(np.linalg.norm(values[:length] - guess, axis=1).min() for guess in guesses)
-            stretch = (along[length] - along[length - 1]) / (along[length + 1] - along[length])
-            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * stretch * steps[length]), index[:length]
+            block, nodes = index[:length], index[length : length + 3, None]
+            off = min(_off_curve(place, deviation, block[None], nodes[:count]).min() for count in (1, 2, 3))
+            growth = gaps[length - 1] / gaps[length] * steps[length]
+            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * growth), block

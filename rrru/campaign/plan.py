@@ -14,7 +14,7 @@ from rrru.campaign.trajectories import sample
 
 # Points of the path between two sampled points: enough for a drive that turns back between them to be seen by the play.
 _PATH_STEPS = 16
-_CURVE_SHARES = np.linspace(0.0, 1.0, 1001)
+_CURVE_SHARES = np.linspace(0.0, 1.0, 401)
 
 
 @dataclass(frozen=True)
@@ -88,20 +88,22 @@ class Plan:
 
 def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse=False):
     """One pass along a trajectory, forward or in reverse, with the trapezoidal profile over its arc length."""
-    dense = trajectory.curve(_CURVE_SHARES[::-1] if reverse else _CURVE_SHARES)
-    arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(dense, axis=0), axis=1))])
-    spline = CubicSpline(arc, dense)
-    profile = Trapezoid(float(arc[-1]), speed_mm_s, acceleration_mm_s2)
-    points = sample(trajectory)[::-1] if reverse else sample(trajectory)
-    at_points = np.interp(np.linspace(0.0, 1.0, trajectory.count), _CURVE_SHARES, arc)
-    at_path = np.interp(np.linspace(0.0, 1.0, (trajectory.count - 1) * _PATH_STEPS + 1), _CURVE_SHARES, arc)
-    time = profile.time(at_points)
+    shares = _CURVE_SHARES[::-1] if reverse else _CURVE_SHARES
+    curve = CubicSpline(_CURVE_SHARES, trajectory.curve(shares))
+    arc = CubicSpline(_CURVE_SHARES, np.linalg.norm(curve(_CURVE_SHARES, 1), axis=1)).antiderivative()
+    profile = Trapezoid(float(arc(1.0)), speed_mm_s, acceleration_mm_s2)
+    at = np.linspace(0.0, 1.0, trajectory.count)
+    path_shares = np.linspace(0.0, 1.0, (trajectory.count - 1) * _PATH_STEPS + 1)
+    time = profile.time(arc(at))
     speed, along = profile.speed(time)[:, None], profile.acceleration(time)[:, None]
-    tangent, curvature = spline(at_points, 1), spline(at_points, 2)
+    first, second = curve(at, 1), curve(at, 2)
+    stretch = np.linalg.norm(first, axis=1, keepdims=True)
+    tangent = first / stretch
+    curvature = (second - (second * tangent).sum(axis=1, keepdims=True) * tangent) / stretch**2
     return Run(
         trajectory=trajectory.name,
-        points_mm=points,
-        path_mm=spline(at_path),
+        points_mm=sample(trajectory)[::-1] if reverse else sample(trajectory),
+        path_mm=trajectory.curve(1.0 - path_shares if reverse else path_shares),
         path_index=np.arange(trajectory.count) * _PATH_STEPS,
         time_s=time,
         velocity_mm_s=speed * tangent,

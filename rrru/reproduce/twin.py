@@ -31,19 +31,20 @@ SEARCH_BOUNDS = {
     "dL2": (-1.5, 1.5),
     "dL3": (-1.5, 1.5),
     "dr": (-4.0, 4.0),
-    **{f"clearance{k}": (0.0, 1.2) for k in _LEGS},
-    **{f"width{k}": (0.0, 0.002) for k in _LEGS},
-    **{f"amplitude{k}": (0.0, 0.0015) for k in _LEGS},
+    **{f"clearance{k}": (0.0, 1.5) for k in _LEGS},
+    **{f"width{k}": (0.0, 0.003) for k in _LEGS},
+    **{f"amplitude{k}": (0.0, 0.003) for k in _LEGS},
     **{f"phase{k}": (-np.pi, np.pi) for k in _LEGS},
-    "ratio": (1.0, 12.0),
+    "ratio": (0.5, 12.5),
+    "side": (-1.0, 1.0),
     "scatter_mm": (0.05, 0.35),
     "offset_first_mm": (15.0, 45.0),
     "offset_second_mm": (15.0, 45.0),
     "offset_third_mm": (15.0, 45.0),
     "centre_x_mm": (-560.0, 250.0),
     "centre_y_mm": (-200.0, 200.0),
-    "radius_start_mm": (30.0, 300.0),
-    "radius_end_mm": (30.0, 350.0),
+    "radius_start_mm": (20.0, 420.0),
+    "radius_end_mm": (30.0, 420.0),
     "z_start_mm": (480.0, 850.0),
     "z_end_mm": (480.0, 850.0),
     "turns": (1.5, 4.0),
@@ -74,11 +75,12 @@ class Twin:
     values: dict
 
     def offsets(self):
-        """Line offsets (7,) in y: 0, then pairs outwards; groups 2, 4, 6 on the positive side."""
+        """Line offsets (7,) in y: 0, then pairs outwards; groups 2, 4, 6 on the side of the sign of `side`."""
         first = self.values["offset_first_mm"]
         second = first + self.values["offset_second_mm"]
         third = second + self.values["offset_third_mm"]
-        return (0.0, first, -first, second, -second, third, -third)
+        side = 1.0 if self.values["side"] >= 0.0 else -1.0
+        return (0.0, *(side * sign * offset for offset in (first, second, third) for sign in (1.0, -1.0)))
 
     def trajectories(self, start_mm=(-800.0, 0.0, 600.0), end_mm=(-300.0, 0.0, 600.0)):
         """Seven lines and the spiral."""

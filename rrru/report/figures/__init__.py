@@ -1,0 +1,76 @@
+"""Every figure of the study: one function each, tables in, a figure out.
+
+FIGURES maps a figure's name to its function, the names of the tables that it reads and its caption. A function takes the tables by name
+and the options, a mapping:
+
+campaign, calibration_lines, calibration_spiral: whose errors are drawn, and under which two calibrations. method, mode: rows of the
+tables errors and error_summary; where a campaign was never driven again, mode "model" stands in. sweep_campaign, sweep_calibration: whose
+optimum the sweeps are compared with.
+
+The table `paths` is the measurements table of the options' campaign. A function raises ConfigError naming what is not there.
+"""
+
+from rrru.report.figures import convergence, cross, lines, observability, spiral, sweep, workspace
+
+_SWEEP_TABLES = ("sweep_runs", "sweep_effect", "sweep_pairs", "calibrations", "published")
+_SWEEP_CAPTION = (
+    "(a) The published curve with half a unit of its last printed digit. (b), (c) The same algorithm run with many seeds: what every run "
+    "reached above the least mean distance, its median and quartiles, and the published curve above its own lowest value, on one axis "
+    "that is linear below one printed digit. Open medians are worse than the best setting (Mann-Whitney, Holm, 5 %)."
+)
+
+_PASSES = "Where a trajectory was passed more than once, curves are means over the passes, bands their range."
+_NEAR = "Grey: points near a constraint singularity."
+
+FIGURES = {
+    "fig06": (sweep.fig06, _SWEEP_TABLES, f"Objective against the crossover fraction (paper A, Fig. 6). {_SWEEP_CAPTION}"),
+    "fig07": (sweep.fig07, _SWEEP_TABLES, f"Objective against the migration fraction (paper A, Fig. 7). {_SWEEP_CAPTION}"),
+    "fig09": (
+        lines.fig09,
+        ("paths", "errors"),
+        "Group 1 before and after the line calibration (paper A, Fig. 9). (a) Commanded and attained points in the vertical plane, "
+        "deviations magnified as stated. (b) Size of the error at every point. "
+        f"{_NEAR} {_PASSES}",
+    ),
+    "fig10": (
+        lines.fig10,
+        ("paths", "errors"),
+        "Every line before and after the line calibration (paper A, Fig. 10). (a) The lines in the middle, (b) the outer ones. "
+        f"The numbers are the smallest and largest error. {_NEAR} {_PASSES}",
+    ),
+    "fig11": (
+        spiral.fig11,
+        ("paths", "errors"),
+        "The spiral under both calibrations (paper A, Fig. 11). (a) Commanded and attained path, deviations magnified as stated. "
+        f"(b) to (d) Errors along the axes, with the tolerance of the task. {_NEAR} {_PASSES}",
+    ),
+    "fig12": (
+        lines.fig12,
+        ("paths", "errors"),
+        "The lines but the first under the line and the spiral calibration (paper A, Fig. 12). "
+        f"The numbers are the smallest and largest error. {_NEAR} {_PASSES}",
+    ),
+    "workspace": (
+        workspace.workspace,
+        ("workspace", "singularity", "paths"),
+        "Distance from both kinds of singularity over the reachable workspace, and the commanded paths projected on it. "
+        "Hatched is out of reach; on the line the constraint determinant changes its sign.",
+    ),
+    "observability": (
+        observability.observability,
+        ("observability",),
+        "What every set of trajectories can see: directions of parameter space from the best seen to the worst, what each is made of "
+        "(weights below 0.15 are not written), the standard error along it and its singular value.",
+    ),
+    "convergence": (
+        convergence.convergence,
+        ("genetic_history", "genetic"),
+        "Convergence of the genetic algorithm: excess of the best mean distance so far over the least one, for every seed, "
+        "their median and quartiles; a run that has stopped keeps what it reached.",
+    ),
+    "cross": (
+        cross.cross,
+        ("error_summary",),
+        "Every calibration applied to every trajectory: (a) mean and (b) largest position error. The first row is before any calibration.",
+    ),
+}

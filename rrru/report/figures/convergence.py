@@ -42,15 +42,18 @@ def _panel(axes, history, optimum):
     excess = wide.where(np.isfinite(wide)).ffill() - optimum
     # a log axis has no zero: a run that has reached the optimum is drawn at its numerical floor
     excess = excess.clip(lower=1e-9 * max(optimum, 1.0))
-    # generation 0 is the initial population
-    place = excess.index.to_numpy() + 1.0
+    place = excess.index.to_numpy()
     for seed in excess:
         alive = excess.index <= ends[seed]
         axes.plot(place[alive], excess.loc[alive, seed], color=style.SKY, linewidth=0.4, zorder=1, label="one seed")
-        axes.plot(ends[seed] + 1.0, excess.loc[ends[seed], seed], ".", color=style.SKY, markersize=3.0, zorder=2, label="end of a run")
+        axes.plot(ends[seed], excess.loc[ends[seed], seed], ".", color=style.SKY, markersize=3.0, zorder=2, label="end of a run")
     low, high = excess.quantile(0.25, axis=1), excess.quantile(0.75, axis=1)
     axes.fill_between(place, low, high, color=style.BLUE, alpha=0.25, linewidth=0.0, zorder=3, label="quartiles")
     axes.plot(place, excess.median(axis=1), color=style.BLUE, linewidth=1.4, zorder=4, label=f"median of {excess.shape[1]} seeds")
-    axes.set(xscale="log", yscale="log")
-    axes.set_xlim(1.0, place.max())
+    # generation 0, the initial population, has its place on a log axis that is linear up to 1
+    axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
+    axes.set_yscale("log")
+    style.plain_log(axes.xaxis)
+    style.plain_log(axes.yaxis)
+    axes.set_xlim(0.0, None)
     axes.grid(True)

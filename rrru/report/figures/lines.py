@@ -52,7 +52,8 @@ def fig10(tables, options):
     figure = style.new(style.DOUBLE_MM, 46.0 * rows)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     cells = [*zip(inner, grid[0], strict=False), *zip(outer, grid[1:].ravel(), strict=False)]
-    _error_panels(tables, cells, curves, {inner[0]: "(a) ", **({outer[0]: "(b) "} if outer else {})})
+    marks = {inner[0]: "(a) ", **({outer[0]: "(b) "} if outer else {})}
+    _error_panels(tables, cells, curves, ("before", "after"), marks)
     for axes in set(grid.ravel()) - {axes for _, axes in cells}:
         axes.set_axis_off()
     for _, axes in cells:
@@ -77,7 +78,7 @@ def fig12(tables, options):
     figure = style.new(style.DOUBLE_MM, 12.0 + 46.0 * rows)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
     cells = list(zip(names, grid.ravel(), strict=False))
-    _error_panels(tables, cells, curves, {})
+    _error_panels(tables, cells, curves, (options["calibration_lines"], options["calibration_spiral"]), {})
     for axes in grid.ravel()[len(names) :]:
         axes.set_axis_off()
     _outer_labels(grid, cells, "position error (mm)")
@@ -106,17 +107,18 @@ def _plane(axes, places, curves):
     axes.grid(True)
 
 
-def _error_panels(tables, cells, curves, marks):
-    """One panel per line with its curves and, in numbers, their ranges."""
+def _error_panels(tables, cells, curves, tags, marks):
+    """One panel per line with its curves and, in numbers behind their tags, their ranges."""
     for name, axes in cells:
         places = choose.stations(tables["paths"], name)
         ranges = [draw_along(axes, errors, places, look, label) for label, look, errors in curves]
         shade_near_singular(axes, places)
         axes.set_title(f"{marks.get(name, '')}{choose.trajectory_label(name)}{pass_note(places)}")
         finish(axes, places)
-        for row, ((_, look, _), (low, high)) in enumerate(zip(curves, ranges, strict=True)):
-            text = f"{style.number(low)} to {style.number(high)} mm"
-            axes.text(0.97, 0.97 - 0.11 * row, text, transform=axes.transAxes, ha="right", va="top", fontsize=7.0, color=_dark(look["color"]))
+        for row, (tag, (_, look, _), (low, high)) in enumerate(zip(tags, curves, ranges, strict=True)):
+            text = f"{tag} {style.number(low)} to {style.number(high)} mm"
+            place = {"transform": axes.transAxes, "ha": "right", "va": "top"}
+            axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=_dark(look["color"]), **place)
     # room for the numbers above the highest curve
     top = max((axes.dataLim.y1 for _, axes in cells if np.isfinite(axes.dataLim.y1)), default=1.0)
     cells[0][1].set_ylim(0.0, 1.45 * top)
@@ -161,9 +163,9 @@ def tolerance(axes, signs=(1.0,)):
 
 
 def pass_note(places):
-    """What a curve is where the trajectory was passed more than once."""
+    """Number of passes where there is more than one: curves are then means."""
     count = choose.passes(places)
-    return f" (mean of {count} passes)" if count > 1 else ""
+    return f", {count} passes" if count > 1 else ""
 
 
 def finish(axes, places):

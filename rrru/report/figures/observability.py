@@ -62,9 +62,10 @@ def _errors(axes, part, limits):
     axes.set_yticks(rows, [_short(value) for value in each["singular_value"]])
     axes.yaxis.tick_right()
     axes.xaxis.set_major_locator(LogLocator(numticks=4))
+    style.plain_log(axes.xaxis)
     axes.tick_params(axis="y", length=0.0)
     axes.set_xlabel("std. error (mm)")
-    axes.set_title("singular value", loc="right", fontsize=7.0)
+    axes.set_title("singular value (mm/mm)", loc="right", fontsize=7.0)
     axes.grid(True, axis="x")
 
 

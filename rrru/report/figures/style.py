@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import style
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
@@ -91,9 +92,7 @@ def legend_above(figure, axes, columns=5):
     """One legend above all panels, so that it covers no data, in as few rows of `columns` as it takes; each label once."""
     entries = _entries(axes)
     rows = max(-(-len(entries) // columns), 1)
-    figure.legend(
-        entries.values(), entries.keys(), loc="outside upper center", ncols=max(-(-len(entries) // rows), 1), columnspacing=1.4
-    )
+    figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=max(-(-len(entries) // rows), 1), columnspacing=1.4)
 
 
 def legend_inside(place, axes):
@@ -126,6 +125,12 @@ def magnification(deviation_mm, span_mm, share=0.16):
 def number(value, digits=2):
     """A number as short text; a dash where there is none."""
     return f"{value:.{digits}f}" if np.isfinite(value) else "–"
+
+
+def plain_log(axis):
+    """Ticks of a log axis as plain numbers at the decades: the digits of powers would be too small to read."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def save(figure, pdf, png):

@@ -88,9 +88,8 @@ def _pairs(tables, parameter, kind):
 
 def _as_printed(axes, published, parameter):
     """The published curve with half a unit of its last digit, on an axis of its own."""
-    axes.errorbar(
-        published.index, published, yerr=_RESOLUTION_MM / 2.0, elinewidth=0.7, capsize=1.5, label="published (single runs)", **style.PUBLISHED
-    )
+    bars = {"yerr": _RESOLUTION_MM / 2.0, "elinewidth": 0.7, "capsize": 1.5}
+    axes.errorbar(published.index, published, label="published, as printed", **bars, **style.PUBLISHED)
     spread = published.max() - published.min()
     axes.set_title(f"(a) as published\nrange {spread:.4f} mm")
     axes.set(xlabel=_axis_label(parameter), ylabel="published fitness (mm)")
@@ -114,17 +113,19 @@ def _scatter(axes, runs, apart, optimum, published):
             continue
         # the dots stand side by side; multiples of the golden section never come close to each other
         aside = 0.6 * step * (np.arange(len(finite)) * _GOLDEN % 1.0 - 0.5)
-        label = f"one seed, above the optimum {optimum:.4f} mm"
+        label = f"one seed (optimum {optimum:.4f} mm)"
         axes.plot(value + aside, finite, linestyle="none", marker=".", markersize=2.5, color=style.SKY, label=label, zorder=2)
         low, middle, high = np.quantile(finite, [0.25, 0.5, 0.75])
         axes.plot([value, value], [low, high], color=style.BLUE, linewidth=1.8, solid_capstyle="butt", label="quartiles", zorder=3)
         told = value in apart
         label = "median, worse than the best setting" if told else "median, not told apart from the best"
-        axes.plot(value, middle, "o", markersize=4.0, color=style.BLUE, markerfacecolor="white" if told else style.BLUE, label=label, zorder=4)
+        inside = "white" if told else style.BLUE
+        axes.plot(value, middle, "o", markersize=4.0, color=style.BLUE, markerfacecolor=inside, label=label, zorder=4)
     above = published - published.min()
-    axes.plot(above.index, above, label=f"published, above its lowest {published.min():.4f} mm", **style.PUBLISHED)
+    axes.plot(above.index, above, label=f"published (lowest {published.min():.4f} mm)", **style.PUBLISHED)
     # linear up to one printed digit, so that no difference is shown as one
     axes.set_yscale("symlog", linthresh=_RESOLUTION_MM, linscale=0.5)
+    style.plain_log(axes.yaxis)
     axes.axhspan(-_RESOLUTION_MM, _RESOLUTION_MM, facecolor="#eeeeee", edgecolor="none", zorder=0, label="within one printed digit")
     axes.grid(True)
     _whole_settings(axes, values)

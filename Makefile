@@ -1,0 +1,30 @@
+# `make results` and `make test` set up .venv from the lock by themselves; nothing else is needed than Python >= 3.11 and make.
+PYTHON ?= python3
+CORES ?= 2
+BIN = .venv/bin
+
+.PHONY: results test lint lock
+
+results: .venv/ready
+	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
+	$(BIN)/snakemake --cores $(CORES)
+
+test: .venv/ready
+	$(BIN)/python -m pytest
+
+lint: .venv/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/snakemake --lint
+
+.venv/ready: requirements.lock pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed, this is " + sys.version)'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+# needs uv; run after changing requirements.in
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate requirements.in -o requirements.lock

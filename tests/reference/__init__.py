@@ -1,0 +1,1 @@
+"""Slow, obvious implementations and sourced numbers that the tests compare with."""
