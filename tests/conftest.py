@@ -13,8 +13,6 @@ def rich_poses():
     robot = Rrru3()
     points = np.random.default_rng(5).uniform([-500.0, -400.0, 450.0], [500.0, 400.0, 950.0], (2000, 3))
     theta = robot.inverse(points)
-    clear = (singularity.translational_measure(robot, points, theta) > 0.15) & (
-        singularity.constraint_measure(robot, points, theta) > 0.15
-    )
+    clear = (singularity.translational_measure(robot, points, theta) > 0.15) & (singularity.constraint_measure(robot, points, theta) > 0.15)
     assert clear.sum() >= 200
     return points[clear][:200], theta[clear][:200]

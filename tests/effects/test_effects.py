@@ -58,7 +58,9 @@ def test_parameters_are_recovered_from_what_they_do(name, motion):
         full[free] = values
         return (_flat(effect.contribute(motion, full), len(motion)) - seen) * 1e3
 
-    fit = least_squares(residual, truth[free] * 1.2 + 1e-4, x_scale=np.maximum(np.abs(truth[free]), 1e-4), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    fit = least_squares(
+        residual, truth[free] * 1.2 + 1e-4, x_scale=np.maximum(np.abs(truth[free]), 1e-4), xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
     np.testing.assert_allclose(fit.x, truth[free], rtol=1e-5, atol=1e-9)
 
 

@@ -16,7 +16,10 @@ _ONCE = ({"reverse": False, "payload_kg": 0.0},)
 
 
 def _plan(x=(-800.0, -300.0), passes=_ONCE):
-    lines = (Line("line_1", (x[0], 0.0, 600.0), (x[1], 0.0, 600.0), 26), Spiral("spiral", (-300.0, 0.0), (50.0, 150.0), (600.0, 700.0), 2.0, 40))
+    lines = (
+        Line("line_1", (x[0], 0.0, 600.0), (x[1], 0.0, 600.0), 26),
+        Spiral("spiral", (-300.0, 0.0), (50.0, 150.0), (600.0, 700.0), 2.0, 40),
+    )
     return make_plan(lines, passes, 80.0, 40.0, 60.0)
 
 

@@ -1,0 +1,140 @@
+"""Least squares and least mean distance: known truths recovered, standard errors checked by repetition, optimum checked by another search."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from rrru.calibrate.identifiability import analyse
+from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.residuals import Residuals
+from rrru.errors import FitError
+from rrru.mechanisms.rrru3 import Rrru3
+
+_TRUTH = np.array([0.0012, -0.0008, 0.0021, 0.31, 0.24, -0.18, 1.4])
+
+
+def _campaign(points, theta, noise_mm=0.0, seed=0):
+    robot = Rrru3()
+    measured = robot.forward(theta, _TRUTH, points)
+    return Residuals(robot, theta, measured + noise_mm * np.random.default_rng(seed).standard_normal(points.shape), points)
+
+
+def test_noise_free_rich_poses_give_the_seven_numbers_back(rich_poses):
+    fit = least_squares(_campaign(*rich_poses))
+    np.testing.assert_allclose(fit.errors, _TRUTH, rtol=0.0, atol=1e-6)
+    assert fit.identifiability.rank == 7 and not fit.at_bound.any()
+
+
+def test_standard_errors_cover_the_truth_in_95_of_100(rich_poses):
+    """200 seeds: the share within 2 standard errors is 95.4 % for each parameter, give or take its binomial scatter."""
+    inside = []
+    for seed in range(200):
+        fit = least_squares(_campaign(*rich_poses, noise_mm=0.05, seed=seed))
+        inside.append(np.abs(fit.errors - _TRUTH) < 2.0 * fit.standard_errors)
+    share = np.array(inside).mean(axis=0)
+    # four binomial deviations of 200 draws at 95.4 %
+    assert (np.abs(share - 0.954) < 4.0 * np.sqrt(0.954 * 0.046 / 200)).all(), share
+    assert np.mean(inside) == pytest.approx(0.954, abs=0.02)
+
+
+def test_estimated_noise_is_the_true_one(rich_poses):
+    fit = least_squares(_campaign(*rich_poses, noise_mm=0.05, seed=1))
+    assert fit.noise_mm == pytest.approx(0.05, rel=0.1) and fit.noise_from == "residuals"
+    assert least_squares(_campaign(*rich_poses), noise_mm=0.02).noise_from == "given"
+
+
+def test_bounded_fit_stays_in_the_box_and_says_so(rich_poses):
+    points, theta = rich_poses
+    narrow = Rrru3(length_limit_mm=0.5)
+    residuals = _campaign(points, theta)
+    fit = least_squares(Residuals(narrow, theta, residuals.measured_mm, points))
+    assert (np.abs(fit.errors[3:6]) <= 0.5).all() and abs(fit.errors[6]) <= 1.0
+    assert fit.at_bound[6] and not fit.at_bound[:3].any()
+
+
+@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy"])
+def test_a_robust_loss_survives_a_broken_beam(rich_poses, loss):
+    residuals = _campaign(*rich_poses, noise_mm=0.02)
+    measured = residuals.measured_mm.copy()
+    measured[::20] += 30.0
+    spoilt = Residuals(residuals.mechanism, residuals.theta_rad, measured, residuals.start_mm)
+    plain, robust = least_squares(spoilt), least_squares(spoilt, loss=loss, loss_scale_mm=0.05)
+    scale = 6.0 * least_squares(residuals, 0.02).standard_errors
+    assert (np.abs(robust.errors - _TRUTH) < scale).all()
+    assert (np.abs(plain.errors - _TRUTH) > scale).any()
+
+
+def test_least_mean_distance_equals_a_derivative_free_search(rich_poses):
+    residuals = _campaign(*rich_poses, noise_mm=0.3)
+    start = least_squares(residuals)
+    errors, value = least_mean_distance(residuals, start.errors)
+    assert value == pytest.approx(residuals.mean_distance(errors[None])[0], rel=1e-12)
+    assert value < start.mean_mm
+    scale = start.standard_errors
+    found = minimize(
+        lambda q: residuals.mean_distance((errors + scale * q)[None])[0],
+        np.full(7, 0.3),
+        method="Nelder-Mead",
+        options={"maxiter": 20_000, "maxfev": 20_000, "xatol": 1e-6, "fatol": 1e-12, "adaptive": True},
+    )
+    assert value <= found.fun + 1e-9 and found.fun == pytest.approx(value, rel=1e-5)
+
+
+def test_least_mean_distance_does_not_depend_on_the_start(rich_poses):
+    residuals = _campaign(*rich_poses, noise_mm=0.3)
+    first, _ = least_mean_distance(residuals, np.zeros(7))
+    second, _ = least_mean_distance(residuals, 2.0 * _TRUTH)
+    np.testing.assert_allclose(first, second, atol=1e-5)
+
+
+def test_residual_jacobian_equals_finite_differences(rich_poses):
+    residuals = _campaign(*rich_poses, noise_mm=0.1)
+    analytic = residuals.jacobian(_TRUTH)
+    for k, step in enumerate([1e-6] * 3 + [1e-3] * 4):
+        shift = step * np.eye(7)[k]
+        numeric = (residuals.residual(_TRUTH + shift) - residuals.residual(_TRUTH - shift)) / (2.0 * step)
+        np.testing.assert_allclose(analytic[..., k], numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max())
+
+
+def test_two_points_leave_a_direction_unseen():
+    robot = Rrru3()
+    points = np.array([[-400.0, 0.0, 600.0], [-300.0, 0.0, 600.0]])
+    theta = robot.inverse(points)
+    ident = analyse(robot, robot.error_jacobian(points, theta))
+    assert ident.rank == 6 and ident.condition == np.inf or ident.condition > 1e6
+    assert np.isinf(ident.standard_errors(0.02)).any() and ident.indices()["O1"] == 0.0
+    measured = robot.forward(theta, _TRUTH, points)
+    with pytest.raises(FitError, match="2 points give 6 equations; allowed: at least 7"):
+        least_squares(Residuals(robot, theta, measured, points))
+
+
+def test_a_repeated_pose_fits_but_keeps_the_unseen_directions_at_their_nominal_value():
+    robot = Rrru3()
+    points = np.tile([[-400.0, 0.0, 600.0]], (5, 1))
+    theta = robot.inverse(points)
+    fit = least_squares(Residuals(robot, theta, robot.forward(theta, _TRUTH, points), points))
+    assert fit.identifiability.rank == 3 and fit.rms_mm < 1e-6
+    nominal = analyse(robot, robot.error_jacobian(points, theta))
+    np.testing.assert_allclose(nominal.directions[3:] @ (fit.errors / nominal.scale), 0.0, atol=1e-9)
+
+
+def test_covariance_equals_the_inverse_normal_matrix(rich_poses):
+    residuals = _campaign(*rich_poses)
+    jacobian = residuals.jacobian(_TRUTH)
+    ident = analyse(residuals.mechanism, jacobian)
+    flat = jacobian.reshape(-1, 7)
+    plain = 0.02**2 * np.linalg.inv(flat.T @ flat)
+    np.testing.assert_allclose(ident.covariance(0.02), plain, rtol=1e-6, atol=1e-12 * np.abs(plain).max())
+    np.testing.assert_allclose(np.diag(ident.correlations()), 1.0)
+    scaled = flat * ident.scale
+    assert ident.indices()["O1"] == pytest.approx(np.sqrt(np.linalg.det(scaled.T @ scaled)) ** (1 / 7) / np.sqrt(len(jacobian)))
+
+
+def test_points_that_cannot_be_fitted_are_named(rich_poses):
+    points, theta = rich_poses
+    measured = points.copy()
+    measured[3, 1] = np.nan
+    with pytest.raises(FitError, match="measured_mm is not finite at 1 of 200 points, the first is point 4"):
+        Residuals(Rrru3(), theta, measured, points)
+    with pytest.raises(FitError, match="the nominal robot cannot take 200 of 200 poses"):
+        Residuals(Rrru3(L3_mm=100.0), theta, points, points)
