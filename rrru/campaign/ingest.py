@@ -11,7 +11,7 @@ import pyarrow
 import pyarrow.parquet as parquet
 
 from rrru.campaign.ingest_checks import check_runs, check_speed, number_runs, path_length, resolution
-from rrru.campaign.ingest_columns import COMMAND, KNOWN, MEASURED, MM, RAD, THETA, convert, resolve
+from rrru.campaign.ingest_columns import COMMAND, KNOWN, MEASURED, MM, RAD, REQUIRED, THETA, convert, resolve
 from rrru.campaign.ingest_geometry import check_commands, check_measured, check_sizes, frame_limit
 from rrru.campaign.ingest_text import looks_like, text_cells
 from rrru.campaign.outliers import flag_outliers, reproduced
@@ -81,10 +81,12 @@ def ingest(spec, mechanism):
     problems, notes = Problems(spec.path), []
     names, rows, cells = _read(Path(spec.path), problems)
     found, extra = resolve(spec, names, problems)
-    problems.refuse()
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
-    frame, more = number_runs(convert(spec, found, cells, rows, problems))
+    frame = convert(spec, found, cells, rows, problems)
+    if not set(REQUIRED) <= set(frame) or len(set(names)) < len(names):
+        problems.refuse()
+    frame, more = number_runs(frame)
     notes += more + _notes_on_columns(frame, found, spec, mechanism)
     digit_mm = MM[spec.unit] * resolution(frame[[*MEASURED]].to_numpy() / MM[spec.unit])
     check_runs(frame, found, len(mechanism.parameters), digit_mm, problems)
@@ -110,16 +112,16 @@ def ingest(spec, mechanism):
 def _read(path, problems):
     """Names of the file's columns, numbers of its rows, and {name: cells (n,)}."""
     suffix = path.suffix.lower()
-    if not path.exists():
-        problems.refuse_now(value="no such file", allowed="an existing .csv or .parquet file")
-    if not path.is_file():
-        problems.refuse_now(value="a directory" if path.is_dir() else "no regular file", allowed="a .csv or .parquet file")
-    if suffix not in (".csv", ".parquet"):
-        problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=".csv or .parquet; a spreadsheet can be saved as .csv")
     try:
+        if not path.exists():
+            problems.refuse_now(value="no such file", allowed="an existing .csv or .parquet file")
+        if not path.is_file():
+            problems.refuse_now(value="a directory" if path.is_dir() else "no regular file", allowed="a .csv or .parquet file")
+        if suffix not in (".csv", ".parquet"):
+            problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=".csv or .parquet; a spreadsheet can be saved as .csv")
         data = path.read_bytes()
     except OSError as error:
-        problems.refuse_now(value=error.strerror, allowed="a file that may be read")
+        problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
     if suffix == ".parquet":
         return _parquet_cells(data, problems)
     names, rows, cells = text_cells(data, problems)
@@ -177,10 +179,10 @@ def _register(frame, found, spec, mechanism, digit_mm, problems):
         value, _, allowed = str(error).partition("; allowed: ")
         problems.refuse_now(value=f"registration points: {value}", allowed=allowed)
     column, limit = ", ".join(found[name] for name in MEASURED), frame_limit(mechanism)
-    if _mirrored(measured, command):
+    if mirrored_off := _off_as_mirrored(measured, command):
         problems.refuse_now(
             column=column,
-            value=f"positions in a left-handed frame ({result.rms_mm:.6g} mm rms off when registered, a fifth of that if mirrored)",
+            value=f"positions in a left-handed frame ({mirrored_off:.6g} mm rms off when registered, a fifth of that if mirrored)",
             allowed="a right-handed frame: turn the sign of one axis round",
         )
     if result.rms_mm > limit:
@@ -189,13 +191,13 @@ def _register(frame, found, spec, mechanism, digit_mm, problems):
     return result
 
 
-def _mirrored(measured, command):
-    """Whether measured positions (n, 3) fit the commanded ones far better with an axis turned round."""
+def _off_as_mirrored(measured, command):
+    """Residual in mm rms of measured positions (n, 3) if they fit the commanded ones far better with an axis turned round, else 0."""
     try:
         straight, mirrored = (register(measured * [1.0, 1.0, sign], command).rms_mm for sign in (1.0, -1.0))
     except FitError:
-        return False
-    return straight > 1.0 and mirrored < 0.2 * straight
+        return 0.0
+    return straight if straight > 1.0 and mirrored < 0.2 * straight else 0.0
 
 
 def _outliers(frame, digit_mm):

@@ -69,14 +69,19 @@ def convert(spec, found, cells, rows, problems):
     found: {our name: the file's name}; cells: {the file's name: cells (n,) that are text, numbers or None}. An optional column without any
     value is left out.
     """
-    missed = np.all([[_blank(cell) for cell in cells[found[name]]] for name in MEASURED], axis=0)
+    missed = np.all([[_blank(cell) for cell in cells[found[name]]] for name in MEASURED if name in found] or [[False] * len(rows)], axis=0)
     for row in np.asarray(rows)[missed]:
-        problems.add("missed point", row=row, column=", ".join(found[name] for name in MEASURED), value="blank", allowed=_MISSED)
+        problems.add(
+            "missed point", row=row, column=", ".join(found[name] for name in MEASURED if name in found), value="blank", allowed=_MISSED
+        )
+    filled = {ours for ours, theirs in found.items() if ours in REQUIRED or not all(map(_blank, cells[theirs]))}
+    if filled & set(THETA):
+        filled |= set(THETA)
     frame = pd.DataFrame(index=pd.Index(rows))
     for ours, theirs in found.items():
         if ours == "trajectory":
             frame[ours] = pd.Series(_names(cells[theirs], rows, theirs, problems), index=frame.index, dtype=object)
-        elif ours in REQUIRED or not all(map(_blank, cells[theirs])):
+        elif ours in filled:
             skip = missed if ours in MEASURED else np.zeros(len(rows), dtype=bool)
             factor = MM[spec.unit] if ours in COMMAND + MEASURED else RAD[spec.angle_unit] if ours in THETA else 1.0
             frame[ours] = factor * _numbers(cells[theirs], rows, theirs, skip, problems)

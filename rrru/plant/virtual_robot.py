@@ -18,7 +18,7 @@ class VirtualRobot:
     """A robot whose truth is known.
 
     errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6): displacements of every axis;
-    effects: active effects; scatter_mm: joint wobble that does not repeat, 1 sigma per axis; masses in kg; singularity_margin:
+    effects: active effects; wobble_mm: radius of the ball in which the platform lies at random, see `wobble`; masses in kg; singularity_margin:
     constraint measure below which a command is reported; rotation_limit_rad: a larger platform rotation counts as unsolved.
     """
 
@@ -26,7 +26,7 @@ class VirtualRobot:
     errors: dict = field(default_factory=dict)
     deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
     effects: tuple = ()
-    scatter_mm: float = 0.0
+    wobble_mm: float = 0.0
     platform_mass_kg: float = 3.0
     forearm_mass_kg: float = 1.2
     singularity_margin: float = 0.1
@@ -66,7 +66,7 @@ class VirtualRobot:
         solved = np.isfinite(position).all(axis=1)
         ideal = self.mechanism.inverse(target)
         constraint = singularity.constraint_measure(self.mechanism, target, ideal)
-        position = position + self.scatter_mm * generator.standard_normal(target.shape)
+        position = position + self.wobble_mm * wobble(generator, len(target))
         measured = measure(position, noise_mm, generator)
         measurements = commands.assign(
             **{f"theta{k + 1}_rad": motion.theta_rad[:, k] for k in range(3)},
@@ -109,6 +109,13 @@ class VirtualRobot:
         return Motion(controller(target), path_theta, index, force, direction)
 
 
+def wobble(generator, count):
+    """Points (count, 3) uniform in the unit ball: what clearance lets the platform do from stop to stop, bounded unlike instrument noise."""
+    direction = generator.standard_normal((count, 3))
+    radius = generator.random((count, 1)) ** (1.0 / 3.0)
+    return radius * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
     known = tuple(dict.fromkeys((*ERROR_NAMES["tied"], *ERROR_NAMES["published"])))
@@ -120,7 +127,7 @@ def from_config(mechanism, section):
         errors={name: float(value) for name, value in section["errors"].items()},
         deviations=_deviations(section["axis_errors"]),
         effects=active_effects(section["effects"]),
-        scatter_mm=section["scatter_mm"],
+        wobble_mm=section["wobble_mm"],
         platform_mass_kg=section["platform_mass_kg"],
         forearm_mass_kg=section["forearm_mass_kg"],
         singularity_margin=section["singularity_margin"],

@@ -21,7 +21,7 @@ from rrru.effects.protocol import Contribution
 from rrru.effects.registry import active_effects
 from rrru.errors import FitError, UnreachableError
 from rrru.mechanisms import singularity
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.plant.virtual_robot import VirtualRobot, wobble
 
 _LEGS = (1, 2, 3)
 # name: (low, high); what papers.md's quick study used, widened
@@ -37,7 +37,7 @@ SEARCH_BOUNDS = {
     **{f"phase{k}": (-np.pi, np.pi) for k in _LEGS},
     "ratio": (0.5, 12.5),
     "side": (-1.0, 1.0),
-    "scatter_mm": (0.05, 0.35),
+    "wobble_mm": (0.2, 0.9),
     "offset_first_mm": (15.0, 45.0),
     "offset_second_mm": (15.0, 45.0),
     "offset_third_mm": (15.0, 45.0),
@@ -116,7 +116,7 @@ class Twin:
             mechanism=mechanism,
             errors={name: self.values[name] for name in names},
             effects=active_effects(self.effects()),
-            scatter_mm=self.values["scatter_mm"],
+            wobble_mm=self.values["wobble_mm"],
         )
 
 
@@ -137,11 +137,12 @@ def simulate(mechanism, twin, noise_mm, seed, kind=TranslationalRobot):
     if margin < SPIRAL_MARGIN:
         raise UnreachableError(f"the spiral comes within {margin:.3f} of a singularity; allowed: {SPIRAL_MARGIN}")
     robot = twin.robot(mechanism, kind)
-    draws = np.random.default_rng(seed).standard_normal((3, 2, *target.shape))
+    generator = np.random.default_rng(seed)
+    draws = [(wobble(generator, len(target)), generator.standard_normal(target.shape)) for _ in range(3)]
 
     def drive(controller, draw):
         position, _ = robot.positions(robot.motion(plan, controller), target)
-        return position + robot.scatter_mm * draw[0] + noise_mm * draw[1]
+        return position + robot.wobble_mm * draw[0] + noise_mm * draw[1]
 
     measured = drive(mechanism.inverse, draws[0])
     fits = {}

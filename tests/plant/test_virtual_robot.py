@@ -28,7 +28,7 @@ def _section(**changes):
         "errors": {},
         "axis_errors": {"position_mm": 0.0, "angle_rad": 0.0, "seed": 0},
         "effects": {},
-        "scatter_mm": 0.0,
+        "wobble_mm": 0.0,
         "platform_mass_kg": 3.0,
         "forearm_mass_kg": 1.2,
         "singularity_margin": 0.1,
@@ -79,21 +79,24 @@ def test_crooked_axes_near_the_singularity_are_unsolved_not_guessed():
 
 def test_same_seed_same_bytes_and_a_lost_point_changes_no_other():
     plan = _plan()
-    runs = [VirtualRobot(scatter_mm=0.3).run(plan, 0.02, np.random.default_rng(7))[0] for _ in range(2)]
+    runs = [VirtualRobot(wobble_mm=0.3).run(plan, 0.02, np.random.default_rng(7))[0] for _ in range(2)]
     assert runs[0].equals(runs[1])
-    strict = VirtualRobot(scatter_mm=0.3, rotation_limit_rad=1e-18).run(plan, 0.02, np.random.default_rng(7))[0]
+    strict = VirtualRobot(wobble_mm=0.3, rotation_limit_rad=1e-18).run(plan, 0.02, np.random.default_rng(7))[0]
     kept = strict["measured_x_mm"].notna()
     assert 0 < kept.sum() < len(kept) or kept.sum() == 0
     assert strict.loc[kept, "measured_x_mm"].equals(runs[0].loc[kept, "measured_x_mm"])
 
 
-def test_noise_and_scatter_have_the_stated_size():
+def test_noise_and_wobble_have_the_stated_size():
     plan = make_plan((Line("line_1", (-600.0, 0.0, 600.0), (-300.0, 0.0, 600.0), 5000),), _ONCE, 80.0, 40.0, 0.0)
-    measurements, truth = VirtualRobot(scatter_mm=0.3).run(plan, 0.02, np.random.default_rng(0))
+    measurements, truth = VirtualRobot(wobble_mm=0.6).run(plan, 0.02, np.random.default_rng(0))
     command = measurements[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
     true = truth[[f"true_{a}_mm" for a in "xyz"]].to_numpy()
     measured = measurements[[f"measured_{a}_mm" for a in "xyz"]].to_numpy()
-    assert (true - command).std(axis=0) == pytest.approx([0.3] * 3, rel=0.05)
+    distance = np.linalg.norm(true - command, axis=1)
+    # uniform in a ball: the cube of the distance is uniform, the mean distance 3/4 of the radius
+    assert 0.59 < distance.max() <= 0.6 and distance.mean() == pytest.approx(0.45, rel=0.02)
+    assert (true - command).std(axis=0) == pytest.approx([0.6 / np.sqrt(5.0)] * 3, rel=0.05)
     assert (measured - true).std(axis=0) == pytest.approx([0.02] * 3, rel=0.05)
 
 
