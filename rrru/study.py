@@ -9,6 +9,7 @@ from rrru.calibrate.campaign_fit import select
 from rrru.calibrate.least_squares import least_squares
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
+from rrru.campaign.ingest import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.errors import ConfigError
 from rrru.mechanisms import singularity
@@ -75,8 +76,6 @@ def virtual_campaign(config, campaign):
 
 def ingest_campaign(config, campaign):
     """The ingested file of a campaign; raises IngestError where it is refused."""
-    from rrru.campaign.ingest import IngestSpec, ingest
-
     section = config["campaigns"][campaign]
     options = {key: section[key] for key in _INGEST_KEYS if key in section}
     if "registration_points" in options:

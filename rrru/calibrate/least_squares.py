@@ -55,13 +55,15 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     seen = (start.directions[: start.rank] * start.scale).T
     full = start.rank == len(parameters)
     # in the directions' own coordinates the problem is well scaled; the box of the bounds holds only where every direction is seen
+    linear = loss == "linear"
     solution = optimize.least_squares(
         lambda q: residuals.residual(parameters.nominal + seen @ q).ravel(),
         np.zeros(start.rank),
         jac=lambda q: residuals.jacobian(parameters.nominal + seen @ q).reshape(-1, len(parameters)) @ seen,
+        method="lm" if linear else "trf",
         x_scale=start.singular_values[0] / start.singular_values[: start.rank],
         loss=loss,
-        f_scale=loss_scale_mm if loss != "linear" else 1.0,
+        f_scale=1.0 if linear else loss_scale_mm,
         xtol=1e-12,
         ftol=1e-14,
         gtol=1e-12,

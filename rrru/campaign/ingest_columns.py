@@ -21,6 +21,7 @@ RAD = {"rad": 1.0, "deg": np.pi / 180.0}
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
+_LARGEST = 1e12
 _MISSED = "three numbers: drop the row of a point that was not measured"
 
 
@@ -116,7 +117,7 @@ def _number(cell):
     elif isinstance(cell, bool) or not isinstance(cell, (int, float, Decimal)):
         return np.nan, "a finite number"
     value = float(cell)
-    return (value, None) if np.isfinite(value) else (np.nan, "a finite number")
+    return (value, None) if abs(value) < _LARGEST else (np.nan, "a finite number")
 
 
 def _names(cells, rows, theirs, problems):

@@ -152,19 +152,17 @@ def _upside_down(command, theta, found, mechanism, problems):
 
 def _check_angles(known, theta, found, spec, mechanism, problems):
     """Note drive angles that are not those of the commanded positions."""
-    given = known[[*THETA]].to_numpy()
+    given, command = known[[*THETA]].to_numpy(), known[[*COMMAND]].to_numpy()
     off = np.abs(given - theta)
     bad = off > ANGLE_TOLERANCE_RAD
     tolerance = f"within {ANGLE_TOLERANCE_RAD:g} rad of the angle that the commanded position needs"
-    if bad.any(axis=1).mean() > _MANY and (advice := _angle_advice(given, theta, known[[*COMMAND]].to_numpy(), spec, mechanism)):
+    if bad.any(axis=1).mean() > _MANY and (advice := _angle_advice(given, theta, command, spec, mechanism)):
         read = f"drive angles up to {np.nanmax(np.abs(given)):.6g} rad when read in {spec.angle_unit}"
         value = f"{read}, up to {np.nanmax(off):.6g} rad from those that the commanded positions need"
         problems.add("angles", column=_columns(THETA, found), value=value, allowed=f"{tolerance}; {advice}")
         return
     for i, k in np.argwhere(bad):
-        value = (
-            f"{given[i, k]:.6f} rad, while the commanded position {_position(known[[*COMMAND]].to_numpy()[i])} needs {theta[i, k]:.6f} rad"
-        )
+        value = f"{given[i, k]:.6f} rad, while the commanded position {_position(command[i])} needs {theta[i, k]:.6f} rad"
         problems.add("angles", row=known.index[i], column=found[THETA[k]], value=value, allowed=tolerance)
 
 

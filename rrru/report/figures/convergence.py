@@ -5,6 +5,9 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.report.figures import choose, style
 
+# a nanometre: no difference between mean distances is smaller in earnest
+_FLOOR_MM = 1e-6
+
 
 @style.printed
 def convergence(tables, options):
@@ -40,8 +43,8 @@ def _panel(axes, history, optimum):
     wide = history.pivot(index="generation", columns="seed", values="best_mm").sort_index()
     ends = history.groupby("seed")["generation"].max()
     excess = wide.where(np.isfinite(wide)).ffill() - optimum
-    # a log axis has no zero: a run that has reached the optimum is drawn at its numerical floor
-    excess = excess.clip(lower=1e-9 * max(optimum, 1.0))
+    # a log axis has no zero: a run that has reached the optimum is drawn there
+    excess = excess.clip(lower=_FLOOR_MM)
     place = excess.index.to_numpy()
     for seed in excess:
         alive = excess.index <= ends[seed]

@@ -64,7 +64,8 @@ def _panel(axes, matrix, scale, rows, columns):
     image = axes.imshow(np.ma.masked_invalid(matrix), cmap=style.SEQUENTIAL, norm=scale, aspect="auto", interpolation="none")
     for (row, column), value in np.ndenumerate(matrix):
         dark = np.isfinite(value) and scale(max(value, scale.vmin)) > 0.6
-        axes.text(column, row, _short(value), ha="center", va="center", fontsize=7.0, color="white" if dark else "black")
+        look = {"ha": "center", "va": "center", "fontsize": 7.0, "in_layout": False}
+        axes.text(column, row, style.number(value), color="white" if dark else "black", **look)
     axes.set_xticks(range(len(columns)), [choose.trajectory_label(name) for name in columns], rotation=90)
     axes.set_yticks(range(len(rows)), [name.replace("_", " ") for name in rows])
     axes.tick_params(length=0.0)
@@ -73,8 +74,3 @@ def _panel(axes, matrix, scale, rows, columns):
     if groups:
         axes.axvline(len(columns) - groups - 0.5, color="white", linewidth=2.0)
     return image
-
-
-def _short(value):
-    """Three digits of an error; a dash where there is none."""
-    return style.number(value, 2 if value < 10.0 else 1 if value < 100.0 else 0)

@@ -47,7 +47,7 @@ def fig10(tables, options):
     ]
     names = choose.trajectories(tables["paths"], LINE_PATTERN, "fig10")
     inner, outer = names[:3], names[3:]
-    columns = max(4, min(len(outer), 6))
+    columns = 4
     rows = 1 + -(-len(outer) // columns)
     figure = style.new(style.DOUBLE_MM, 46.0 * rows)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
@@ -117,7 +117,7 @@ def _error_panels(tables, cells, curves, tags, marks):
         finish(axes, places)
         for row, (tag, (_, look, _), (low, high)) in enumerate(zip(tags, curves, ranges, strict=True)):
             text = f"{tag} {style.number(low)} to {style.number(high)} mm"
-            place = {"transform": axes.transAxes, "ha": "right", "va": "top"}
+            place = {"transform": axes.transAxes, "ha": "right", "va": "top", "in_layout": False}
             axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=_dark(look["color"]), **place)
     # room for the numbers above the highest curve
     top = max((axes.dataLim.y1 for _, axes in cells if np.isfinite(axes.dataLim.y1)), default=1.0)

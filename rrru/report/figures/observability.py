@@ -42,10 +42,12 @@ def _weights(axes, part):
     for (row, column), weight in np.ndenumerate(table.to_numpy()):
         if abs(weight) >= _WRITTEN_FROM:
             text = f"{weight:+.2f}".replace("0.", ".", 1).replace("-", "\N{MINUS SIGN}")
-            axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color="white" if abs(weight) > 0.6 else "black")
+            color = "white" if abs(weight) > 0.6 else "black"
+            axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
     axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters])
     axes.set_yticks(range(len(table)), table.index)
     axes.tick_params(length=0.0)
+    axes.set_xlabel("error parameter")
     return image
 
 

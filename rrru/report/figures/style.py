@@ -6,6 +6,7 @@ Colours are Okabe and Ito's, told apart by every kind of colour vision; those th
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib import style
@@ -15,6 +16,8 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
 _DPI = 300
+# characters in a line of a legend that stands in a panel's place
+_NARROW = 24
 
 # Okabe and Ito, "Color universal design", 2008
 BLACK, ORANGE, SKY, BLUE, VERMILION, GREY = "#000000", "#E69F00", "#56B4E9", "#0072B2", "#D55E00", "#999999"
@@ -98,7 +101,8 @@ def legend_above(figure, axes, columns=5):
 def legend_inside(place, axes):
     """One legend for the given axes in a place that is left empty for it."""
     entries = _entries(axes)
-    legend = place.legend(entries.values(), entries.keys(), loc="upper left", borderaxespad=0.0, handlelength=2.0)
+    labels = [fill(label, _NARROW) for label in entries]
+    legend = place.legend(entries.values(), labels, loc="upper left", borderaxespad=0.0, handlelength=2.0)
     legend.set_in_layout(False)
 
 
@@ -122,9 +126,11 @@ def magnification(deviation_mm, span_mm, share=0.16):
     return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-12)))
 
 
-def number(value, digits=2):
-    """A number as short text; a dash where there is none."""
-    return f"{value:.{digits}f}" if np.isfinite(value) else "–"
+def number(value):
+    """Three digits of an error; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
 
 
 def plain_log(axis):

@@ -50,7 +50,7 @@ def _sweep(tables, options, parameter, name):
         axes.tick_params(labelleft=first is None)
         first = first or axes
     # some room above the highest point of all panels
-    first.set_ylim(-0.3 * _RESOLUTION_MM, 2.0 * max(max(axes.dataLim.y1 for axes in figure.axes[1:]), _RESOLUTION_MM))
+    first.set_ylim(-0.3 * _RESOLUTION_MM, 3.0 * max(max(axes.dataLim.y1 for axes in figure.axes[1:]), _RESOLUTION_MM))
     first.set_ylabel("mean distance above the optimum (mm)")
     style.legend_above(figure, figure.axes, columns=3)
     return figure
@@ -130,7 +130,7 @@ def _scatter(axes, runs, apart, optimum, published):
     axes.grid(True)
     _whole_settings(axes, values)
     if lost:
-        axes.text(0.97, 0.03, f"{lost} runs without a feasible end", transform=axes.transAxes, ha="right", fontsize=7.0)
+        axes.text(0.03, 0.98, f"infeasible, not drawn: {lost}", transform=axes.transAxes, va="top", fontsize=7.0)
 
 
 def _test(tables, parameter, kind):

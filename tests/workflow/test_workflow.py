@@ -1,0 +1,128 @@
+"""The workflow as a user runs it: end to end, interrupted, refused."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+_ROOT = Path(__file__).resolve().parents[2]
+_SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+
+
+def _start(folder, *arguments, cores=2):
+    """A running snakemake in a folder of its own, which sees the project's files through links."""
+    for name in ("Snakefile", "config.yaml", "workflow", "tests"):
+        link = folder / name
+        if not link.exists():
+            link.symlink_to(_ROOT / name)
+    overlay = ["--configfile", "tests/minimal.yaml", *[a for a in arguments if a.endswith(".yaml")]]
+    rest = [a for a in arguments if not a.endswith(".yaml")]
+    command = [str(_SNAKEMAKE), "--cores", str(cores), *rest, *overlay]
+    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+
+
+def _run(folder, *arguments, cores=2):
+    """Exit code and output."""
+    process = _start(folder, *arguments, cores=cores)
+    output, _ = process.communicate(timeout=600)
+    return process.returncode, output
+
+
+def _digests(folder):
+    """Digest of every result file that has to be the same in every run."""
+    results = folder / "build" / "minimal"
+    files = [p for p in sorted(results.rglob("*")) if p.is_file() and p.relative_to(results).parts[0] not in ("timings", "logs")]
+    return {str(p.relative_to(results)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A whole run on two cores."""
+    folder = tmp_path_factory.mktemp("two")
+    code, output = _run(folder)
+    assert code == 0, output
+    return folder
+
+
+def test_everything_is_there_and_a_second_run_does_nothing(finished):
+    digests = _digests(finished)
+    assert {"tables/published.parquet", "tables/audit.parquet", "tables/errors.parquet", "figures/fig09.png"} <= set(digests)
+    campaigns = pd.read_parquet(finished / "build/minimal/tables/campaigns.parquet")
+    assert {"paper", "crooked", "field_01", "field_09"} == set(campaigns["campaign"])
+    code, output = _run(finished)
+    assert code == 0 and "Nothing to be done" in output
+    assert _digests(finished) == digests
+
+
+def test_one_core_gives_the_same_bytes(finished, tmp_path):
+    code, output = _run(tmp_path, cores=1)
+    assert code == 0, output
+    assert _digests(tmp_path) == _digests(finished)
+
+
+def test_a_killed_run_ends_with_the_same_bytes(finished, tmp_path):
+    process = _start(tmp_path)
+    until = time.monotonic() + 120.0
+    while len(list((tmp_path / "build").rglob("*.parquet"))) < 12:
+        assert process.poll() is None and time.monotonic() < until
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    code, output = _run(tmp_path, "--unlock")
+    assert code == 0, output
+    code, output = _run(tmp_path)
+    assert code == 0, output
+    assert _digests(tmp_path) == _digests(finished)
+
+
+def test_a_user_campaign_is_added_by_an_overlay(finished, tmp_path):
+    """Only the campaign's own part is made: the rest is the same study."""
+    data = pd.read_csv(_ROOT / "tests/data/field_01.csv").drop(columns=["theta1_rad", "theta2_rad", "theta3_rad", "payload_kg"])
+    position = [f"{kind}_{axis}_mm" for kind in ("command", "measured") for axis in "xyz"]
+    data[position] /= 25.4
+    data.to_csv(tmp_path / "mine.csv", index=False)
+    (tmp_path / "mine.yaml").write_text("campaigns: {mine: {robot: rrru3, ingest: mine.csv, unit: inch}}\n")
+    target = "build/minimal/campaigns/mine/errors.parquet"
+    code, output = _run(tmp_path, target, "mine.yaml")
+    assert code == 0, output
+    errors = pd.read_parquet(tmp_path / target)
+    same = pd.read_parquet(finished / "build/minimal/campaigns/field_01/errors.parquet")
+    rows = (errors["mode"] == "before").to_numpy()
+    pd.testing.assert_series_equal(errors["error_mm"][rows], same["error_mm"][(same["mode"] == "before").to_numpy()], atol=1e-5)
+    info = pd.read_parquet(tmp_path / "build/minimal/campaigns/mine/campaigns.parquet").iloc[0]
+    assert info["noise_from"] in ("repeats", "residuals") and "theta" in info["notes"]
+
+
+def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
+    lines = (_ROOT / "tests/data/field_01.csv").read_text().splitlines()
+    lines[17] = lines[17].replace(lines[17].split(",")[11], "oops")
+    (tmp_path / "bad.csv").write_text("\n".join(lines))
+    (tmp_path / "bad.yaml").write_text("campaigns: {bad: {robot: rrru3, ingest: bad.csv}}\n")
+    code, output = _run(tmp_path, "build/minimal/campaigns/bad/measurements.parquet", "bad.yaml")
+    assert code != 0
+    assert "bad.csv, row 17, column measured_y_mm: got 'oops'" in output and "Traceback" not in output.split("IngestError")[-1]
+    assert not list((tmp_path / "build").rglob("*.parquet")) and not list((tmp_path / "build").rglob("*.partial"))
+
+
+@pytest.mark.parametrize(
+    ("overlay", "message"),
+    [
+        ("sede: 3", "sede"),
+        ("genetic: {crossover_probability: 0.8}", "crossover_probability"),
+        ("campaigns: {mine: {robot: rrru3, ingest: a.csv, nois_mm: 0.02}}", "nois_mm"),
+        ("campaigns: {mine: {robot: rrru9, ingest: a.csv}}", "rrru9"),
+        ("sweep: {values: [0.1, 0.2]}", "0.1 is not of type 'string'"),
+        ("genetic: {generations: 0}", "0 is less than the minimum of 1"),
+    ],
+)
+def test_a_wrong_configuration_fails_before_anything_runs(tmp_path, overlay, message):
+    (tmp_path / "wrong.yaml").write_text(overlay + "\n")
+    code, output = _run(tmp_path, "wrong.yaml")
+    assert code != 0 and message in output
+    assert not (tmp_path / "build").exists()
