@@ -12,5 +12,5 @@ def stream_seed(study_seed, *labels):
 
 
 def stream(study_seed, *labels):
-    """numpy Generator for the labels, see `stream_seed`."""
+    """Generator of numpy for the labels, see `stream_seed`."""
     return np.random.default_rng(stream_seed(study_seed, *labels))

@@ -30,14 +30,17 @@ def play(path, half_width):
     return result
 
 
+_PARAMETERS = ParameterSet(
+    tuple(Parameter(f"width{k}", "rad", 0.0, 0.0, 0.02, "play of worm and harmonic drives: up to some arc minutes") for k in (1, 2, 3))
+)
+
+
 @dataclass(frozen=True)
 class Backlash:
     """Play of a width per leg in the drive angle."""
 
     name: str = "backlash"
-    parameters: ParameterSet = ParameterSet(
-        tuple(Parameter(f"width{k}", "rad", 0.0, 0.0, 0.02, "play of worm and harmonic drives: up to some arc minutes") for k in (1, 2, 3))
-    )
+    parameters: ParameterSet = _PARAMETERS
 
     def contribute(self, motion, values):
         """Changes of the drive angles under widths (3,) in rad."""

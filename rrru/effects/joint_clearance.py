@@ -15,15 +15,17 @@ import numpy as np
 from rrru.effects.protocol import Contribution
 from rrru.parameters import Parameter, ParameterSet
 
+_PARAMETERS = ParameterSet(
+    tuple(Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed") for k in (1, 2, 3))
+)
+
 
 @dataclass(frozen=True)
 class JointClearance:
     """Radial clearance per leg in the U joint."""
 
     name: str = "joint_clearance"
-    parameters: ParameterSet = ParameterSet(
-        tuple(Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed") for k in (1, 2, 3))
-    )
+    parameters: ParameterSet = _PARAMETERS
 
     def contribute(self, motion, values):
         """Shifts of the platform's U-joint centres against the forearms under clearances (3,) in mm."""

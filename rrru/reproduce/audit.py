@@ -126,7 +126,7 @@ def _predicted(values, points):
 
 
 def _table_6():
-    """Are Table 6's drive angle errors radians or degrees?"""
+    """Whether Table 6's drive angle errors are radians or degrees."""
     points = _line()
     degrees = {k: np.radians(v) if k.startswith("dtheta") else v for k, v in TABLE_6.items()}
     lines = _predicted(TABLE_5, points)

@@ -16,13 +16,13 @@ from scipy.optimize import differential_evolution
 from rrru.calibrate.identifiability import RANK_TOLERANCE
 from rrru.campaign.plan import Plan, make_run
 from rrru.campaign.trajectories import Spiral, line_groups
-from rrru.reproduce.paper_a import ERRORS_MM
-from rrru.reproduce.study_numbers import UPPER_LIMITS, group_orders, study_numbers
 from rrru.effects.protocol import Contribution
 from rrru.effects.registry import active_effects
 from rrru.errors import FitError, UnreachableError
 from rrru.mechanisms import singularity
 from rrru.plant.virtual_robot import VirtualRobot, wobble
+from rrru.reproduce.paper_a import ERRORS_MM
+from rrru.reproduce.study_numbers import UPPER_LIMITS, group_orders, study_numbers
 
 _LEGS = (1, 2, 3)
 # name: (low, high); what papers.md's quick study used, widened

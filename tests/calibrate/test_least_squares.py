@@ -98,10 +98,10 @@ def test_residual_jacobian_equals_finite_differences(rich_poses):
 
 def test_two_points_leave_a_direction_unseen():
     robot = Rrru3()
-    points = np.array([[-400.0, 0.0, 600.0], [-300.0, 0.0, 600.0]])
+    points = np.array([[-400.0, 50.0, 600.0], [-300.0, 20.0, 700.0]])
     theta = robot.inverse(points)
     ident = analyse(robot, robot.error_jacobian(points, theta))
-    assert ident.rank == 6 and ident.condition == np.inf or ident.condition > 1e6
+    assert ident.rank == 6 and ident.condition > 1e6
     assert np.isinf(ident.standard_errors(0.02)).any() and ident.indices()["O1"] == 0.0
     measured = robot.forward(theta, _TRUTH, points)
     with pytest.raises(FitError, match="2 points give 6 equations; allowed: at least 7"):

@@ -122,5 +122,5 @@ def test_unknown_names_in_the_configuration_are_named():
         virtual_robot.from_config(Rrru3(), _section(effects={"slack": {}}))
     with pytest.raises(ConfigError, match="unknown parameter 'width'"):
         virtual_robot.from_config(Rrru3(), _section(effects={"backlash": {"width": 0.1}}))
-    with pytest.raises(ConfigError, match="width1 is 1.0 rad; allowed: 0.0 to 0.02"):
+    with pytest.raises(ConfigError, match=r"width1 is 1\.0 rad; allowed: 0\.0 to 0\.02"):
         virtual_robot.from_config(Rrru3(), _section(effects={"backlash": {"width1": 1.0}}))

@@ -227,6 +227,13 @@ def test_magnification_is_round(largest, span, factor):
     assert style.magnification([0.1, np.nan, -largest], span) == factor
 
 
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0471, "0.047"), (-5.031, "\N{MINUS SIGN}5.03"), (-47.11, "\N{MINUS SIGN}47.1"), (471.1, "471"), (np.nan, "–")]
+)
+def test_numbers_are_short(value, text):
+    assert style.number(value) == text
+
+
 def test_the_registry_names_tables_that_exist():
     known = set(tables.TABLES) | {"paths", "workspace"}
     for name, (function, needed, caption) in FIGURES.items():

@@ -25,10 +25,11 @@ def fig11(tables, options):
     grid = figure.add_gridspec(3, 1)
     _path(path, places, [("before calibration", style.BEFORE, choose.before(tables, options, "fig11")), *curves])
     first = None
+    tags = (options["calibration_lines"], options["calibration_spiral"])
     for row, axis in enumerate(_AXES):
         axes = first = figure.add_subplot(grid[row], sharex=first, sharey=first)
-        _component(axes, places, curves, axis)
-        axes.set_title(f"({'bcd'[row]}) error along {axis}{lines.pass_note(places)}")
+        _component(axes, places, curves, tags, axis)
+        axes.set_title(f"({'bcd'[row]}) {axis}{lines.pass_note(places)}")
         axes.tick_params(labelbottom=row == len(_AXES) - 1)
     axes.set_xlabel("point")
     style.legend_above(figure, figure.axes)
@@ -67,10 +68,11 @@ def _path(axes, places, curves):
     axes.text2D(0.06, 0.97, f"(a) path, deviations magnified {factor:g} times", transform=axes.transAxes)
 
 
-def _component(axes, places, curves, axis):
-    """Error along one axis under each calibration."""
-    for label, look, errors in curves:
-        lines.draw_along(axes, errors, places, look, label, f"error_{axis}_mm")
+def _component(axes, places, curves, tags, axis):
+    """Error along one axis under each calibration, the ranges as numbers above the panel."""
+    ranges = [lines.draw_along(axes, errors, places, look, label, f"error_{axis}_mm") for label, look, errors in curves]
+    texts = [f"{tag} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)]
+    axes.set_title("; ".join(texts) + " mm", loc="right", fontsize=7.0)
     axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
     lines.tolerance(axes, (1.0, -1.0))
     lines.shade_near_singular(axes, places)

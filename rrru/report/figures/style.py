@@ -127,10 +127,12 @@ def magnification(deviation_mm, span_mm, share=0.16):
 
 
 def number(value):
-    """Three digits of an error; a dash where there is none."""
+    """An error to two decimals, more where it is small, fewer where it is large; a dash where there is none."""
     if not np.isfinite(value):
         return "–"
-    return f"{value:.{2 if value < 10.0 else 1 if value < 100.0 else 0}f}"
+    size = abs(value)
+    digits = 3 if size < 0.1 else 2 if size < 10.0 else 1 if size < 100.0 else 0
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
 
 
 def plain_log(axis):
