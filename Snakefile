@@ -1,5 +1,3 @@
-import sys
-
 from snakemake.utils import min_version, validate
 
 min_version("9.0")
@@ -22,3 +20,4 @@ rule all:
     default_target: True
     input:
         [table(name) for name in STUDY_TABLES],
+        rules.figures.input,

@@ -60,15 +60,19 @@ def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
 
 
 def _bad_points(place, deviation, noise_mm, threshold):
-    """Indices of the bad points of one run: the worst block first, then again without it, until none is left."""
+    """Indices of the bad points of one run: the worst block first, then again without it, until none is left.
+
+    A good point beside bad ones can be taken with them: each is put back once to see whether it fits the good ones.
+    """
     kept, bad = np.arange(len(deviation)), []
-    while len(kept) >= _WINDOW:
-        block = _worst_block(place[kept], deviation[kept], noise_mm, threshold)
-        if block is None:
-            break
+    while len(kept) >= _WINDOW and (block := _worst_block(place[kept], deviation[kept], noise_mm, threshold)) is not None:
         bad.extend(kept[block])
         kept = np.delete(kept, block)
-    return np.array(bad, dtype=int)
+    for one in sorted(bad) if len(kept) >= _WINDOW else ():
+        again = np.sort(np.append(kept, one))
+        if _worst_block(place[again], deviation[again], noise_mm, threshold) is None:
+            kept = again
+    return np.setdiff1d(np.arange(len(deviation)), kept)
 
 
 def _worst_block(place, deviation, noise_mm, threshold):

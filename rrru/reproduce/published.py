@@ -9,20 +9,22 @@ from rrru.reproduce.study_numbers import group_orders, study_numbers
 _AXES = [f"error_{axis}_mm" for axis in "xyz"]
 
 
-def published_table(config, errors, parameters, genetic, sweep_runs, method="least_mean_distance"):
+def published_table(config, errors, parameters, genetic, sweep_runs):
     """Rows of `published` from tables of the study.
 
-    config: the whole configuration; errors, parameters, genetic, sweep_runs: the tables of those names; method: whose errors and
-    parameters stand beside the paper's. Numbers that this study does not have are null.
+    config: the whole configuration, whose `reproduce` section says which calibrations stand for the paper's; errors, parameters, genetic,
+    sweep_runs: the tables of those names. Numbers that this study does not have are null.
     """
+    reproduce = config["reproduce"]
+    before, lines, spiral = (_study_errors(errors, reproduce, key) for key in ("none", "line_calibration", "spiral_calibration"))
     here = (
         _design(config)
         | _sweep(sweep_runs)
-        | _fitted(parameters, genetic, config, method)
-        | _errors(errors, config, method)
+        | _fitted(parameters, genetic, reproduce)
+        | _errors(errors, reproduce, before, lines, spiral)
         | {"tolerance_mm": 2.0}
     )
-    notes = _notes(genetic, config)
+    notes = _notes(genetic, reproduce)
     rows = []
     for number in paper_a.NUMBERS:
         value = here.get(number.item, np.nan)
@@ -37,25 +39,25 @@ def published_table(config, errors, parameters, genetic, sweep_runs, method="lea
                 "note": "; ".join(text for text in (number.note, notes.get(number.item, "")) if text),
             }
         )
-    return pd.concat([pd.DataFrame(rows), _orders(errors, config, method)], ignore_index=True)
+    return pd.concat([pd.DataFrame(rows), _orders(before, lines)], ignore_index=True)
 
 
-def closed_loop_errors(errors, campaign, calibration, method):
-    """Trajectory names (n,) and error vectors (n, 3) of one calibration driven again, or measured before any (calibration "none")."""
-    mode = "before" if calibration == "none" else "closed_loop"
-    chosen = errors[
-        (errors["campaign"] == campaign)
-        & (errors["calibration"] == calibration)
-        & (errors["method"] == ("none" if calibration == "none" else method))
-        & (errors["mode"] == mode)
-    ].sort_values(["run", "point"])
+def _study_errors(errors, reproduce, key):
+    """Trajectory names (n,) and error vectors (n, 3): before calibration (key "none"), or driven again under one of the calibrations."""
+    chosen = errors[errors["campaign"] == reproduce["campaign"]]
+    if key == "none":
+        chosen = chosen[chosen["mode"] == "before"]
+    else:
+        same = (chosen["calibration"] == reproduce[key]) & (chosen["method"] == reproduce["method"])
+        chosen = chosen[same & (chosen["mode"] == "closed_loop")]
+    chosen = chosen.sort_values(["run", "point"])
     return chosen["trajectory"].to_numpy(), chosen[_AXES].to_numpy()
 
 
 def _design(config):
     """Dimensions, motion and counts as configured."""
     robot, motion = config["robots"]["rrru3"], config["motion"]
-    shape = config["trajectories"][config["campaigns"][config["sweep"]["campaign"]]["trajectories"]]
+    shape = config["trajectories"][config["campaigns"][config["reproduce"]["campaign"]]["trajectories"]]
     lines, spiral, genetic = shape["lines"], shape["spiral"], config["genetic"]
     return {
         **{key: robot[key] for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")},
@@ -78,13 +80,13 @@ def _sweep(runs):
     return {f"{label[parameter]}={value:.1f}": median for (parameter, value), median in medians.items()}
 
 
-def _fitted(parameters, genetic, config, method):
+def _fitted(parameters, genetic, reproduce):
     """The printed 14 errors of both calibrations; dR and dr alone from the genetic algorithm's median, since only dr - dR is a result."""
-    campaign, result = config["sweep"]["campaign"], {}
-    for label in ("lines", "spiral"):
-        chosen = parameters[(parameters["campaign"] == campaign) & (parameters["calibration"] == label) & (parameters["method"] == method)]
+    result = {}
+    for label, key in (("lines", "line_calibration"), ("spiral", "spiral_calibration")):
+        own = [(t["campaign"] == reproduce["campaign"]) & (t["calibration"] == reproduce[key]) for t in (parameters, genetic)]
+        chosen, runs = parameters[own[0] & (parameters["method"] == reproduce["method"])], genetic[own[1]]
         values = dict(zip(chosen["parameter"], chosen["value"], strict=True))
-        runs = genetic[(genetic["campaign"] == campaign) & (genetic["calibration"] == label)]
         for name in paper_a.TABLE_5:
             value = float(runs[name].median()) if name in ("dR", "dr") and len(runs) else values.get(name, np.nan)
             for printed in paper_a.TIED_TO_PRINTED.get(name, (name,)):
@@ -93,29 +95,21 @@ def _fitted(parameters, genetic, config, method):
     return result
 
 
-def _errors(errors, config, method):
-    """The error numbers of the paper's section 3."""
-    campaign = config["sweep"]["campaign"]
-    trajectory, before = closed_loop_errors(errors, campaign, "none", method)
-    _, lines = closed_loop_errors(errors, campaign, "lines", method)
-    _, spiral = closed_loop_errors(errors, campaign, "spiral", method)
-    if not (len(before) == len(lines) == len(spiral)) or not len(before):
+def _errors(errors, reproduce, before, lines, spiral):
+    """The error numbers of the paper's section 3; empty for a campaign that was not driven again."""
+    if not len(before[1]) == len(lines[1]) == len(spiral[1]) > 0:
         return {}
-    model = errors[
-        (errors["campaign"] == campaign)
-        & (errors["calibration"] == "lines")
-        & (errors["method"] == method)
-        & (errors["mode"] == "model")
-        & errors["trajectory"].str.startswith("line_")
-    ]
-    return study_numbers(trajectory, before, lines, spiral) | {"lines_objective": model["error_mm"].mean()}
+    own = (errors["campaign"] == reproduce["campaign"]) & (errors["calibration"] == reproduce["line_calibration"])
+    model = errors[own & (errors["method"] == reproduce["method"]) & (errors["mode"] == "model")]
+    if reproduce["line_calibration"] == "group_1":
+        model = model[model["trajectory"] == "line_1"]
+    model = model[model["trajectory"].str.startswith("line_")]
+    return study_numbers(before[0], before[1], lines[1], spiral[1]) | {"lines_objective": model["error_mm"].mean()}
 
 
-def _orders(errors, config, method):
+def _orders(before, lines):
     """The paper's orders as rows: published 1 (holds), here 1 or 0."""
-    trajectory, before = closed_loop_errors(errors, config["sweep"]["campaign"], "none", method)
-    _, lines = closed_loop_errors(errors, config["sweep"]["campaign"], "lines", method)
-    if not len(before) or len(before) != len(lines):
+    if not len(before[1]) == len(lines[1]) > 0:
         return pd.DataFrame(columns=["item", "source", "unit", "published", "here", "ratio", "note"])
     text = {
         "centre_before": "mean error of each of groups 1-3 below each of groups 4-7, before calibration",
@@ -133,14 +127,14 @@ def _orders(errors, config, method):
             "ratio": float(margin > 0.0),
             "note": f"{text[name]}: 1 where it holds; margin here {100.0 * margin:.1f} %",
         }
-        for name, margin in group_orders(trajectory, before, lines).items()
+        for name, margin in group_orders(before[0], before[1], lines[1]).items()
     ]
     return pd.DataFrame(rows)
 
 
-def _notes(genetic, config):
+def _notes(genetic, reproduce):
     """Notes that depend on the results."""
-    runs = genetic[(genetic["campaign"] == config["sweep"]["campaign"]) & (genetic["calibration"] == "lines")]
+    runs = genetic[(genetic["campaign"] == reproduce["campaign"]) & (genetic["calibration"] == reproduce["line_calibration"])]
     if runs.empty:
         return {}
     return {

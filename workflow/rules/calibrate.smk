@@ -1,7 +1,3 @@
-CALIBRATE_ROOMS = (*CAMPAIGN_ROOMS, "calibrate")
-SWEPT = ("crossover_fraction", "migration_fraction")
-
-
 rule calibrate:
     input:
         measurements=part("measurements"),
@@ -41,14 +37,14 @@ rule genetic:
 
 rule sweep:
     input:
-        measurements=part("measurements", config["sweep"]["campaign"]),
+        measurements=part("measurements", config["reproduce"]["campaign"]),
     output:
         sweep_runs=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_runs.parquet",
         sweep_history=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_history.parquet",
     log:
         f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}/{{value}}.log",
     params:
-        settings=settings("seed", "robots", "calibration", "genetic", "sweep"),
+        settings=settings("seed", "robots", "calibration", "genetic", "reproduce", "sweep"),
         code=code_digest(*CALIBRATE_ROOMS),
     script:
         "../scripts/sweep.py"
@@ -64,10 +60,10 @@ rule gather_sweep:
         ),
     output:
         table("sweep_{kind}"),
-    wildcard_constraints:
-        kind="runs|history",
     log:
         f"{RESULTS}/logs/gather/sweep_{{kind}}.log",
+    wildcard_constraints:
+        kind="runs|history",
     params:
         table="sweep_{kind}",
         code=code_digest("report/tables", "report/schemas"),

@@ -1,11 +1,3 @@
-CAMPAIGN_ROOMS = ("errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
-
-
-def campaign_file(wildcards):
-    """The file of an ingested campaign, nothing for a virtual one."""
-    return config["campaigns"][wildcards.campaign].get("ingest", [])
-
-
 rule campaign:
     input:
         file=campaign_file,
@@ -17,7 +9,7 @@ rule campaign:
     log:
         f"{RESULTS}/logs/campaign/{{campaign}}.log",
     params:
-        section=lambda wildcards: config["campaigns"][wildcards.campaign],
+        section=campaign_settings,
         settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
         code=code_digest(*CAMPAIGN_ROOMS),
     script:
@@ -29,10 +21,10 @@ rule gather:
         lambda wildcards: [part(wildcards.table, campaign) for campaign in CAMPAIGNS],
     output:
         table("{table}"),
-    wildcard_constraints:
-        table="|".join(CAMPAIGN_TABLES),
     log:
         f"{RESULTS}/logs/gather/{{table}}.log",
+    wildcard_constraints:
+        table="|".join(CAMPAIGN_TABLES),
     params:
         table="{table}",
         code=code_digest("report/tables", "report/schemas"),

@@ -1,4 +1,8 @@
+import hashlib
+import json
+
 from rrru.report.digest import code_digest
+from rrru.report.figures import FIGURES
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
@@ -18,6 +22,14 @@ CAMPAIGN_TABLES = [
 ]
 STUDY_TABLES = [*CAMPAIGN_TABLES, "sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs", "published", "audit"]
 
+# figures that every campaign gets; the others show the reproduced study
+CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]
+
+# rooms of the package that a stage's results depend on
+CAMPAIGN_ROOMS = ("errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
+CALIBRATE_ROOMS = (*CAMPAIGN_ROOMS, "calibrate")
+SWEPT = ("crossover_fraction", "migration_fraction")
+
 
 wildcard_constraints:
     campaign="[A-Za-z0-9_-]+",
@@ -34,5 +46,41 @@ def table(name):
 
 
 def settings(*keys):
-    """What a rule depends on in the configuration: its text, so that a change reruns the rule."""
-    return {key: config[key] for key in keys}
+    """Digests of what a rule depends on in the configuration, so that a change reruns the rule."""
+    return {key: hashlib.sha256(json.dumps(config[key], sort_keys=True).encode()).hexdigest()[:12] for key in keys}
+
+
+def campaign_file(wildcards):
+    """The file of an ingested campaign, nothing for a virtual one."""
+    return config["campaigns"][wildcards.campaign].get("ingest", [])
+
+
+def campaign_settings(wildcards):
+    """The campaign's own section of the configuration."""
+    return json.dumps(config["campaigns"][wildcards.campaign], sort_keys=True)
+
+
+def figure_campaign(wildcards):
+    """Whose figure it is: the reproduced study's lie in figures/ itself, the others' in a folder of the campaign."""
+    return wildcards.get("campaign", config["reproduce"]["campaign"])
+
+
+def figure_tables(wildcards):
+    """The tables that a figure reads, by name."""
+    campaign = figure_campaign(wildcards)
+    own = {"paths": part("measurements", campaign), "workspace": part("workspace", campaign)}
+    return {name: own.get(name, table(name)) for name in FIGURES[wildcards.figure][1]}
+
+
+def figure_options(wildcards):
+    """What a figure shows."""
+    reproduce = config["reproduce"]
+    return {
+        "campaign": figure_campaign(wildcards),
+        "calibration_lines": reproduce["line_calibration"],
+        "calibration_spiral": reproduce["spiral_calibration"],
+        "sweep_campaign": reproduce["campaign"],
+        "sweep_calibration": reproduce["line_calibration"],
+        "method": reproduce["method"],
+        "mode": "closed_loop",
+    }

@@ -10,7 +10,42 @@ rule published:
     log:
         f"{RESULTS}/logs/published.log",
     params:
-        settings=settings("robots", "motion", "trajectories", "campaigns", "genetic", "sweep"),
+        settings=settings("robots", "motion", "trajectories", "campaigns", "genetic", "reproduce", "sweep"),
         code=code_digest("reproduce", "mechanisms", "report/tables", "report/schemas"),
     script:
         "../scripts/published.py"
+
+
+rule figure:
+    input:
+        unpack(figure_tables),
+    output:
+        pdf=f"{RESULTS}/figures/{{figure}}.pdf",
+        png=f"{RESULTS}/figures/{{figure}}.png",
+    log:
+        f"{RESULTS}/logs/figures/{{figure}}.log",
+    wildcard_constraints:
+        figure="|".join(FIGURES),
+    params:
+        options=figure_options,
+        code=code_digest("report"),
+    script:
+        "../scripts/figure.py"
+
+
+use rule figure as campaign_figure with:
+    output:
+        pdf=f"{RESULTS}/figures/{{campaign}}/{{figure}}.pdf",
+        png=f"{RESULTS}/figures/{{campaign}}/{{figure}}.png",
+    log:
+        f"{RESULTS}/logs/figures/{{campaign}}/{{figure}}.log",
+
+
+rule figures:
+    input:
+        expand(f"{RESULTS}/figures/{{figure}}.png", figure=sorted(FIGURES)),
+        expand(
+            f"{RESULTS}/figures/{{campaign}}/{{figure}}.png",
+            campaign=[name for name in CAMPAIGNS if name != config["reproduce"]["campaign"]],
+            figure=CAMPAIGN_FIGURES,
+        ),

@@ -12,9 +12,9 @@ from rrru.report.job import job
 
 def main(config, parameter, population, value, inputs, outputs):
     """Write the runs and their history."""
-    section = config["sweep"]
-    mechanism = study.mechanism(config, section["campaign"], "tied")
-    patterns = config["calibration"]["sets"][section["calibration"]]
+    section, reproduce = config["sweep"], config["reproduce"]
+    mechanism = study.mechanism(config, reproduce["campaign"], "tied")
+    patterns = config["calibration"]["sets"][reproduce["line_calibration"]]
     residuals = select(tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"])
     settings = settings_from_config(config["genetic"], populations=section["populations"][population])
     runs, history = run_sweep(
