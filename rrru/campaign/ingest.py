@@ -12,7 +12,7 @@ import pyarrow.parquet as parquet
 
 from rrru.campaign.ingest_checks import check_runs, check_speed, number_runs, path_length, resolution
 from rrru.campaign.ingest_columns import COMMAND, KNOWN, MEASURED, MM, RAD, REQUIRED, THETA, convert, resolve
-from rrru.campaign.ingest_geometry import check_commands, check_measured, check_sizes, frame_limit
+from rrru.campaign.ingest_geometry import check_commands, check_measured, check_sizes, doubts, frame_limit
 from rrru.campaign.ingest_text import looks_like, text_cells
 from rrru.campaign.outliers import flag_outliers, reproduced
 from rrru.campaign.problems import Problems
@@ -209,9 +209,10 @@ def _outliers(frame, digit_mm):
 
 
 def _table(frame, spec, mechanism, digit_mm, notes):
-    """Frame in the form of the schema `measurements`; adds to the notes how many outliers were marked."""
+    """Frame in the form of the schema `measurements`; adds doubts and how many outliers were marked to the notes."""
     if not set(THETA) <= set(frame):
         frame[[*THETA]] = mechanism.inverse(frame[[*COMMAND]].to_numpy(), elbow=spec.elbow)
+    notes += doubts(frame, mechanism)
     outlier = _outliers(frame, digit_mm)
     frame["status"] = np.where(outlier, "outlier", "ok")
     if outlier.any():

@@ -11,6 +11,7 @@ from rrru.campaign.ingest_columns import AXES, COMMAND, MEASURED, MM, THETA
 ANGLE_TOLERANCE_RAD = 1e-4
 # ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ.
 _FRAME_SHARE = 0.05
+_STRANGE_SHARE = 0.01
 # Room beyond the farthest reachable point, where an outlier may still lie.
 _REACH_MARGIN = 1.1
 _MOST, _MANY = 0.9, 0.5
@@ -90,6 +91,25 @@ def check_measured(frame, found, mechanism, problems):
     for i in np.flatnonzero((np.linalg.norm(measured, axis=1) > far) | (measured == 0.0).all(axis=1)):
         allowed = f"within {far:.4g} mm of the robot's origin, and not 0, 0, 0; drop the row of a point that was not measured"
         problems.add("reach of measured", row=known.index[i], column=column, value=_position(measured[i]), allowed=allowed)
+
+
+def doubts(frame, mechanism):
+    """What is possible but strange about measured positions in the robot's frame: far off in all, or one row late or early."""
+    command, measured, run = frame[[*COMMAND]].to_numpy(), frame[[*MEASURED]].to_numpy(), frame["run"].to_numpy()
+    off = np.median(np.linalg.norm(measured - command, axis=1))
+    notes = []
+    for first, second, word in ((measured[1:], command[:-1], "before"), (measured[:-1], command[1:], "after")):
+        shifted = np.linalg.norm(first - second, axis=1)[run[1:] == run[:-1]]
+        if off > 1.0 and np.median(shifted) < 0.2 * off:
+            notes.append(
+                f"measured positions fit the command of the row {word} theirs to {np.median(shifted):.3g} mm in the median, "
+                f"their own to {off:.3g} mm: the rows may be shifted"
+            )
+    if off > _STRANGE_SHARE * _size(mechanism):
+        notes.append(
+            f"measured positions are {off:.4g} mm from the commanded ones in the median: see that unit, frame and rows belong together"
+        )
+    return notes
 
 
 def frame_limit(mechanism):

@@ -125,9 +125,15 @@ class Twin:
 LINE_CALIBRATIONS = ("group_1", "lines")
 
 
-def simulate(mechanism, twin, noise_mm, seed, line_calibration="group_1", kind=TranslationalRobot):
+def draw(generator, count):
+    """Random numbers of one drive in the order in which a virtual robot draws them: unit wobble (count, 3) and unit noise (count, 3)."""
+    return wobble(generator, count), generator.standard_normal((count, 3))
+
+
+def simulate(mechanism, twin, noise_mm, draws, line_calibration="group_1", kind=TranslationalRobot):
     """Numbers and order margins of a candidate: calibrate on lines and on the spiral, drive the corrected commands, compare.
 
+    draws: see `draw`, for the measurement and for the drives with corrected commands; line_calibration: one of LINE_CALIBRATIONS.
     Raises UnreachableError or FitError where the candidate cannot be driven or calibrated.
     """
     plan = _plan(twin)
@@ -142,21 +148,16 @@ def simulate(mechanism, twin, noise_mm, seed, line_calibration="group_1", kind=T
     if margin < SPIRAL_MARGIN:
         raise UnreachableError(f"the spiral comes within {margin:.3f} of a singularity; allowed: {SPIRAL_MARGIN}")
     robot = twin.robot(mechanism, kind)
-    generator = np.random.default_rng(seed)
-    draws = [(wobble(generator, len(target)), generator.standard_normal(target.shape)) for _ in range(3)]
 
-    def drive(controller, draw):
+    def drive(controller, drawn):
         position, _ = robot.positions(robot.motion(plan, controller), target)
-        return position + robot.wobble_mm * draw[0] + noise_mm * draw[1]
+        return position + robot.wobble_mm * drawn[0] + noise_mm * drawn[1]
 
     measured = drive(mechanism.inverse, draws[0])
     fits = {}
     for name, chosen in (("lines", trajectory == "line_1" if line_calibration == "group_1" else ~curve), ("spiral", curve)):
         fits[name] = _linear_fit(mechanism, theta[chosen], measured[chosen], target[chosen])
-    lines, spiral = (
-        drive(lambda x, e=fits[name][0]: mechanism.inverse(x, e), draw) - target
-        for name, draw in (("lines", draws[1]), ("spiral", draws[2]))
-    )
+    lines, spiral = (drive(lambda x, e=fits[name][0]: mechanism.inverse(x, e), draws[1]) - target for name in ("lines", "spiral"))
     numbers = study_numbers(trajectory, measured - target, lines, spiral) | {"lines_objective": fits["lines"][1]}
     return numbers, group_orders(trajectory, measured - target, lines)
 
@@ -222,24 +223,28 @@ def misfit(numbers, orders):
         ratio = max(numbers[item] / published, 1e-3)
         deviation = max(ratio - 1.0, 0.0) if item in UPPER_LIMITS else abs(np.log(ratio))
         total += min(deviation / 0.14, 20.0) ** 4
-    return total + sum((max(0.02 - margin, 0.0) / 0.05) ** 2 for margin in orders.values())
+    return total + sum((max(0.02 - margin, 0.0) / 0.01) ** 2 for margin in orders.values())
 
 
-def cost(vector, mechanism, noise_mm, seed, line_calibration):
+def cost(vector, mechanism, noise_mm, draws, line_calibration):
     """Misfit of a search vector; a large number for candidates that cannot be driven."""
     try:
-        value = misfit(*simulate(mechanism, Twin(dict(zip(SEARCH_BOUNDS, vector, strict=True))), noise_mm, seed, line_calibration))
+        value = misfit(*simulate(mechanism, Twin(dict(zip(SEARCH_BOUNDS, vector, strict=True))), noise_mm, draws, line_calibration))
     except (UnreachableError, FitError, np.linalg.LinAlgError):
         return _WORST
     return value if np.isfinite(value) else _WORST
 
 
-def search(mechanism, noise_mm, seed, line_calibration, generations, population, workers=1, start=None, callback=None):
-    """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit). The same seed gives the same twin on any number of workers."""
+def search(mechanism, noise_mm, draws, line_calibration, seed, generations, population, workers=1, callback=None):
+    """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit). The same seed gives the same twin on any number of workers.
+
+    noise_mm, draws, line_calibration: see `simulate`; population: candidates per searched number; callback: scipy's, called with each
+    generation's intermediate result.
+    """
     result = differential_evolution(
         cost,
         list(SEARCH_BOUNDS.values()),
-        args=(mechanism, noise_mm, seed, line_calibration),
+        args=(mechanism, noise_mm, draws, line_calibration),
         maxiter=generations,
         popsize=population,
         mutation=(0.4, 0.9),
@@ -248,8 +253,35 @@ def search(mechanism, noise_mm, seed, line_calibration, generations, population,
         updating="deferred",
         polish=False,
         tol=0.0,
-        x0=start,
         workers=workers,
         callback=callback,
     )
     return Twin(dict(zip(SEARCH_BOUNDS, result.x.tolist(), strict=True))), float(result.fun)
+
+
+def overlay(twin):
+    """Configuration overlay that makes the twin the virtual robot `twin` and its lines and spiral the trajectories `paper`."""
+    *_, spiral = twin.trajectories()
+    names = (*(f"dtheta{k}" for k in _LEGS), "dL1", "dL2", "dL3", "dr")
+    shape = {
+        "centre_mm": list(spiral.centre_mm),
+        "radius_mm": list(spiral.radius_mm),
+        "z_mm": list(spiral.z_mm),
+        "turns": spiral.turns,
+        "start_deg": spiral.start_deg,
+    }
+    robot = {"errors": {name: twin.values[name] for name in names}, "effects": twin.effects(), "wobble_mm": twin.values["wobble_mm"]}
+    section = {
+        "trajectories": {"paper": {"lines": {"offsets_y_mm": list(twin.offsets())}, "spiral": shape}},
+        "virtual_robots": {"twin": robot},
+    }
+    return _rounded(section)
+
+
+def _rounded(value):
+    """The same structure with every number rounded to six significant digits."""
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_rounded(entry) for entry in value]
+    return float(f"{value:.6g}")

@@ -164,6 +164,15 @@ def test_a_broken_beam_is_kept_and_marked(field, tmp_path):
     assert result.measurements["measured_z_mm"].to_list() == frame["measured_z_mm"].to_list()
 
 
+def test_rows_that_seem_shifted_or_far_off_are_noted(field, tmp_path):
+    frame = field.copy()
+    frame[MEASURED] = field[MEASURED].shift(1)
+    shifted = ingest(IngestSpec(written(frame[frame["point"] > 1], tmp_path / "f.csv")), ROBOT).notes
+    assert "measured positions fit the command of the row before theirs to 1.6" in shifted[0]
+    far = ingest(IngestSpec(written(field.assign(measured_x_mm=field["measured_x_mm"] + 40.0), tmp_path / "f.csv")), ROBOT).notes
+    assert "measured positions are 41.58 mm from the commanded ones in the median" in far[0]
+
+
 @settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(turn=st.tuples(*[st.floats(-3.0, 3.0)] * 3), shift=st.tuples(*[st.floats(-9000.0, 9000.0)] * 3), chosen=st.booleans())
 def test_a_tracker_frame_is_registered(turn, shift, chosen, field, tmp_path):

@@ -16,6 +16,19 @@ rule published:
         "../scripts/published.py"
 
 
+rule twin:
+    output:
+        f"{RESULTS}/twin/twin.yaml",
+    log:
+        f"{RESULTS}/logs/twin.log",
+    params:
+        settings=settings("seed", "robots", "reproduce", "twin"),
+        code=code_digest("mechanisms", "effects", "plant", "campaign", "reproduce"),
+    threads: 2
+    script:
+        "../scripts/twin.py"
+
+
 rule figure:
     input:
         unpack(figure_tables),
