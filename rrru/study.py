@@ -12,11 +12,14 @@ from rrru.campaign import trajectories
 from rrru.campaign.ingest import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.errors import ConfigError
-from rrru.mechanisms import singularity
+from rrru.mechanisms import singularity, workspace
 from rrru.mechanisms.protocol import make_mechanism
 from rrru.plant import virtual_robot
 from rrru.seeds import stream
 
+# all that the robot of the paper can reach
+_WORKSPACE_MM = {"x": (-1000.0, 1000.0), "y": (-1000.0, 1000.0), "z": (0.0, 1300.0)}
+_WORKSPACE_STEP_MM = 10.0
 _INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points", "extra_columns", "elbow")
 
 
@@ -112,6 +115,30 @@ def singularity_table(robot, measurements):
         constraint_measure=singularity.constraint_measure(robot, position, theta),
         constraint_determinant=singularity.constraint_determinant(robot, position, theta),
     )
+
+
+def workspace_table(config, campaign, measurements):
+    """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commanded points."""
+    robot = mechanism(config, campaign)
+    height = float(rows.command(measurements)[:, 2].mean().round(-1))
+    frames = []
+    for plane, at in (("xz", 0.0), ("xy", height)):
+        points = workspace.slice_points(plane, at, _WORKSPACE_MM[plane[0]], _WORKSPACE_MM[plane[1]], _WORKSPACE_STEP_MM)
+        reachable, translational, constraint, determinant = workspace.measures(robot, points)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "campaign": campaign,
+                    "slice": plane,
+                    **{f"{axis}_mm": points[:, k] for k, axis in enumerate("xyz")},
+                    "reachable": reachable,
+                    "translational_measure": translational,
+                    "constraint_measure": constraint,
+                    "constraint_determinant": determinant,
+                }
+            )
+        )
+    return pd.concat(frames, ignore_index=True)
 
 
 def campaign_row(config, campaign, measurements, singular, ingested=None):

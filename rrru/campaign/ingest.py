@@ -152,7 +152,9 @@ def _notes_on_columns(frame, found, spec, mechanism):
         if name not in frame:
             notes.append(f"column {found[name]} is blank: {name} is unknown" if name in found else f"no column {name}: it is unknown")
     if not set(THETA) <= set(frame):
-        notes.append(f"no drive angles: computed from the commanded positions ({mechanism.name}, nominal, elbow {spec.elbow})")
+        notes.append(
+            f"no drive angles: theta1_rad to theta3_rad computed from the commanded positions ({mechanism.name}, nominal, elbow {spec.elbow})"
+        )
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")
     return notes

@@ -137,8 +137,8 @@ def _blank(cell):
 
 
 def _shown(cell):
-    """A cell as it stands in the file."""
-    return "blank" if _blank(cell) else str(cell)
+    """A cell as it stands in the file, text in quotes."""
+    return "blank" if _blank(cell) else repr(cell) if isinstance(cell, str) else str(cell)
 
 
 def _nearest(name, candidates):

@@ -11,6 +11,7 @@ from rrru.campaign.ingest_columns import AXES, COMMAND, MEASURED, MM, THETA
 ANGLE_TOLERANCE_RAD = 1e-4
 # ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ.
 _FRAME_SHARE = 0.05
+# A hundredth of it is strange enough for a note.
 _STRANGE_SHARE = 0.01
 # Room beyond the farthest reachable point, where an outlier may still lie.
 _REACH_MARGIN = 1.1

@@ -17,7 +17,7 @@ _SNAKEMAKE = Path(sys.executable).parent / "snakemake"
 
 def _start(folder, *arguments, cores=2):
     """A running snakemake in a folder of its own, which sees the project's files through links."""
-    for name in ("Snakefile", "config.yaml", "workflow", "tests"):
+    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests"):
         link = folder / name
         if not link.exists():
             link.symlink_to(_ROOT / name)

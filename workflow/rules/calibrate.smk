@@ -50,37 +50,23 @@ rule sweep:
         "../scripts/sweep.py"
 
 
-rule gather_sweep:
+rule sweep_tables:
     input:
-        expand(
-            f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_{{{{kind}}}}.parquet",
-            parameter=SWEPT,
-            population=sorted(config["sweep"]["populations"]),
-            value=config["sweep"]["values"],
-        ),
+        **{
+            name: expand(
+                f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_{name.removeprefix('sweep_')}.parquet",
+                parameter=SWEPT,
+                population=sorted(config["sweep"]["populations"]),
+                value=config["sweep"]["values"],
+            )
+            for name in ("sweep_runs", "sweep_history")
+        },
     output:
-        table("sweep_{kind}"),
+        **{name: table(name) for name in SWEEP_TABLES},
     log:
-        f"{RESULTS}/logs/gather/sweep_{{kind}}.log",
-    wildcard_constraints:
-        kind="runs|history",
-    params:
-        table="sweep_{kind}",
-        code=code_digest("report/tables", "report/schemas"),
-    script:
-        "../scripts/gather.py"
-
-
-rule sweep_tests:
-    input:
-        sweep_runs=table("sweep_runs"),
-    output:
-        sweep_effect=table("sweep_effect"),
-        sweep_pairs=table("sweep_pairs"),
-    log:
-        f"{RESULTS}/logs/sweep_tests.log",
+        f"{RESULTS}/logs/sweep_tables.log",
     params:
         seed=config["seed"],
         code=code_digest("calibrate", "report/tables", "report/schemas"),
     script:
-        "../scripts/sweep_tests.py"
+        "../scripts/sweep_tables.py"

@@ -6,6 +6,7 @@ rule campaign:
         truth=part("truth"),
         singularity=part("singularity"),
         campaigns=part("campaigns"),
+        workspace=part("workspace"),
     log:
         f"{RESULTS}/logs/campaign/{{campaign}}.log",
     params:
@@ -18,29 +19,12 @@ rule campaign:
 
 rule gather:
     input:
-        lambda wildcards: [part(wildcards.table, campaign) for campaign in CAMPAIGNS],
+        **{name: [part(name, campaign) for campaign in CAMPAIGNS] for name in CAMPAIGN_TABLES},
     output:
-        table("{table}"),
+        **{name: table(name) for name in CAMPAIGN_TABLES},
     log:
-        f"{RESULTS}/logs/gather/{{table}}.log",
-    wildcard_constraints:
-        table="|".join(CAMPAIGN_TABLES),
+        f"{RESULTS}/logs/gather.log",
     params:
-        table="{table}",
         code=code_digest("report/tables", "report/schemas"),
     script:
         "../scripts/gather.py"
-
-
-rule workspace:
-    input:
-        measurements=part("measurements"),
-    output:
-        part("workspace"),
-    log:
-        f"{RESULTS}/logs/workspace/{{campaign}}.log",
-    params:
-        settings=settings("robots", "calibration"),
-        code=code_digest("mechanisms"),
-    script:
-        "../scripts/workspace.py"

@@ -20,7 +20,8 @@ CAMPAIGN_TABLES = [
     "genetic_history",
     "genetic_against_least_squares",
 ]
-STUDY_TABLES = [*CAMPAIGN_TABLES, "sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs", "published", "audit"]
+SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
+STUDY_TABLES = [*CAMPAIGN_TABLES, *SWEEP_TABLES, "published", "audit"]
 
 # figures that every campaign gets; the others show the reproduced study
 CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]

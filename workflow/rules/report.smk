@@ -21,10 +21,10 @@ rule twin:
         f"{RESULTS}/twin/twin.yaml",
     log:
         f"{RESULTS}/logs/twin.log",
+    threads: 2
     params:
         settings=settings("seed", "robots", "reproduce", "twin"),
         code=code_digest("mechanisms", "effects", "plant", "campaign", "reproduce"),
-    threads: 2
     script:
         "../scripts/twin.py"
 
@@ -33,25 +33,38 @@ rule figure:
     input:
         unpack(figure_tables),
     output:
-        pdf=f"{RESULTS}/figures/{{figure}}.pdf",
-        png=f"{RESULTS}/figures/{{figure}}.png",
+        expand(f"{RESULTS}/figures/{{{{figure}}}}.{{kind}}", kind=["pdf", "png"]),
     log:
         f"{RESULTS}/logs/figures/{{figure}}.log",
     wildcard_constraints:
         figure="|".join(FIGURES),
     params:
+        figures=["{figure}"],
         options=figure_options,
         code=code_digest("report"),
     script:
         "../scripts/figure.py"
 
 
-use rule figure as campaign_figure with:
+rule campaign_figures:
+    input:
+        paths=part("measurements"),
+        workspace=part("workspace"),
+        singularity=part("singularity"),
+        observability=part("observability"),
+        genetic=part("genetic"),
+        genetic_history=part("genetic_history"),
+        error_summary=part("error_summary"),
     output:
-        pdf=f"{RESULTS}/figures/{{campaign}}/{{figure}}.pdf",
-        png=f"{RESULTS}/figures/{{campaign}}/{{figure}}.png",
+        expand(f"{RESULTS}/figures/{{{{campaign}}}}/{{figure}}.{{kind}}", figure=CAMPAIGN_FIGURES, kind=["pdf", "png"]),
     log:
-        f"{RESULTS}/logs/figures/{{campaign}}/{{figure}}.log",
+        f"{RESULTS}/logs/figures/{{campaign}}.log",
+    params:
+        figures=CAMPAIGN_FIGURES,
+        options=figure_options,
+        code=code_digest("report"),
+    script:
+        "../scripts/figure.py"
 
 
 rule figures:

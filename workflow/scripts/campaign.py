@@ -8,7 +8,7 @@ from rrru.report.job import job
 
 
 def main(config, campaign, outputs):
-    """Write measurements, truth (empty for a file), singularity measures and the campaign's row."""
+    """Write measurements, truth (empty for a file), singularity measures, workspace slices and the campaign's row."""
     ingested = None
     if study.is_virtual(config, campaign):
         measurements, truth = study.virtual_campaign(config, campaign).run()
@@ -19,6 +19,7 @@ def main(config, campaign, outputs):
     tables.write("measurements", measurements, outputs["measurements"])
     tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
     tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])
+    tables.write("workspace", study.workspace_table(config, campaign, measurements), outputs["workspace"])
     tables.write("campaigns", study.campaign_row(config, campaign, measurements, singular, ingested), outputs["campaigns"])
 
 

@@ -1,4 +1,4 @@
-"""One table for the whole study out of the same table of every part."""
+"""Tables for the whole study out of the same tables of its parts."""
 
 import pandas as pd
 
@@ -6,13 +6,14 @@ from rrru.report import tables
 from rrru.report.job import job
 
 
-def main(name, inputs, output):
-    """Write the parts, one below the other, as one table."""
-    parts = [tables.read(path) for path in inputs]
-    filled = [part for part in parts if len(part)] or parts[:1]
-    tables.write(name, pd.concat(filled, ignore_index=True), output)
+def main(inputs, outputs):
+    """Write every table as its parts, one below the other."""
+    for name, output in outputs.items():
+        parts = [tables.read(path) for path in inputs[name]]
+        filled = [part for part in parts if len(part)] or parts[:1]
+        tables.write(name, pd.concat(filled, ignore_index=True), output)
 
 
 if __name__ == "__main__":
     with job(snakemake.log[0]):
-        main(snakemake.params.table, list(snakemake.input), snakemake.output[0])
+        main(dict(snakemake.input.items()), dict(snakemake.output.items()))

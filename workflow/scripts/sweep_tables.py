@@ -1,0 +1,25 @@
+"""All runs of the sweeps, and whether a setting's effect can be told from the seeds' scatter."""
+
+import pandas as pd
+
+from rrru.calibrate.sweep import setting_effect, setting_pairs
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(seed, inputs, outputs):
+    """Write the runs and their history, the test over all values and that of every value against the best."""
+    runs, history = (pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True) for name in ("sweep_runs", "sweep_history"))
+    frames = {
+        "sweep_runs": runs,
+        "sweep_history": history,
+        "sweep_effect": setting_effect(runs),
+        "sweep_pairs": setting_pairs(runs, seed),
+    }
+    for name, frame in frames.items():
+        tables.write(name, frame, outputs[name])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.params.seed, snakemake.input, snakemake.output)
