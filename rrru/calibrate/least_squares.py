@@ -44,7 +44,8 @@ class Fit:
 def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     """Errors within the parameters' bounds that minimise the sum of squares of the signed residuals (analytic Jacobian).
 
-    noise_mm: known noise per axis; None estimates it from the residuals. loss: one of LOSSES, with the residual size `loss_scale_mm` at which
+    noise_mm: known noise per axis; None estimates it from the residuals, and so does a value that the residuals clearly exceed, since
+    standard errors from the instrument alone would then promise too much. loss: one of LOSSES, with the residual size `loss_scale_mm` at which
     a robust loss begins to bend. The fit moves only along directions that the points see; the others keep their nominal value.
     Raises FitError, carrying scipy's result, where there are fewer equations than parameters or the search fails.
     """
@@ -78,11 +79,13 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     residual = residuals.residual(errors)
     freedom = max(residual.size - start.rank, 1)
     estimated = float(np.sqrt((residual**2).sum() / freedom))
+    # three standard deviations of an estimated standard deviation
+    given = noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom))
     return Fit(
         errors=errors,
         residual_mm=residual,
-        noise_mm=estimated if noise_mm is None else noise_mm,
-        noise_from="residuals" if noise_mm is None else "given",
+        noise_mm=noise_mm if given else estimated,
+        noise_from="given" if given else "residuals",
         at_bound=np.isclose(errors, parameters.low, rtol=1e-6, atol=0.0)
         | np.isclose(errors, parameters.high, rtol=1e-6, atol=0.0)
         | outside,

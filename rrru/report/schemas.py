@@ -158,7 +158,12 @@ _ALL = (
             Column("rms_mm", _NUMBER, "root mean square distance"),
             Column("max_mm", _NUMBER, "largest distance"),
             Column("noise_mm", _NUMBER, "noise per axis that the standard errors assume"),
-            Column("noise_from", "str", "given, or residuals", allowed=("given", "residuals")),
+            Column(
+                "noise_from",
+                "str",
+                "given, or residuals where nothing was given or the fit leaves more than that",
+                allowed=("given", "residuals"),
+            ),
             Column("rank", "int64", "parameter combinations that the points see, of 7"),
             Column("condition", _NUMBER, "condition number of the scaled Jacobian (angles as arcs at the end of the drive arm)"),
             *(

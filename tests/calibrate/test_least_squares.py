@@ -41,6 +41,9 @@ def test_estimated_noise_is_the_true_one(rich_poses):
     fit = least_squares(_campaign(*rich_poses, noise_mm=0.05, seed=1))
     assert fit.noise_mm == pytest.approx(0.05, rel=0.1) and fit.noise_from == "residuals"
     assert least_squares(_campaign(*rich_poses), noise_mm=0.02).noise_from == "given"
+    assert least_squares(_campaign(*rich_poses, noise_mm=0.02, seed=1), noise_mm=0.02).noise_from == "given"
+    doubted = least_squares(_campaign(*rich_poses, noise_mm=0.3), noise_mm=0.02)
+    assert doubted.noise_from == "residuals" and doubted.noise_mm == pytest.approx(0.3, rel=0.1)
 
 
 def test_bounded_fit_stays_in_the_box_and_says_so(rich_poses):
