@@ -122,7 +122,7 @@ def test_a_blank_optional_column_counts_as_missing(field, tmp_path):
         IngestSpec(written(field.assign(time_s=None, theta1_rad=None, theta2_rad=None, theta3_rad=None), tmp_path / "f.csv")), ROBOT
     )
     assert result.measurements["time_s"].isna().all()
-    assert [note[:21] for note in result.notes] == ["column time_s is blan", "no drive angles: comp"]
+    assert [note[:21] for note in result.notes] == ["column time_s is blan", "no drive angles: thet"]
 
 
 def test_columns_nobody_declared_can_be_left_out(field, expected, tmp_path):

@@ -67,6 +67,6 @@ rule sweep_tables:
         f"{RESULTS}/logs/sweep_tables.log",
     params:
         seed=config["seed"],
-        code=code_digest("calibrate", "report/tables", "report/schemas"),
+        code=code_digest("calibrate", *TABLE_ROOMS),
     script:
         "../scripts/sweep_tables.py"

@@ -25,6 +25,6 @@ rule gather:
     log:
         f"{RESULTS}/logs/gather.log",
     params:
-        code=code_digest("report/tables", "report/schemas"),
+        code=code_digest(*TABLE_ROOMS),
     script:
         "../scripts/gather.py"

@@ -27,7 +27,8 @@ STUDY_TABLES = [*CAMPAIGN_TABLES, *SWEEP_TABLES, "published", "audit"]
 CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]
 
 # rooms of the package that a stage's results depend on
-CAMPAIGN_ROOMS = ("errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
+TABLE_ROOMS = ("report/tables", "report/schemas")
+CAMPAIGN_ROOMS = (*TABLE_ROOMS, "errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
 CALIBRATE_ROOMS = (*CAMPAIGN_ROOMS, "calibrate")
 SWEPT = ("crossover_fraction", "migration_fraction")
 

@@ -11,7 +11,7 @@ rule published:
         f"{RESULTS}/logs/published.log",
     params:
         settings=settings("robots", "motion", "trajectories", "campaigns", "genetic", "reproduce", "sweep"),
-        code=code_digest("reproduce", "mechanisms", "report/tables", "report/schemas"),
+        code=code_digest("reproduce", "mechanisms", *TABLE_ROOMS),
     script:
         "../scripts/published.py"
 
