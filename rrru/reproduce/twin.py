@@ -18,7 +18,7 @@ from rrru.campaign.plan import Plan, make_run
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.effects.protocol import Contribution
 from rrru.effects.registry import active_effects
-from rrru.errors import FitError, UnreachableError
+from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.mechanisms import singularity
 from rrru.plant.virtual_robot import VirtualRobot, wobble
 from rrru.reproduce.paper_a import ERRORS_MM
@@ -53,6 +53,8 @@ SEARCH_BOUNDS = {
 }
 # the spiral keeps clear of both singularities by this margin of the measures
 SPIRAL_MARGIN = 0.1
+# a refinement starts this share of the bounds' width about its twin, 1 sigma
+_REFINE_SPREAD = 0.02
 _WORST = 1e6
 
 
@@ -235,12 +237,15 @@ def cost(vector, mechanism, noise_mm, draws, line_calibration):
     return value if np.isfinite(value) else _WORST
 
 
-def search(mechanism, noise_mm, draws, line_calibration, seed, generations, population, workers=1, callback=None):
+def search(mechanism, noise_mm, draws, line_calibration, seed, generations, population, start=None, workers=1, callback=None):
     """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit). The same seed gives the same twin on any number of workers.
 
-    noise_mm, draws, line_calibration: see `simulate`; population: candidates per searched number; callback: scipy's, called with each
-    generation's intermediate result.
+    noise_mm, draws, line_calibration: see `simulate`; population: candidates per searched number; start: a Twin to refine, around which
+    the first generation is drawn, or None for the whole of the bounds; callback: scipy's, called with each generation's intermediate
+    result.
     """
+    generator = np.random.default_rng(seed)
+    first = "latinhypercube" if start is None else _around(start, population * len(SEARCH_BOUNDS), generator)
     result = differential_evolution(
         cost,
         list(SEARCH_BOUNDS.values()),
@@ -249,7 +254,8 @@ def search(mechanism, noise_mm, draws, line_calibration, seed, generations, popu
         popsize=population,
         mutation=(0.4, 0.9),
         recombination=0.8,
-        rng=np.random.default_rng(seed),
+        rng=generator,
+        init=first,
         updating="deferred",
         polish=False,
         tol=0.0,
@@ -257,6 +263,42 @@ def search(mechanism, noise_mm, draws, line_calibration, seed, generations, popu
         callback=callback,
     )
     return Twin(dict(zip(SEARCH_BOUNDS, result.x.tolist(), strict=True))), float(result.fun)
+
+
+def _around(start, count, generator):
+    """First generation (count, number of searched values) about a twin, which is its first member."""
+    low, high = np.array(list(SEARCH_BOUNDS.values())).T
+    centre = np.array([start.values[name] for name in SEARCH_BOUNDS])
+    spread = _REFINE_SPREAD * (high - low) * generator.standard_normal((count, len(low)))
+    spread[0] = 0.0
+    return np.clip(centre + spread, low, high)
+
+
+def from_config(config, campaign):
+    """The configured twin: the virtual robot and the trajectories of a campaign, as a Twin.
+
+    Raises ConfigError where these hold something that the search does not know.
+    """
+    section = config["campaigns"][campaign]
+    robot, shape = config["virtual_robots"][section["virtual"]], config["trajectories"][section["trajectories"]]
+    spiral, offsets = shape["spiral"], shape["lines"]["offsets_y_mm"]
+    steps = np.diff([0.0, *np.abs(offsets[1::2])])
+    effects = robot["effects"]
+    values = {
+        **robot["errors"],
+        **{key: value for effect in effects.values() for key, value in effect.items()},
+        "side": float(np.sign(offsets[1])),
+        "wobble_mm": robot["wobble_mm"],
+        **dict(zip(("offset_first_mm", "offset_second_mm", "offset_third_mm"), steps.tolist(), strict=True)),
+        **dict(zip(("centre_x_mm", "centre_y_mm"), spiral["centre_mm"], strict=True)),
+        **dict(zip(("radius_start_mm", "radius_end_mm"), spiral["radius_mm"], strict=True)),
+        **dict(zip(("z_start_mm", "z_end_mm"), spiral["z_mm"], strict=True)),
+        "turns": spiral["turns"],
+        "start_deg": spiral["start_deg"],
+    }
+    if set(values) != set(SEARCH_BOUNDS):
+        raise ConfigError(f"twin: campaign {campaign} differs in {sorted(set(values) ^ set(SEARCH_BOUNDS))} from what is searched")
+    return Twin({name: float(values[name]) for name in SEARCH_BOUNDS})
 
 
 def overlay(twin):

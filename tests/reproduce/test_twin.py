@@ -1,13 +1,15 @@
 """The twin's search: its fast path against the pipeline, its bounds, its reproducibility."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from rrru.calibrate.least_squares import least_mean_distance, least_squares
 from rrru.calibrate.residuals import Residuals
-from rrru.errors import UnreachableError
+from rrru.errors import ConfigError, UnreachableError
 from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.reproduce import twin
@@ -89,3 +91,20 @@ def test_the_overlay_is_the_twin():
     assert replace(candidate, effects=()).errors == robot["errors"]
     offsets = overlay["trajectories"]["paper"]["lines"]["offsets_y_mm"]
     assert offsets[0] == 0.0 and np.allclose(np.add(offsets[1::2], offsets[2::2]), 0.0)
+
+
+def test_the_configured_twin_comes_back_and_a_refinement_is_never_worse(draws):
+    root = Path(__file__).resolve().parents[2]
+    config = yaml.safe_load((root / "config.yaml").read_text())
+    configured = twin.from_config(config, "paper")
+    assert set(configured.values) == set(twin.SEARCH_BOUNDS)
+    overlay = twin.overlay(configured)
+    assert overlay["virtual_robots"]["twin"]["errors"] == config["virtual_robots"]["twin"]["errors"]
+    assert overlay["trajectories"]["paper"]["spiral"].items() <= config["trajectories"]["paper"]["spiral"].items()
+    vector = [configured.values[name] for name in twin.SEARCH_BOUNDS]
+    before = twin.cost(vector, Rrru3(), 0.02, draws, "group_1")
+    _, after = twin.search(Rrru3(), 0.02, draws, "group_1", 4, generations=1, population=1, start=configured)
+    assert after <= before
+    config["virtual_robots"]["twin"]["errors"]["dR"] = 1.0
+    with pytest.raises(ConfigError, match="dR"):
+        twin.from_config(config, "paper")

@@ -24,6 +24,7 @@ def main(config, output, workers):
         section["seed"],
         section["generations"],
         section["population"],
+        twin.from_config(config, reproduce["campaign"]) if section["refine"] else None,
         workers,
         lambda intermediate_result: logging.info("generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun),
     )
