@@ -1,6 +1,6 @@
 """Named parameters and the map between names and vectors."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -89,12 +89,16 @@ class ParameterSet:
             raise ConfigError(f"expected {len(self)} values for {', '.join(self.names)}, got shape {vector.shape}")
         return dict(zip(self.names, vector.tolist(), strict=True))
 
-    def with_bounds(self, bounds):
-        """New set with the bounds of some names replaced: {name: (low, high)}."""
-        changed = {self.index(name): limits for name, limits in bounds.items()}
-        return ParameterSet(
-            tuple(
-                replace(p, low=float(changed[i][0]), high=float(changed[i][1])) if i in changed else p
-                for i, p in enumerate(self.parameters)
-            )
-        )
+    def hold(self, vector):
+        """Whether a vector (p,) lies within the bounds."""
+        return bool(((vector >= self.low) & (vector <= self.high)).all())
+
+    def inside(self, vector, margin=1e-6):
+        """Nearest vector (p,) within the bounds, off them by a share `margin` of their width."""
+        inset = margin * (self.high - self.low)
+        return np.clip(vector, self.low + inset, self.high - inset)
+
+    def at_bound(self, vector, share=1e-6):
+        """Flags (p,) of entries that lie at a bound, or beyond it, within a share of the bounds' width."""
+        inset = share * (self.high - self.low)
+        return (vector <= self.low + inset) | (vector >= self.high - inset)

@@ -17,9 +17,8 @@ from rrru.mechanisms.protocol import make_mechanism
 from rrru.plant import virtual_robot
 from rrru.seeds import stream
 
-# all that the robot of the paper can reach
-_WORKSPACE_MM = {"x": (-1000.0, 1000.0), "y": (-1000.0, 1000.0), "z": (0.0, 1300.0)}
-_WORKSPACE_STEP_MM = 10.0
+# grid lines over the longest reach of a robot's legs
+_WORKSPACE_LINES = 130
 _INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points", "extra_columns", "elbow")
 
 
@@ -101,16 +100,17 @@ def noise(config, campaign, measurements):
     repeated, freedom = rows.repeat_noise(measurements)
     if freedom >= 30 and repeated > 0.0:
         return repeated, "repeats"
-    residuals = select(measurements, mechanism(config, campaign), ["*"])
+    residuals = select(measurements, mechanism(config, campaign), ["*"], config["calibration"]["use_near_singularity"])
     if residuals is None:
         raise ConfigError(f"campaigns.{campaign}: too few usable points to estimate noise_mm; give it")
     return least_squares(residuals).noise_mm, "residuals"
 
 
-def singularity_table(robot, measurements):
-    """Rows of `singularity` (without the campaign's name)."""
+def with_singularities(robot, measurements, margin):
+    """The measurements with points near a constraint singularity marked, and the rows of `singularity` (without the campaign's name)."""
     position, theta = rows.command(measurements), rows.theta(measurements)
-    return measurements[["run", "trajectory", "point", "status"]].assign(
+    measurements = rows.mark_near_singularity(measurements, singularity.constraint_measure(robot, position, theta), margin)
+    return measurements, measurements[["run", "trajectory", "point", "status"]].assign(
         translational_measure=singularity.translational_measure(robot, position, theta),
         constraint_measure=singularity.constraint_measure(robot, position, theta),
         constraint_determinant=singularity.constraint_determinant(robot, position, theta),
@@ -121,9 +121,12 @@ def workspace_table(config, campaign, measurements):
     """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commanded points."""
     robot = mechanism(config, campaign)
     height = float(rows.command(measurements)[:, 2].mean().round(-1))
+    reach = robot.L1_mm + robot.L2_mm + robot.L3_mm
+    across, down = (-reach, reach), (0.0, reach)
     frames = []
-    for plane, at in (("xz", 0.0), ("xy", height)):
-        points = workspace.slice_points(plane, at, _WORKSPACE_MM[plane[0]], _WORKSPACE_MM[plane[1]], _WORKSPACE_STEP_MM)
+    for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
+        points = workspace.slice_points(plane, at, across, vertical, reach / _WORKSPACE_LINES)
+        points = _around_reachable(robot, points)
         reachable, translational, constraint, determinant = workspace.measures(robot, points)
         frames.append(
             pd.DataFrame(
@@ -139,6 +142,14 @@ def workspace_table(config, campaign, measurements):
             )
         )
     return pd.concat(frames, ignore_index=True)
+
+
+def _around_reachable(robot, points):
+    """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth."""
+    reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
+    low, high = reachable.min(axis=0), reachable.max(axis=0)
+    room = 0.1 * (high - low)
+    return points[((points >= low - room) & (points <= high + room)).all(axis=1)]
 
 
 def campaign_row(config, campaign, measurements, singular, ingested=None):
@@ -158,6 +169,7 @@ def campaign_row(config, campaign, measurements, singular, ingested=None):
                 **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "near_singularity", "unsolved")},
                 "noise_mm": noise_mm,
                 "noise_from": noise_from,
+                "platform_mass_kg": section.get("platform_mass_kg", np.nan),
                 "registration_rms_mm": registration.rms_mm if registration else np.nan,
                 "registration_max_mm": registration.max_mm if registration else np.nan,
                 "min_translational_measure": singular["translational_measure"].min(),

@@ -1,11 +1,10 @@
 """Calibrations of one campaign, as frames: every set of trajectories by least squares and by least mean distance (the GA's objective)."""
 
-from dataclasses import replace
-
 import numpy as np
 import pandas as pd
 
-from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.least_squares import least_squares
+from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.residuals import Residuals
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError, FitError
@@ -33,8 +32,7 @@ def fit_sets(measurements, mechanism, settings, noise_mm=None):
             continue
         fit = least_squares(residuals, noise_mm, settings["loss"], settings["loss_scale_mm"])
         fits[name, "least_squares"] = fit
-        errors, _ = least_mean_distance(residuals, fit.errors)
-        fits[name, "least_mean_distance"] = replace(fit, errors=errors, residual_mm=residuals.residual(errors))
+        fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.errors, noise_mm)
     if not fits:
         present = ", ".join(measurements["trajectory"].unique())
         raise ConfigError(f"calibration.sets: no set matches the campaign's trajectories ({present}) with enough points")

@@ -7,7 +7,8 @@ import pandas as pd
 
 from rrru.calibrate.campaign_fit import select
 from rrru.calibrate.genetic import GeneticSettings, minimise
-from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.least_squares import least_squares
+from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.sweep import kept_generations
 from rrru.mechanisms.rrru3 import to_identifiable
 from rrru.seeds import stream_seed
@@ -32,7 +33,8 @@ def study_set(measurements, tied, identifiable, calibration, patterns, settings,
         return None
     reduced = select(measurements, identifiable, patterns, use_near_singularity)
     fit, fit_seconds = _timed(lambda: least_squares(reduced))
-    (_, optimum), polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.errors))
+    best, polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.errors))
+    optimum = best.mean_mm
     names, bounds = tied.parameters.names, (tied.parameters.low, tied.parameters.high)
     # the compiled objective is loaded before anything is timed
     residuals.mean_distance(tied.parameters.nominal[None])
@@ -44,11 +46,12 @@ def study_set(measurements, tied, identifiable, calibration, patterns, settings,
         seconds.append(perf_counter() - start)
         values = dict(zip(names, result.errors.tolist(), strict=True))
         shared = to_identifiable(values)
-        _, polished = least_mean_distance(reduced, identifiable.parameters.vector(shared))
+        polish = least_mean_distance(reduced, identifiable.parameters.vector(shared))
         runs.append(
             {"calibration": calibration, "seed": number, "objective_mm": result.objective, "generations": result.generations}
-            | {"evaluations": result.evaluations, "stopped": result.stopped, "polished_mm": polished, "optimum_mm": optimum}
-            | {"excess": result.objective / optimum - 1.0, "polished_excess": polished / optimum - 1.0}
+            | {"evaluations": result.evaluations, "stopped": result.stopped, "polished_mm": polish.mean_mm, "optimum_mm": optimum}
+            | {"polish_evaluations": polish.evaluations, "excess": _excess(result.objective, optimum)}
+            | {"polished_excess": _excess(polish.mean_mm, optimum)}
             | values
             | {"da": shared["da"]}
         )
@@ -94,30 +97,34 @@ def against_least_squares(runs, calibrations, parameters, truth):
             found = dict(zip(values["parameter"], values["value"], strict=True))
             result.append(
                 {"calibration": calibration, "method": row.method, "runs": 1, "mean_mm": row.mean_mm, "worst_mean_mm": row.mean_mm}
-                | {"excess": row.mean_mm / optimum - 1.0, "evaluations": float(row.evaluations)}
+                | {"excess": _excess(row.mean_mm, optimum), "evaluations": float(row.evaluations)}
                 | _parameter_error(pd.DataFrame([found]), truth)
             )
-        for method, column in (("genetic", "objective_mm"), ("genetic_polished", "polished_mm")):
+        for method, column, more in (("genetic", "objective_mm", 0), ("genetic_polished", "polished_mm", part["polish_evaluations"])):
             middle = part[column].median()
             result.append(
                 {"calibration": calibration, "method": method, "runs": len(part), "mean_mm": middle, "worst_mean_mm": part[column].max()}
-                | {"excess": middle / optimum - 1.0, "evaluations": float(part["evaluations"].median())}
+                | {"excess": _excess(middle, optimum), "evaluations": float((part["evaluations"] + more).median())}
                 | (_parameter_error(part, truth) if method == "genetic" else {"angle_error_rad": np.nan, "length_error_mm": np.nan})
             )
     return pd.DataFrame(result)
+
+
+def _excess(value, optimum):
+    """Share by which a mean distance exceeds the least one; NaN where that is zero but for rounding."""
+    return value / optimum - 1.0 if optimum > 1e-9 else np.nan
 
 
 def _parameter_error(values, truth):
     """RMS deviation of angles and lengths from the truth over all rows of a frame of identifiable parameters."""
     if truth is None:
         return {"angle_error_rad": np.nan, "length_error_mm": np.nan}
-    error = {
-        kind: np.sqrt(
-            np.mean([(values[name] - value) ** 2 for name, value in truth.items() if name.startswith("dtheta") == (kind == "rad")])
-        )
-        for kind in ("rad", "mm")
-    }
-    return {"angle_error_rad": float(error["rad"]), "length_error_mm": float(error["mm"])}
+    error = {}
+    for key, angle in (("angle_error_rad", True), ("length_error_mm", False)):
+        names = [name for name in truth if name.startswith("dtheta") == angle]
+        # NaN where the legs of the real robot differ, so that there is no true value
+        error[key] = float(np.sqrt(np.mean([(values[name] - truth[name]) ** 2 for name in names])))
+    return error
 
 
 def _timed(function):

@@ -52,6 +52,21 @@ class Identifiability:
         """Standard errors (p,) for noise of `noise_mm` per axis; inf for parameters that touch an unseen direction."""
         return np.sqrt(np.diag(self.covariance(noise_mm)))
 
+    def robust_standard_errors(self, jacobian, influence, curvature):
+        """Standard errors (p,) of an M-estimate: A^-1 B A^-1 with A = J' diag(curvature) J and B = J' diag(influence^2) J.
+
+        jacobian: (n, 3, p); influence, curvature: (n, 3), first and second derivative of the loss by the residuals. Inf for
+        parameters that touch an unseen direction.
+        """
+        seen = slice(0, self.rank)
+        basis = self.directions[seen].T * self.scale[:, None]
+        flat = jacobian.reshape(-1, len(self.scale)) @ basis
+        bread = np.linalg.inv(flat.T @ (curvature.reshape(-1, 1) * flat))
+        half = basis @ bread @ (flat * influence.reshape(-1, 1)).T
+        result = np.sqrt((half**2).sum(axis=1))
+        result[(self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8] = np.inf
+        return result
+
     def correlations(self):
         """Correlation matrix (p, p) of the estimates; NaN for parameters that touch an unseen direction."""
         covariance = self.covariance(1.0)
@@ -74,7 +89,11 @@ class Identifiability:
 
 def analyse(mechanism, jacobian):
     """Identifiability from the derivative (n, 3, p) of the positions with respect to the mechanism's parameters."""
-    scale = parameter_scale(mechanism)
+    return analyse_columns(mechanism.parameters.names, parameter_scale(mechanism), jacobian)
+
+
+def analyse_columns(names, scale, jacobian):
+    """Identifiability of named parameters with scales (p,) from the derivative (n, 3, p) of the positions with respect to them."""
     flat = np.asarray(jacobian).reshape(-1, len(scale)) * scale
     # with at least as many rows as parameters the thin decomposition holds all directions
     _, singular_values, directions = np.linalg.svd(flat, full_matrices=len(flat) < len(scale))
@@ -82,4 +101,4 @@ def analyse(mechanism, jacobian):
     padded[: len(singular_values)] = singular_values
     # the sign of a singular vector is free: its largest entry is made positive
     largest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
-    return Identifiability(mechanism.parameters.names, scale, padded, directions * np.sign(largest), len(jacobian))
+    return Identifiability(tuple(names), np.asarray(scale), padded, directions * np.sign(largest), len(jacobian))

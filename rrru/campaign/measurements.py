@@ -3,6 +3,7 @@
 from fnmatch import fnmatchcase
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 USED = ("ok", "near_singularity")
 
@@ -38,8 +39,8 @@ def usable(measurements, use_near_singularity=True):
 def repeat_noise(measurements):
     """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
 
-    Repeats share the trajectory, the commanded position, the neighbour before it (direction of motion), speed and payload. NaN and 0
-    where nothing repeats. What moves the robot from pass to pass counts as noise here.
+    Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where nothing
+    repeats. What moves the robot from pass to pass counts as noise here.
     """
     frame = measurements.loc[usable(measurements)].copy()
     axes = [f"measured_{axis}_mm" for axis in "xyz"]
@@ -52,13 +53,20 @@ def repeat_noise(measurements):
 
 
 def direction(measurements):
-    """+1 or -1 (n,): whether a run passes its trajectory in the direction of the first run along it or against it."""
+    """+1 or -1 (n,): whether a run passes its trajectory in the order of the first run along it or against it."""
     result = np.ones(len(measurements), dtype=int)
     first = {}
     position = command(measurements)
     for (trajectory, _), rows in measurements.reset_index(drop=True).groupby(["trajectory", "run"], sort=False):
         points = position[rows.index.to_numpy()]
-        start = first.setdefault(trajectory, points[0])
-        if np.linalg.norm(points[0] - start) > np.linalg.norm(points[-1] - start):
-            result[rows.index.to_numpy()] = -1
+        tree = first.setdefault(trajectory, cKDTree(points))
+        # most steps tell, so that a closed path's equal ends or a missing point do not matter
+        steps = np.sign(np.diff(tree.query(points)[1])).sum()
+        result[rows.index.to_numpy()] = -1 if steps < 0 else 1
     return result
+
+
+def mark_near_singularity(measurements, constraint_measure, margin):
+    """The table with status "near_singularity" where the measure (n,) is below the margin and the point is otherwise fine."""
+    near = (measurements["status"] == "ok") & (np.asarray(constraint_measure) < margin)
+    return measurements.assign(status=measurements["status"].where(~near, "near_singularity"))

@@ -3,12 +3,16 @@
 Lengths in mm, angles in rad.
 """
 
+from fnmatch import fnmatchcase
+
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 
-GROUPS = {"all_lines": ("line_*",), "all": ("*",)}
+GROUPS = {"all_lines": "line_*", "all": "*"}
+# the standard asks for 30 cycles; below three a spread says nothing
+_FEWEST_REPEATS = 3
 
 
 def before(measurements):
@@ -50,13 +54,18 @@ def summarise(errors, measurements):
     errors: rows of `errors` of one campaign; besides every trajectory the groups "all_lines" and "all" are summed up.
     """
     geometry = _path_geometry(measurements)
-    groups = [(name, (name,)) for name in measurements["trajectory"].unique()]
-    groups += [(name, patterns) for name, patterns in GROUPS.items() if rows.on_trajectories(measurements, patterns).any()]
+    names = measurements["trajectory"].unique().tolist()
+    groups = {name: [name] for name in names}
+    for group, pattern in GROUPS.items():
+        # a trajectory of that name stands for itself
+        groups.setdefault(group, [name for name in names if fnmatchcase(name, pattern)])
     result = []
     for (calibration, method, mode), part in errors.groupby(["calibration", "method", "mode"], sort=False):
         joined = part.merge(geometry, on=["run", "point"], how="left", validate="one_to_one")
-        for name, patterns in groups:
-            chosen = joined[rows.on_trajectories(joined, patterns)]
+        for name, members in groups.items():
+            if not members:
+                continue
+            chosen = joined[joined["trajectory"].isin(members)]
             label = {"calibration": calibration, "method": method, "mode": mode, "trajectory": name}
             result.append(label | _statistics(chosen) | _iso_9283(chosen))
     return pd.DataFrame(result)
@@ -83,7 +92,10 @@ def _path_geometry(measurements):
     side = rows.direction(measurements)
     for _, part in measurements.reset_index(drop=True).groupby("run", sort=False):
         index = part.index.to_numpy()
-        tangent = np.gradient(position[index], axis=0) if len(index) > 1 else np.zeros((1, 3))
+        if len(index) > 2:
+            tangent = np.gradient(position[index], axis=0, edge_order=2)
+        else:
+            tangent = np.tile(position[index[-1]] - position[index[0]], (len(index), 1))
         length = np.linalg.norm(tangent, axis=1, keepdims=True)
         tangent = np.divide(tangent, length, out=np.zeros_like(tangent), where=length > 0.0)
         frames.append(
@@ -101,7 +113,7 @@ def _iso_9283(part):
 
     pose_accuracy_mm: largest distance between commanded position and barycentre of the attained ones (AP). path_accuracy_mm: the same across
     the path only (AT: the standard compares in the plane normal to the commanded path). repeatability_mm: largest l + 3 S_l about
-    the barycentre (RP), null without repeats.
+    the barycentre (RP), null with fewer than three repeats. In mode "model" the model's position stands for the commanded one.
     """
     axes = [f"error_{axis}_mm" for axis in "xyz"]
     part = part.dropna(subset=axes).reset_index(drop=True)
@@ -118,5 +130,5 @@ def _iso_9283(part):
         "repeats": repeats,
         "pose_accuracy_mm": np.linalg.norm(barycentre, axis=1).max(),
         "path_accuracy_mm": np.linalg.norm(across, axis=1).max(),
-        "repeatability_mm": (distance.mean() + 3.0 * distance.std(ddof=1)).max() if repeats > 1 else np.nan,
+        "repeatability_mm": (distance.mean() + 3.0 * distance.std(ddof=1)).max() if repeats >= _FEWEST_REPEATS else np.nan,
     }

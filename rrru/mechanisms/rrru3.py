@@ -57,16 +57,14 @@ def _leg_map(names):
 
 
 def to_identifiable(values):
-    """Mapping of the 7 identifiable errors from a mapping of published or tied ones.
+    """Mapping of the 7 identifiable errors from a mapping of published or tied ones; what is absent is zero.
 
-    Raises ConfigError where the legs' link errors differ, since the identifiable set ties them.
+    NaN for a link whose errors differ between the legs, since the identifiable set has one number for all three.
     """
     result = {name: float(values.get(name, 0.0)) for name in _ANGLES}
     for link in (1, 2, 3):
-        seen = {float(values[key]) for key in (f"dL{link}", *(f"dL{leg}{link}" for leg in (1, 2, 3))) if key in values}
-        if len(seen) > 1:
-            raise ConfigError(f"dL{link}: the legs' errors differ ({sorted(seen)}); the tied model has one number for all three")
-        result[f"dL{link}"] = seen.pop() if seen else 0.0
+        legs = {float(values.get(f"dL{leg}{link}", values.get(f"dL{link}", 0.0))) for leg in (1, 2, 3)}
+        result[f"dL{link}"] = legs.pop() if len(legs) == 1 else float("nan")
     result["da"] = float(values.get("da", values.get("dr", 0.0) - values.get("dR", 0.0)))
     return result
 

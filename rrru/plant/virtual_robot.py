@@ -18,8 +18,8 @@ class VirtualRobot:
     """A robot whose truth is known.
 
     errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6): displacements of every axis;
-    effects: active effects; wobble_mm: radius of the ball in which the platform lies at random, see `wobble`; masses in kg; singularity_margin:
-    constraint measure below which a command is reported; rotation_limit_rad: a larger platform rotation counts as unsolved.
+    effects: active effects; wobble_mm: radius of the ball in which the platform lies at random, see `wobble`; masses in kg;
+    rotation_limit_rad: a larger platform rotation counts as unsolved.
     """
 
     mechanism: Rrru3 = field(default_factory=Rrru3)
@@ -29,7 +29,6 @@ class VirtualRobot:
     wobble_mm: float = 0.0
     platform_mass_kg: float = 3.0
     forearm_mass_kg: float = 1.2
-    singularity_margin: float = 0.1
     rotation_limit_rad: float = 0.05
 
     @property
@@ -55,7 +54,7 @@ class VirtualRobot:
 
         controller: positions (n, 3) to drive angles (n, 3), by default the nominal inverse kinematics. `measurements` fits the schema of
         that name with the commanded positions of the plan and the angles that the controller sent; `truth` holds the exact position,
-        the platform's rotation and both singularity measures. Noise is drawn for every row, solved or not, so that one lost
+        the platform's rotation. Noise is drawn for every row, solved or not, so that one lost
         point does not change the others.
         """
         controller = controller or self.mechanism.inverse
@@ -64,20 +63,16 @@ class VirtualRobot:
         motion = self.motion(plan, controller)
         position, turned = self.positions(motion, target)
         solved = np.isfinite(position).all(axis=1)
-        ideal = self.mechanism.inverse(target)
-        constraint = singularity.constraint_measure(self.mechanism, target, ideal)
         position = position + self.wobble_mm * wobble(generator, len(target))
         measured = measure(position, noise_mm, generator)
         measurements = commands.assign(
             **{f"theta{k + 1}_rad": motion.theta_rad[:, k] for k in range(3)},
             **{f"measured_{axis}_mm": measured[:, k] for k, axis in enumerate("xyz")},
-            status=np.where(~solved, "unsolved", np.where(constraint < self.singularity_margin, "near_singularity", "ok")),
+            status=np.where(solved, "ok", "unsolved"),
         )
         truth = commands[["run", "trajectory", "point"]].assign(
             **{f"true_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")},
             platform_rotation_rad=turned,
-            translational_measure=singularity.translational_measure(self.mechanism, target, ideal),
-            constraint_measure=constraint,
         )
         return measurements, truth
 
@@ -130,7 +125,6 @@ def from_config(mechanism, section):
         wobble_mm=section["wobble_mm"],
         platform_mass_kg=section["platform_mass_kg"],
         forearm_mass_kg=section["forearm_mass_kg"],
-        singularity_margin=section["singularity_margin"],
         rotation_limit_rad=section["rotation_limit_rad"],
     )
 

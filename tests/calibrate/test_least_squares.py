@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from rrru.calibrate.identifiability import analyse
-from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.least_squares import least_squares
+from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.residuals import Residuals
 from rrru.errors import FitError
 from rrru.mechanisms.rrru3 import Rrru3
@@ -67,27 +68,80 @@ def test_a_robust_loss_survives_a_broken_beam(rich_poses, loss):
     assert (np.abs(plain.errors - _TRUTH) > scale).any()
 
 
-def test_least_mean_distance_equals_a_derivative_free_search(rich_poses):
-    residuals = _campaign(*rich_poses, noise_mm=0.3)
+def _simplex_search(residuals, centre, scale):
+    """Least mean distance by a derivative-free search in units of the standard errors, within the bounds."""
+    parameters = residuals.mechanism.parameters
+
+    def objective(q):
+        errors = centre + scale * q
+        return residuals.mean_distance(errors[None])[0] if parameters.hold(errors) else 1e6
+
+    options = {"maxiter": 40_000, "maxfev": 40_000, "xatol": 1e-6, "fatol": 1e-12, "adaptive": True}
+    return min(minimize(objective, start, method="Nelder-Mead", options=options).fun for start in (np.full(7, 0.3), np.full(7, -0.2)))
+
+
+@pytest.mark.parametrize("count", [200, 12, 4])
+def test_least_mean_distance_equals_a_derivative_free_search(rich_poses, count):
+    """With few points the optimum meets some of them exactly, where the objective has a kink."""
+    points, theta = rich_poses
+    residuals = _campaign(points[:count], theta[:count], noise_mm=0.3)
     start = least_squares(residuals)
-    errors, value = least_mean_distance(residuals, start.errors)
-    assert value == pytest.approx(residuals.mean_distance(errors[None])[0], rel=1e-12)
-    assert value < start.mean_mm
-    scale = start.standard_errors
-    found = minimize(
-        lambda q: residuals.mean_distance((errors + scale * q)[None])[0],
-        np.full(7, 0.3),
-        method="Nelder-Mead",
-        options={"maxiter": 20_000, "maxfev": 20_000, "xatol": 1e-6, "fatol": 1e-12, "adaptive": True},
-    )
-    assert value <= found.fun + 1e-9 and found.fun == pytest.approx(value, rel=1e-5)
+    fit = least_mean_distance(residuals, start.errors)
+    assert fit.mean_mm == pytest.approx(residuals.mean_distance(fit.errors[None])[0], rel=1e-10)
+    assert fit.mean_mm < start.mean_mm and fit.evaluations > 0
+    scale = np.where(np.isfinite(start.standard_errors), start.standard_errors, 1e-3)
+    assert fit.mean_mm <= _simplex_search(residuals, parameters_inside(residuals, fit), scale) * (1.0 + 1e-5)
+
+
+def parameters_inside(residuals, fit):
+    """Fitted errors, off the bounds by a hair."""
+    return residuals.mechanism.parameters.inside(fit.errors)
 
 
 def test_least_mean_distance_does_not_depend_on_the_start(rich_poses):
     residuals = _campaign(*rich_poses, noise_mm=0.3)
-    first, _ = least_mean_distance(residuals, np.zeros(7))
-    second, _ = least_mean_distance(residuals, 2.0 * _TRUTH)
-    np.testing.assert_allclose(first, second, atol=1e-5)
+    first, second = (least_mean_distance(residuals, start) for start in (np.zeros(7), 2.0 * _TRUTH))
+    np.testing.assert_allclose(first.errors, second.errors, atol=1e-5)
+
+
+def test_least_mean_distance_stays_in_the_bounds(rich_poses):
+    points, theta = rich_poses
+    free = _campaign(points, theta, noise_mm=0.3)
+    residuals = Residuals(Rrru3(length_limit_mm=0.5), theta, free.measured_mm, points)
+    fit = least_mean_distance(residuals, least_squares(residuals).errors)
+    parameters = residuals.mechanism.parameters
+    assert parameters.hold(fit.errors) and fit.at_bound[6] and np.isnan(fit.standard_errors[6])
+    scale = np.where(np.isfinite(fit.standard_errors), fit.standard_errors, 1e-3)
+    assert fit.mean_mm <= _simplex_search(residuals, parameters_inside(residuals, fit), scale) * (1.0 + 1e-5)
+    assert fit.mean_mm > least_mean_distance(free, np.zeros(7)).mean_mm
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy"])
+def test_standard_errors_are_the_scatter_of_repeated_fits(rich_poses, loss):
+    """With a broken beam in every twentieth point the robust losses' errors still say how much the answer scatters."""
+    points, theta = (array[:60] for array in rich_poses)
+    found, stated = [], []
+    for seed in range(60):
+        residuals = _campaign(points, theta, noise_mm=0.02, seed=seed)
+        measured = residuals.measured_mm.copy()
+        if loss != "linear":
+            measured[::20] += np.random.default_rng(seed + 1000).normal(0.0, 1.0, (3, 3))
+        fit = least_squares(Residuals(residuals.mechanism, theta, measured, points), loss=loss, loss_scale_mm=0.05)
+        found.append(fit.errors)
+        stated.append(fit.standard_errors)
+    ratio = np.std(found, axis=0, ddof=1) / np.mean(stated, axis=0)
+    assert ((ratio > 0.65) & (ratio < 1.45)).all(), ratio
+
+
+def test_a_bounded_parameter_has_no_standard_error_and_the_others_are_those_without_it(rich_poses):
+    points, theta = rich_poses
+    residuals = _campaign(points, theta, noise_mm=0.05)
+    narrow = Residuals(Rrru3(length_limit_mm=0.5), theta, residuals.measured_mm, points)
+    fit = least_squares(narrow, noise_mm=10.0)
+    free = ~fit.at_bound
+    assert 0 < free.sum() < 7 and np.isnan(fit.standard_errors[~free]).all()
+    jacobian = narrow.jacobian(fit.errors)[..., free].reshape(-1, free.sum())
+    np.testing.assert_allclose(fit.standard_errors[free], 10.0 * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))), rtol=1e-6)
 
 
 def test_residual_jacobian_equals_finite_differences(rich_poses):

@@ -67,24 +67,40 @@ def test_summary_equals_the_plain_statistics(campaign):
 
 
 def test_iso_9283_by_hand():
-    """Two passes along x: barycentre errors known, the along-path part of the error is no path error."""
+    """Four passes along x, two and two alike: barycentre errors known, the along-path part of the error is no path error."""
     position = np.array([[-300.0, 0.0, 600.0], [-290.0, 0.0, 600.0], [-280.0, 0.0, 600.0]])
-    error = np.zeros((2, 3, 3))
-    error[0], error[1] = [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]
-    error[0, 1], error[1, 1] = [0.0, 0.0, 1.0], [0.0, 0.0, 1.4]
-    frame = pd.DataFrame({"run": np.repeat([1, 2], 3), "trajectory": "line_1", "point": np.tile([1, 2, 3], 2), "status": "ok"})
+    error = np.zeros((4, 3, 3))
+    error[:2], error[2:] = [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]
+    error[:2, 1], error[2:, 1] = [0.0, 0.0, 1.0], [0.0, 0.0, 1.4]
+    frame = pd.DataFrame({"run": np.repeat([1, 2, 3, 4], 3), "trajectory": "line_1", "point": np.tile([1, 2, 3], 4), "status": "ok"})
     for k, axis in enumerate("xyz"):
-        frame[f"command_{axis}_mm"] = np.tile(position[:, k], 2)
-        frame[f"measured_{axis}_mm"] = np.tile(position[:, k], 2) + error[..., k].ravel()
+        frame[f"command_{axis}_mm"] = np.tile(position[:, k], 4)
+        frame[f"measured_{axis}_mm"] = np.tile(position[:, k], 4) + error[..., k].ravel()
     frame["speed_mm_s"], frame["payload_kg"] = 80.0, np.nan
     row = evaluate.summarise(evaluate.before(frame), frame).iloc[0]
-    assert row["repeats"] == 2
+    assert row["repeats"] == 4
     assert row["pose_accuracy_mm"] == pytest.approx(1.2) and row["path_accuracy_mm"] == pytest.approx(1.2)
-    # l = 0.2 at both passes of point 2, no spread: RP = 0.2 + 3 x 0
+    # l = 0.2 at all passes of point 2, no spread: RP = 0.2 + 3 x 0
     assert row["repeatability_mm"] == pytest.approx(0.2)
     only = frame[frame["point"] != 2].reset_index(drop=True)
     row = evaluate.summarise(evaluate.before(only), only).iloc[0]
     assert row["pose_accuracy_mm"] == pytest.approx(np.hypot(0.3, 0.2)) and row["path_accuracy_mm"] == pytest.approx(0.2)
+
+
+def test_reverse_passes_are_told_apart_on_open_and_closed_paths():
+    angle = np.linspace(0.0, 2.0 * np.pi, 30)
+    closed = np.round(np.stack([100.0 * np.cos(angle), 100.0 * np.sin(angle), np.full(30, 600.0)], axis=1), 6)
+    points = np.concatenate([closed, closed[::-1], closed[2:], closed[::-1][:-3]])
+    frame = pd.DataFrame(points, columns=[f"command_{a}_mm" for a in "xyz"])
+    frame["run"], frame["trajectory"] = np.repeat([1, 2, 3, 4], [30, 30, 28, 27]), "circle"
+    assert [rows.direction(frame)[frame["run"] == run].tolist()[0] for run in (1, 2, 3, 4)] == [1, -1, 1, -1]
+
+
+def test_names_with_pattern_characters_are_names(campaign):
+    _, _, measurements = campaign
+    named = measurements.assign(trajectory=measurements["trajectory"].replace({"line_1": "path[1]", "line_2": "all"}))
+    summary = evaluate.summarise(evaluate.before(named), named).set_index("trajectory")
+    assert summary.loc["path[1]", "points"] == 60 and summary.loc["all", "points"] == 60 and summary.loc["all_lines", "points"] == 60
 
 
 def test_outliers_are_kept_but_not_counted(campaign):

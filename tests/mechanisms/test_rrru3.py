@@ -140,9 +140,10 @@ def test_published_tied_and_identifiable_errors_say_the_same(rich_poses):
     assert np.linalg.norm(positions[0] - points, axis=1).min() > 0.1
 
 
-def test_different_legs_cannot_be_tied():
-    with pytest.raises(ConfigError, match="dL1: the legs' errors differ"):
-        to_identifiable({"dL11": 0.1, "dL21": 0.2})
+def test_legs_that_differ_have_no_tied_error():
+    assert np.isnan(to_identifiable({"dL11": 0.1, "dL21": 0.2})["dL1"])
+    assert np.isnan(to_identifiable({"dL11": 0.3})["dL1"]) and to_identifiable({"dL11": 0.3})["dL2"] == 0.0
+    assert to_identifiable({"dL1": 0.3, "dL21": 0.3})["dL1"] == 0.3
 
 
 def test_out_of_reach_is_nan_in_batches_and_an_error_at_the_boundary():

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import yaml
 
-from rrru.calibrate.least_squares import least_mean_distance, least_squares
+from rrru.calibrate.least_squares import least_squares
+from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.residuals import Residuals
 from rrru.errors import ConfigError, UnreachableError
 from rrru.mechanisms.rrru3 import Rrru3
@@ -54,10 +55,10 @@ def test_the_linearised_fit_is_the_pipelines(rich_poses):
     truth = np.array([0.004, -0.003, 0.002, 0.8, -0.6, 0.5, 2.0])
     measured = robot.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.3, points.shape)
     residuals = Residuals(robot, theta, measured, points)
-    errors, value = least_mean_distance(residuals, least_squares(residuals).errors)
+    fit = least_mean_distance(residuals, least_squares(residuals).errors)
     fast, fast_value = twin._linear_fit(robot, theta, measured, points)
-    assert fast_value == pytest.approx(value, abs=1e-4)
-    np.testing.assert_allclose(fast / residuals.mechanism.parameters.high, errors / residuals.mechanism.parameters.high, atol=2e-3)
+    assert fast_value == pytest.approx(fit.mean_mm, abs=1e-4)
+    np.testing.assert_allclose(fast / residuals.mechanism.parameters.high, fit.errors / residuals.mechanism.parameters.high, atol=2e-3)
 
 
 def test_misfit_is_zero_for_the_paper_itself_and_grows_with_every_number():

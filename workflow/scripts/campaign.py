@@ -15,7 +15,8 @@ def main(config, campaign, outputs):
     else:
         ingested = study.ingest_campaign(config, campaign)
         measurements, truth = ingested.measurements, pd.DataFrame(columns=tables.columns("truth"))
-    singular = study.singularity_table(study.mechanism(config, campaign), measurements)
+    margin = config["calibration"]["singularity_margin"]
+    measurements, singular = study.with_singularities(study.mechanism(config, campaign), measurements, margin)
     tables.write("measurements", measurements, outputs["measurements"])
     tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
     tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])

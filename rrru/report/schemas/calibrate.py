@@ -121,9 +121,14 @@ TABLES = (
                 for name, text in (("min", "minimum"), ("mean", "mean"), ("rms", "root mean square"), ("max", "maximum"))
             ),
             Column("repeats", "int64", "smallest number of passes under the same conditions"),
-            Column("pose_accuracy_mm", NUMBER, "ISO 9283 AP: largest distance of a barycentre from its command", True),
+            Column(
+                "pose_accuracy_mm",
+                NUMBER,
+                "ISO 9283 AP: largest distance of a barycentre from its command (mode model: from the model's position)",
+                True,
+            ),
             Column("path_accuracy_mm", NUMBER, "ISO 9283 AT: the same, across the path only", True),
-            Column("repeatability_mm", NUMBER, "ISO 9283 RP: largest l + 3 S_l; null without repeats", True),
+            Column("repeatability_mm", NUMBER, "ISO 9283 RP: largest l + 3 S_l; null with fewer than 3 repeats", True),
         ),
         ("campaign", "calibration", "method", "mode", "trajectory"),
     ),

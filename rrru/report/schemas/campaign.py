@@ -83,6 +83,7 @@ TABLES = (
                 "given: by the configuration; repeats: pooled over repeated points; residuals: from the fit of all points",
                 allowed=("given", "repeats", "residuals"),
             ),
+            Column("platform_mass_kg", NUMBER, "the real robot's platform, as given; null where it was not", True),
             Column("registration_rms_mm", NUMBER, "residual of the frame registration; null where the frame was the robot's", True),
             Column("registration_max_mm", NUMBER, "largest residual of the frame registration", True),
             Column("min_translational_measure", NUMBER, "nearest approach to a translational singularity"),

@@ -16,9 +16,10 @@ TABLES = (
             Column("evaluations", "int64", "evaluations of the objective"),
             Column("stopped", "str", "why it stopped", allowed=("generations", "stalled")),
             Column("polished_mm", NUMBER, "mean distance after a local polish from where the run ended"),
-            Column("optimum_mm", NUMBER, "least mean distance, found from the least-squares fit"),
-            Column("excess", NUMBER, "objective_mm / optimum_mm - 1"),
-            Column("polished_excess", NUMBER, "polished_mm / optimum_mm - 1"),
+            Column("optimum_mm", NUMBER, "least mean distance within the bounds, found from the least-squares fit"),
+            Column("polish_evaluations", "int64", "evaluations of the local polish"),
+            Column("excess", NUMBER, "objective_mm / optimum_mm - 1; null where the optimum is zero", True),
+            Column("polished_excess", NUMBER, "polished_mm / optimum_mm - 1; null where the optimum is zero", True),
             *(
                 Column(name, NUMBER, "error that the run found, rad" if name.startswith("dtheta") else "error that the run found, mm")
                 for name in ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dR", "dr")
@@ -45,7 +46,7 @@ TABLES = (
             Column("runs", "int64", "seeds; 1 for what has none"),
             Column("mean_mm", NUMBER, "mean distance reached (median over the seeds)"),
             Column("worst_mean_mm", NUMBER, "mean distance of the worst seed"),
-            Column("excess", NUMBER, "mean_mm over the least mean distance - 1"),
+            Column("excess", NUMBER, "mean_mm over the least mean distance - 1; null where that is zero", True),
             Column("evaluations", NUMBER, "evaluations of all residuals (median over the seeds)"),
             Column("angle_error_rad", NUMBER, "RMS deviation of the drive-angle errors from the truth; null where nobody knows it", True),
             Column("length_error_mm", NUMBER, "RMS deviation of dL1, dL2, dL3 and da from the truth", True),
