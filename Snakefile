@@ -1,5 +1,7 @@
 from snakemake.utils import min_version, validate
 
+from rrru.study import check
+
 min_version("9.0")
 
 
@@ -7,6 +9,7 @@ configfile: "config.yaml"
 
 
 validate(config, "workflow/schemas/config.schema.yaml")
+check(config)
 
 
 include: "workflow/rules/common.smk"

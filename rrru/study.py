@@ -22,6 +22,31 @@ _WORKSPACE_LINES = 130
 _INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points", "extra_columns", "elbow")
 
 
+def check(config):
+    """Raise ConfigError where names in a valid configuration refer to nothing, before anything runs."""
+    for campaign, section in config["campaigns"].items():
+        if "virtual" not in section:
+            continue
+        _entry(config, "virtual_robots", section["virtual"], campaign)
+        names = [t.name for t in trajectories.from_config(_entry(config, "trajectories", section["trajectories"], campaign))]
+        for entry in section.get("passes", []):
+            for wanted in entry.get("trajectories", []):
+                if wanted not in names:
+                    raise ConfigError(f"campaigns.{campaign}.passes: no trajectory {wanted!r}; known: {', '.join(names)}")
+    reproduce, sweep = config["reproduce"], config["sweep"]
+    for key, section in (
+        ("campaign", config["campaigns"]),
+        *((f"{k}_calibration", config["calibration"]["sets"]) for k in ("line", "spiral")),
+    ):
+        if reproduce[key] not in section:
+            raise ConfigError(f"reproduce.{key} is {reproduce[key]!r}; known: {', '.join(section)}")
+    if len({float(value) for value in sweep["values"]}) < len(sweep["values"]):
+        raise ConfigError(f"sweep.values holds a number twice: {', '.join(sweep['values'])}")
+    for kind, sizes in sweep["populations"].items():
+        if (len(sizes) == 1) != (kind == "one"):
+            raise ConfigError(f"sweep.populations.{kind} is {sizes}; allowed: one size for one, several for islands")
+
+
 def mechanism(config, campaign, errors="identifiable"):
     """The nominal robot of a campaign with the chosen error parameters and the configuration's bounds."""
     name = config["campaigns"][campaign]["robot"]

@@ -3,6 +3,8 @@
 import numpy as np
 
 # printed as "less than": reached when not above
+# what the numbers need
+TRAJECTORIES = {*(f"line_{k}" for k in range(1, 8)), "spiral"}
 UPPER_LIMITS = ("spiral_under_lines_z_abs_max",)
 
 

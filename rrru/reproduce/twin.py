@@ -138,6 +138,8 @@ def simulate(mechanism, twin, noise_mm, draws, line_calibration="group_1", kind=
     draws: see `draw`, for the measurement and for the drives with corrected commands; line_calibration: one of LINE_CALIBRATIONS.
     Raises UnreachableError or FitError where the candidate cannot be driven or calibrated.
     """
+    if line_calibration not in LINE_CALIBRATIONS:
+        raise ConfigError(f"twin: line calibration is {line_calibration!r}; allowed: {', '.join(LINE_CALIBRATIONS)}")
     plan = _plan(twin)
     target = plan.targets()
     theta = mechanism.require_reachable(target)

@@ -118,6 +118,12 @@ def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
         ("campaigns: {mine: {robot: rrru3, ingest: a.csv, nois_mm: 0.02}}", "nois_mm"),
         ("campaigns: {mine: {robot: rrru9, ingest: a.csv}}", "rrru9"),
         ("sweep: {values: [0.1, 0.2]}", "0.1 is not of type 'string'"),
+        ("reproduce: {campaign: nosuch}", "reproduce.campaign is 'nosuch'"),
+        ("reproduce: {line_calibration: nosuch}", "reproduce.line_calibration is 'nosuch'"),
+        ("campaigns: {crooked: {passes: [{trajectories: [nosuch]}]}}", "campaigns.crooked.passes: no trajectory 'nosuch'"),
+        ("campaigns: {paper: {unit: inch}}", "unit"),
+        ('sweep: {values: ["0.5", "0.50"]}', "sweep.values holds a number twice"),
+        ("sweep: {populations: {islands: [30]}}", "sweep.populations.islands is [30]"),
         ("genetic: {generations: 0}", "0 is less than the minimum of 1"),
     ],
 )

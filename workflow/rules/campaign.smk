@@ -12,7 +12,7 @@ rule campaign:
     params:
         section=campaign_settings,
         settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
-        code=code_digest(*CAMPAIGN_ROOMS),
+        code=code_digest(*STUDY_ROOMS),
     script:
         "../scripts/campaign.py"
 

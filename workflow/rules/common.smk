@@ -28,8 +28,18 @@ CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]
 
 # rooms of the package that a stage's results depend on
 TABLE_ROOMS = ("report/tables", "report/schemas")
-CAMPAIGN_ROOMS = (*TABLE_ROOMS, "errors", "parameters", "seeds", "study", "mechanisms", "effects", "plant", "campaign")
-CALIBRATE_ROOMS = (*CAMPAIGN_ROOMS, "calibrate")
+STUDY_ROOMS = (
+    *TABLE_ROOMS,
+    "errors",
+    "parameters",
+    "seeds",
+    "study",
+    "mechanisms",
+    "effects",
+    "plant",
+    "campaign",
+    "calibrate",
+)
 SWEPT = ("crossover_fraction", "migration_fraction")
 
 

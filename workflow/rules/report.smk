@@ -1,6 +1,7 @@
 rule published:
     input:
         errors=table("errors"),
+        calibrations=table("calibrations"),
         parameters=table("parameters"),
         genetic=table("genetic"),
         sweep_runs=table("sweep_runs"),
@@ -10,8 +11,10 @@ rule published:
     log:
         f"{RESULTS}/logs/published.log",
     params:
-        settings=settings("robots", "motion", "trajectories", "campaigns", "genetic", "reproduce", "sweep"),
-        code=code_digest("reproduce", "mechanisms", *TABLE_ROOMS),
+        settings=settings(
+            "seed", "robots", "motion", "trajectories", "virtual_robots", "campaigns", "calibration", "genetic", "reproduce"
+        ),
+        code=code_digest(*STUDY_ROOMS, "reproduce"),
     script:
         "../scripts/published.py"
 

@@ -1,15 +1,32 @@
 """Paper A's numbers beside this study's, and the audit of its misprints."""
 
+import pandas as pd
+
+from rrru import study
+from rrru.calibrate.genetic_study import typical_parameters
 from rrru.report import tables
 from rrru.report.job import job
 from rrru.reproduce.audit import audit_table
 from rrru.reproduce.published import published_table
+from rrru.reproduce.redraw import spread
 
 
 def main(config, inputs, outputs):
     """Write both tables."""
-    frames = [tables.read(inputs[name]) for name in ("errors", "parameters", "genetic", "sweep_runs")]
-    tables.write("published", published_table(config, *frames), outputs["published"])
+    errors, calibrations, parameters, genetic, runs = (
+        tables.read(inputs[name]) for name in ("errors", "calibrations", "parameters", "genetic", "sweep_runs")
+    )
+    reproduce = config["reproduce"]
+    campaign = reproduce["campaign"]
+    own = genetic[genetic["campaign"] == campaign]
+    names = study.mechanism(config, campaign).parameters.names
+    typical = typical_parameters(own, (*names, "dR", "dr")).assign(campaign=campaign)
+    others = {}
+    if study.is_virtual(config, campaign):
+        others = spread(study.virtual_campaign(config, campaign), config["calibration"], reproduce, reproduce["redraws"])
+    parameters = pd.concat([parameters[typical.columns], typical], ignore_index=True)
+    frame = published_table(config, errors, calibrations, parameters, genetic, runs, others)
+    tables.write("published", frame, outputs["published"])
     tables.write("audit", audit_table(), outputs["audit"])
 
 

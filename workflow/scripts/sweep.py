@@ -6,6 +6,7 @@ from rrru import study
 from rrru.calibrate.campaign_fit import select
 from rrru.calibrate.genetic_study import settings_from_config
 from rrru.calibrate.sweep import run_sweep
+from rrru.errors import ConfigError
 from rrru.report import tables
 from rrru.report.job import job
 
@@ -16,6 +17,8 @@ def main(config, parameter, population, value, inputs, outputs):
     mechanism = study.mechanism(config, reproduce["campaign"], "tied")
     patterns = config["calibration"]["sets"][reproduce["line_calibration"]]
     residuals = select(tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"])
+    if residuals is None:
+        raise ConfigError(f"campaign {reproduce['campaign']} has too few points for the set {reproduce['line_calibration']}")
     settings = settings_from_config(config["genetic"], populations=section["populations"][population])
     runs, history = run_sweep(
         residuals.mean_distance,

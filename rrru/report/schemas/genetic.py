@@ -55,7 +55,7 @@ TABLES = (
     ),
     Table(
         "timings",
-        "timings/timings.parquet",
+        "timings/{campaign}.parquet",
         "Time of one calibration by each method on this machine; the only table whose bytes differ from run to run.",
         (
             CAMPAIGN,

@@ -14,6 +14,10 @@ TABLES = (
             Column("published", NUMBER, "printed number"),
             Column("here", NUMBER, "this study's number; null where it has none", True),
             Column("ratio", NUMBER, "here / published; null where either is null or zero", True),
+            Column(
+                "here_low", NUMBER, "lower end of the middle 90 % over other draws of wobble and noise; null where nothing is drawn", True
+            ),
+            Column("here_high", NUMBER, "upper end", True),
             Column("note", "str", "what differs, and why"),
         ),
         ("item", "source"),
@@ -26,6 +30,7 @@ TABLES = (
             Column("where", "str", "place in the paper"),
             Column("printed", "str", "what stands there"),
             Column("right", "str", "what should"),
+            Column("kind", "str", "computed here, or compared as printed", allowed=("computed", "as printed")),
             Column("check", "str", "what is computed to show it"),
             Column("unit", "str", "unit of the two values"),
             Column("value_printed", NUMBER, "what the printed form gives; null where it gives nothing", True),
