@@ -11,6 +11,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from rrru.reproduce import paper_a
+
 _ROOT = Path(__file__).resolve().parents[2]
 _SNAKEMAKE = Path(sys.executable).parent / "snakemake"
 
@@ -58,6 +60,32 @@ def test_everything_is_there_and_a_second_run_does_nothing(finished):
     code, output = _run(finished)
     assert code == 0 and "Nothing to be done" in output
     assert _digests(finished) == digests
+
+
+def test_every_number_of_the_paper_stands_beside_ours(finished):
+    published = pd.read_parquet(finished / "build/minimal/tables/published.parquet")
+    for number in paper_a.NUMBERS:
+        row = published[(published["item"] == number.item) & (published["source"] == number.source)]
+        assert len(row) == 1 and row["published"].iloc[0] == number.value and row["unit"].iloc[0] == number.unit
+    known = published.dropna(subset=["here", "ratio"])
+    pd.testing.assert_series_equal(known["ratio"], known["here"] / known["published"], check_names=False)
+    by_item = published.drop_duplicates("item").set_index("item")
+    assert (by_item.loc[[n.item for n in paper_a.DESIGN], "ratio"].drop(["population"]).dropna() == 1.0).all()
+    # the minimal sweep has two of the ten values
+    assert (
+        by_item.loc[["P_c=0.5", "P_m=1.0", *paper_a.ERRORS_MM], "here"].notna().all()
+        and by_item.loc["P_c=0.4":"P_c=0.4", "here"].isna().all()
+    )
+    # recomputed from the point errors, not through the package
+    errors = pd.read_parquet(finished / "build/minimal/tables/errors.parquet").query("campaign == 'paper'")
+    first = errors.query("trajectory == 'line_1' and mode == 'before'")["error_mm"]
+    assert by_item.loc["group1_before_max", "here"] == first.max() and by_item.loc["group1_before_min", "here"] == first.min()
+    curve = errors.query(
+        "trajectory == 'spiral' and calibration == 'group_1' and method == 'least_mean_distance' and mode == 'closed_loop'"
+    )
+    assert by_item.loc["spiral_under_lines_x_min", "here"] == curve["error_x_mm"].min()
+    spread = published.dropna(subset=["here_low"])
+    assert len(spread) >= 17 and (spread["here_low"] <= spread["here_high"]).all()
 
 
 def test_one_core_gives_the_same_bytes(finished, tmp_path):

@@ -12,7 +12,15 @@ rule published:
         f"{RESULTS}/logs/published.log",
     params:
         settings=settings(
-            "seed", "robots", "motion", "trajectories", "virtual_robots", "campaigns", "calibration", "genetic", "reproduce"
+            "seed",
+            "robots",
+            "motion",
+            "trajectories",
+            "virtual_robots",
+            "campaigns",
+            "calibration",
+            "genetic",
+            "reproduce",
         ),
         code=code_digest(*STUDY_ROOMS, "reproduce"),
     script:
