@@ -11,7 +11,7 @@ from rrru.calibrate.least_squares import least_squares
 from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.sweep import kept_generations
 from rrru.mechanisms.rrru3 import to_identifiable
-from rrru.seeds import stream_seed
+from rrru.seeds import run_seed
 
 SETTING_KEYS = tuple(GeneticSettings.__dataclass_fields__)
 
@@ -22,10 +22,11 @@ def settings_from_config(section, **changes):
     return GeneticSettings(**values | {"populations": tuple(values["populations"])})
 
 
-def study_set(measurements, tied, identifiable, calibration, patterns, settings, seeds, study_seed, use_near_singularity):
+def study_set(measurements, tied, identifiable, calibration, patterns, settings, seeds, study_seed, labels=(), use_near_singularity=True):
     """Runs of the genetic algorithm on one calibration set.
 
-    tied, identifiable: the mechanism with 8 and with 7 error parameters; seeds: number of runs. Returns (runs, history, timings) as frames
+    tied, identifiable: the mechanism with 8 and with 7 error parameters; seeds: number of runs, seeded by the study's
+    seed and the labels. Returns (runs, history, timings) as frames
     without the campaign's name, or None where the campaign has too few points for the set.
     """
     residuals = select(measurements, tied, patterns, use_near_singularity)
@@ -40,7 +41,7 @@ def study_set(measurements, tied, identifiable, calibration, patterns, settings,
     residuals.mean_distance(tied.parameters.nominal[None])
     runs, history, seconds = [], [], []
     for number in range(1, seeds + 1):
-        seed = stream_seed(study_seed, "genetic", calibration, number) % 2**32
+        seed = run_seed(study_seed, "genetic", *labels, calibration, number)
         start = perf_counter()
         result = minimise(residuals.mean_distance, *bounds, settings, seed)
         seconds.append(perf_counter() - start)

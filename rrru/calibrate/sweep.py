@@ -1,6 +1,5 @@
 """Sweeps of the genetic algorithm's settings over many seeds, and whether a setting's effect can be told from the seeds' scatter."""
 
-import hashlib
 from dataclasses import replace
 
 import numpy as np
@@ -9,21 +8,12 @@ from scipy import stats
 
 from rrru.calibrate.genetic import minimise
 from rrru.errors import ConfigError
+from rrru.seeds import run_seed
 
 SWEPT = ("crossover_fraction", "migration_fraction")
 _EVERY_UNTIL, _THEN_EVERY = 100, 10
 _LEVEL = 0.05
 _RESAMPLES = 4999
-
-
-def run_seed(study_seed, *labels):
-    """Seed, 0..2^32 - 1, of one run: the same for the same study seed and labels on every machine, independent for all others.
-
-    study_seed: whole number >= 0; labels: texts and numbers; numbers count to ten digits, so that 0.1 + 0.2 is 0.3, and 1.0 is 1.
-    """
-    text = "\x1f".join(label if isinstance(label, str) else f"{label:.10g}" for label in labels)
-    words = np.frombuffer(hashlib.sha256(text.encode()).digest(), dtype="<u4").tolist()
-    return int(np.random.SeedSequence([study_seed, *words]).generate_state(1)[0])
 
 
 def population_kind(settings):

@@ -9,7 +9,7 @@ from rrru.errors import ConfigError, UnreachableError
 from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3, to_identifiable
 from tests.reference import rrru3_slow
 
-# papers.md, part A: elbow out, y = 0, z = 600 (degrees)
+# computed apart from this project: elbow out, y = 0, z = 600 (degrees)
 REFERENCE_DEG = {
     -800.0: (79.0746, 14.5015, 14.5015),
     -540.0: (42.1292, -20.7658, -20.7658),

@@ -1,4 +1,4 @@
-"""Both singularity measures against the sourced facts of papers.md, the 12 x 12 closure and what a lock-up means."""
+"""Both singularity measures against facts computed apart from this project, the 12 x 12 closure and what a lock-up means."""
 
 import numpy as np
 import pytest

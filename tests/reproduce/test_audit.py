@@ -1,4 +1,4 @@
-"""The audit against the values that papers.md states, and the published table's completeness."""
+"""The audit against values that were computed apart from this project, and the published table's completeness."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def test_where_the_line_is_singular(audit):
 
 
 def test_paper_numbers_are_the_sourced_ones():
-    """A sample typed in from papers.md again; the sums guard the rest."""
+    """A sample typed in a second time; the sums guard the rest."""
     by_item = {(n.item, n.source): n.value for n in paper_a.NUMBERS}
     assert by_item["P_c=1.0", "Table 3, Fig. 6"] == 0.6516 and by_item["P_m=0.7", "Table 4, Fig. 7"] == 0.5112
     assert sum(paper_a.CROSSOVER) == pytest.approx(5.3308) and sum(paper_a.MIGRATION) == pytest.approx(5.1134)

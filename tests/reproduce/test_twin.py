@@ -13,7 +13,7 @@ from rrru.calibrate.residuals import Residuals
 from rrru.errors import ConfigError, UnreachableError
 from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.reproduce import twin
+from rrru.reproduce import twin, twin_search
 from rrru.reproduce.paper_a import ERRORS_MM
 
 _VALUES = {name: 0.5 * (low + high) for name, (low, high) in twin.SEARCH_BOUNDS.items()} | {
@@ -35,14 +35,14 @@ _VALUES = {name: 0.5 * (low + high) for name, (low, high) in twin.SEARCH_BOUNDS.
 @pytest.fixture(scope="module")
 def draws():
     generator = np.random.default_rng(0)
-    return tuple(twin.draw(generator, 222) for _ in range(2))
+    return tuple(twin_search.draw(generator, 222) for _ in range(2))
 
 
-@pytest.mark.parametrize("line_calibration", twin.LINE_CALIBRATIONS)
+@pytest.mark.parametrize("line_calibration", twin_search.LINE_CALIBRATIONS)
 def test_the_fast_path_gives_the_spatial_closures_numbers(draws, line_calibration):
     candidate = twin.Twin(_VALUES)
-    fast, fast_orders = twin.simulate(Rrru3(), candidate, 0.02, draws, line_calibration)
-    full, full_orders = twin.simulate(Rrru3(), candidate, 0.02, draws, line_calibration, kind=VirtualRobot)
+    fast, fast_orders = twin_search.simulate(Rrru3(), candidate, 0.02, draws, line_calibration)
+    full, full_orders = twin_search.simulate(Rrru3(), candidate, 0.02, draws, line_calibration, kind=VirtualRobot)
     assert set(fast) == set(ERRORS_MM)
     for item, value in full.items():
         assert fast[item] == pytest.approx(value, abs=0.05), item
@@ -56,29 +56,29 @@ def test_the_linearised_fit_is_the_pipelines(rich_poses):
     measured = robot.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.3, points.shape)
     residuals = Residuals(robot, theta, measured, points)
     fit = least_mean_distance(residuals, least_squares(residuals).errors)
-    fast, fast_value = twin._linear_fit(robot, theta, measured, points)
+    fast, fast_value = twin_search._linear_fit(robot, theta, measured, points)
     assert fast_value == pytest.approx(fit.mean_mm, abs=1e-4)
     np.testing.assert_allclose(fast / residuals.mechanism.parameters.high, fit.errors / residuals.mechanism.parameters.high, atol=2e-3)
 
 
 def test_misfit_is_zero_for_the_paper_itself_and_grows_with_every_number():
     holds = {"centre_before": 0.1, "group6_after": 0.1}
-    assert twin.misfit(ERRORS_MM, holds) == 0.0
+    assert twin_search.misfit(ERRORS_MM, holds) == 0.0
     for item in ERRORS_MM:
-        worse = twin.misfit(ERRORS_MM | {item: 1.3 * ERRORS_MM[item]}, holds)
+        worse = twin_search.misfit(ERRORS_MM | {item: 1.3 * ERRORS_MM[item]}, holds)
         assert worse > 1.0
-    assert twin.misfit(ERRORS_MM | {"spiral_under_lines_z_abs_max": 1.0}, holds) == 0.0
-    assert twin.misfit(ERRORS_MM, holds | {"group6_after": -0.01}) > 1.0
+    assert twin_search.misfit(ERRORS_MM | {"spiral_under_lines_z_abs_max": 1.0}, holds) == 0.0
+    assert twin_search.misfit(ERRORS_MM, holds | {"group6_after": -0.01}) > 1.0
 
 
 def test_a_spiral_near_a_singularity_is_refused(draws):
     near = twin.Twin(_VALUES | {"centre_x_mm": -560.0, "radius_end_mm": 210.0})
     with pytest.raises(UnreachableError):
-        twin.simulate(Rrru3(), near, 0.02, draws)
+        twin_search.simulate(Rrru3(), near, 0.02, draws)
 
 
 def test_same_seed_same_twin_and_it_stays_in_its_bounds(draws):
-    found = [twin.search(Rrru3(), 0.02, draws, "group_1", 3, generations=1, population=1) for _ in range(2)]
+    found = [twin_search.search(Rrru3(), 0.02, draws, "group_1", 3, generations=1, population=1) for _ in range(2)]
     assert found[0] == found[1] and np.isfinite(found[0][1])
     for name, (low, high) in twin.SEARCH_BOUNDS.items():
         assert low <= found[0][0].values[name] <= high
@@ -103,8 +103,8 @@ def test_the_configured_twin_comes_back_and_a_refinement_is_never_worse(draws):
     assert overlay["virtual_robots"]["twin"]["errors"] == config["virtual_robots"]["twin"]["errors"]
     assert overlay["trajectories"]["paper"]["spiral"].items() <= config["trajectories"]["paper"]["spiral"].items()
     vector = [configured.values[name] for name in twin.SEARCH_BOUNDS]
-    before = twin.cost(vector, Rrru3(), 0.02, draws, "group_1")
-    _, after = twin.search(Rrru3(), 0.02, draws, "group_1", 4, generations=1, population=1, start=configured)
+    before = twin_search.cost(vector, Rrru3(), 0.02, draws, "group_1")
+    _, after = twin_search.search(Rrru3(), 0.02, draws, "group_1", 4, generations=1, population=1, start=configured)
     assert after <= before
     config["virtual_robots"]["twin"]["errors"]["dR"] = 1.0
     with pytest.raises(ConfigError, match="dR"):

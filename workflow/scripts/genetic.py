@@ -17,9 +17,18 @@ def main(config, campaign, inputs, outputs):
     settings = genetic_study.settings_from_config(config["genetic"])
     results = []
     for name, patterns in tqdm(config["calibration"]["sets"].items(), desc=f"genetic {campaign}", unit="set"):
-        seed = f"{config['seed']}:{campaign}"
-        use = config["calibration"]["use_near_singularity"]
-        result = genetic_study.study_set(measurements, tied, identifiable, name, patterns, settings, config["genetic"]["seeds"], seed, use)
+        result = genetic_study.study_set(
+            measurements,
+            tied,
+            identifiable,
+            name,
+            patterns,
+            settings,
+            config["genetic"]["seeds"],
+            config["seed"],
+            (campaign,),
+            config["calibration"]["use_near_singularity"],
+        )
         if result is not None:
             results.append(result)
     runs, history, timings = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))

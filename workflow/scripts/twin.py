@@ -7,7 +7,7 @@ import yaml
 
 from rrru import study
 from rrru.report.job import job
-from rrru.reproduce import twin
+from rrru.reproduce import twin, twin_search
 
 
 def main(config, output, workers):
@@ -15,8 +15,8 @@ def main(config, output, workers):
     section, reproduce = config["twin"], config["reproduce"]
     campaign = study.virtual_campaign(config, reproduce["campaign"])
     count = len(campaign.plan.targets())
-    draws = tuple(twin.draw(campaign.generator(name), count) for name in ("measure", "closed_loop"))
-    found, misfit = twin.search(
+    draws = tuple(twin_search.draw(campaign.generator(name), count) for name in ("measure", "closed_loop"))
+    found, misfit = twin_search.search(
         study.mechanism(config, reproduce["campaign"]),
         campaign.noise_mm,
         draws,

@@ -19,7 +19,7 @@ TABLES = (
             Column(
                 "noise_from",
                 "str",
-                "given, or residuals where nothing was given or the fit leaves more than that",
+                "given: by the configuration or from repeats, see campaigns; residuals: of this fit, where nothing was given or more is left",
                 allowed=("given", "residuals"),
             ),
             Column("rank", "int64", "parameter combinations that the points see, of 7"),
