@@ -169,6 +169,16 @@ def workspace_table(config, campaign, measurements):
     return pd.concat(frames, ignore_index=True)
 
 
+def _unmatched_sets(config, measurements):
+    """A note where calibration sets match none of the campaign's trajectories."""
+    sets = config["calibration"]["sets"]
+    unmatched = [name for name, patterns in sets.items() if not rows.on_trajectories(measurements, patterns).any()]
+    if not unmatched:
+        return ()
+    present = ", ".join(measurements["trajectory"].unique())
+    return (f"not calibrated on {', '.join(unmatched)}: these sets match none of the trajectories {present}",)
+
+
 def _around_reachable(robot, points):
     """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth."""
     reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
@@ -199,7 +209,7 @@ def campaign_row(config, campaign, measurements, singular, ingested=None):
                 "registration_max_mm": registration.max_mm if registration else np.nan,
                 "min_translational_measure": singular["translational_measure"].min(),
                 "min_constraint_measure": singular["constraint_measure"].min(),
-                "notes": "; ".join(ingested.notes) if ingested else "",
+                "notes": "; ".join((*(ingested.notes if ingested else ()), *_unmatched_sets(config, measurements))),
             }
         ]
     )

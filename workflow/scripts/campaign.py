@@ -1,5 +1,8 @@
 """One campaign: driven by a virtual robot or read from a file."""
 
+import logging
+import sys
+
 import pandas as pd
 
 from rrru import study
@@ -21,7 +24,11 @@ def main(config, campaign, outputs):
     tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
     tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])
     tables.write("workspace", study.workspace_table(config, campaign, measurements), outputs["workspace"])
-    tables.write("campaigns", study.campaign_row(config, campaign, measurements, singular, ingested), outputs["campaigns"])
+    row = study.campaign_row(config, campaign, measurements, singular, ingested)
+    if row["notes"].iloc[0]:
+        logging.warning("campaign %s: %s", campaign, row["notes"].iloc[0])
+        print(f"campaign {campaign}: {row['notes'].iloc[0]}", file=sys.stderr)
+    tables.write("campaigns", row, outputs["campaigns"])
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ def _error_panels(tables, cells, curves, tags, marks):
         axes.set_title(f"{marks.get(name, '')}{choose.trajectory_label(name)}{pass_note(places)}")
         finish(axes, places)
         for row, (tag, (_, look, _), (low, high)) in enumerate(zip(tags, curves, ranges, strict=True)):
-            text = f"{tag} {style.number(low)} to {style.number(high)} mm"
+            text = f"{choose.trajectory_label(tag)} {style.number(low)} to {style.number(high)} mm"
             place = {"transform": axes.transAxes, "ha": "right", "va": "top", "in_layout": False}
             axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=_dark(look["color"]), **place)
     # room for the numbers above the highest curve

@@ -81,5 +81,5 @@ def _error_limits(errors):
 
 
 def _short(value):
-    """Three digits of a number."""
-    return f"{value:.3g}" if value >= 1e-3 else f"{value:.0e}"
+    """Two digits of a number, or all before the point."""
+    return f"{value:.2g}" if 1e-3 <= value < 10.0 else f"{value:.0f}" if value >= 10.0 else f"{value:.0e}"

@@ -64,14 +64,16 @@ def _path(axes, places, curves):
         one.labelpad = -1.0
     axes.zaxis.set_rotate_label(False)
     axes.zaxis.label.set_rotation(90.0)
-    axes.zaxis.labelpad = -6.0
+    axes.zaxis.labelpad = 1.0
     axes.text2D(0.06, 0.97, f"(a) path, deviations magnified {factor:g} times", transform=axes.transAxes)
 
 
 def _component(axes, places, curves, tags, axis):
     """Error along one axis under each calibration, the ranges as numbers above the panel."""
     ranges = [lines.draw_along(axes, errors, places, look, label, f"error_{axis}_mm") for label, look, errors in curves]
-    texts = [f"{tag} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)]
+    texts = [
+        f"{choose.trajectory_label(tag)} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)
+    ]
     axes.set_title("; ".join(texts) + " mm", loc="right", fontsize=7.0)
     axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
     lines.tolerance(axes, (1.0, -1.0))

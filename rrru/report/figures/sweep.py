@@ -122,7 +122,7 @@ def _scatter(axes, runs, apart, optimum, published):
         inside = "white" if told else style.BLUE
         axes.plot(value, middle, "o", markersize=4.0, color=style.BLUE, markerfacecolor=inside, label=label, zorder=4)
     above = published - published.min()
-    axes.plot(above.index, above, label=f"published (lowest {published.min():.4f} mm)", **style.PUBLISHED)
+    axes.plot(above.index, above, label=f"published, above its own lowest, {published.min():.4f} mm", **style.PUBLISHED)
     # linear up to one printed digit, so that no difference is shown as one
     axes.set_yscale("symlog", linthresh=_RESOLUTION_MM, linscale=0.5)
     style.plain_log(axes.yaxis)

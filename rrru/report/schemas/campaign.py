@@ -17,7 +17,12 @@ TABLES = (
             *xyz("measured", "mm", "measured position, robot frame; null where the point was not measured", True),
             Column("speed_mm_s", "float64", "speed of the run; null where the file has none", True),
             Column("payload_kg", "float64", "payload on the platform; null where the file has none", True),
-            Column("status", "str", "ok: used in fits; every other point is kept, reported and left out of fits", allowed=STATUS),
+            Column(
+                "status",
+                "str",
+                "every point is kept; outlier and unsolved are left out of fits, near_singularity only with use_near_singularity: false",
+                allowed=STATUS,
+            ),
         ),
         ("run", "point"),
     ),
