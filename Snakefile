@@ -16,6 +16,8 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/campaign.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/compensate.smk"
+include: "workflow/rules/gap.smk"
+include: "workflow/rules/withheld.smk"
 include: "workflow/rules/report.smk"
 
 

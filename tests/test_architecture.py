@@ -16,6 +16,7 @@ _FLOORS = {
     "calibrate": 5,
     "plant": 5,
     "compensate": 6,
+    "gap": 6,
     "reproduce": 7,
     "study": 7,
     "report": 0,

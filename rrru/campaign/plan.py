@@ -44,7 +44,7 @@ class Plan:
 
         Raises UnreachableError where a point is out of the mechanism's reach.
         """
-        frames, start = [], 0.0
+        frames, first, time = [], 0, self.time_s()
         for number, run in enumerate(self.runs, start=1):
             theta = mechanism.require_reachable(run.points_mm)
             frames.append(
@@ -53,7 +53,7 @@ class Plan:
                         "run": number,
                         "trajectory": run.trajectory,
                         "point": np.arange(1, len(run.points_mm) + 1),
-                        "time_s": start + run.time_s,
+                        "time_s": time[first : first + len(run.points_mm)],
                         **{f"command_{axis}_mm": run.points_mm[:, k] for k, axis in enumerate("xyz")},
                         **{f"theta{k + 1}_rad": theta[:, k] for k in range(3)},
                         "speed_mm_s": run.speed_mm_s,
@@ -61,8 +61,16 @@ class Plan:
                     }
                 )
             )
-            start += run.time_s[-1] + self.dwell_s
+            first += len(run.points_mm)
         return pd.concat(frames, ignore_index=True)
+
+    def time_s(self):
+        """Times (n,) of all sampled points since the campaign's start, the rests between the runs included."""
+        times, start = [], 0.0
+        for run in self.runs:
+            times.append(start + run.time_s)
+            start += run.time_s[-1] + self.dwell_s
+        return np.concatenate(times)
 
     def targets(self):
         """Commanded positions (n, 3) of all sampled points in order."""
@@ -116,12 +124,14 @@ def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse
 def make_plan(trajectories, passes, speed_mm_s, acceleration_mm_s2, dwell_s):
     """Plan of a campaign: every pass drives its trajectories one after another.
 
-    passes: mappings with the keys `reverse`, `speed_mm_s` (absent: the campaign's), `payload_kg` and `trajectories` (absent: all).
+    passes: mappings with the keys `reverse`, `speed_mm_s` and `acceleration_mm_s2` (absent: the campaign's), `payload_kg` and `trajectories`
+    (absent: all).
     """
     by_name = {trajectory.name: trajectory for trajectory in trajectories}
     runs = []
     for entry in passes:
         for name in entry.get("trajectories", list(by_name)):
             speed = entry.get("speed_mm_s", speed_mm_s)
-            runs.append(make_run(by_name[name], speed, acceleration_mm_s2, entry["payload_kg"], entry["reverse"]))
+            acceleration = entry.get("acceleration_mm_s2", acceleration_mm_s2)
+            runs.append(make_run(by_name[name], speed, acceleration, entry["payload_kg"], entry["reverse"]))
     return Plan(tuple(runs), dwell_s)

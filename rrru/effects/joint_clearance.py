@@ -1,23 +1,38 @@
 """Joint clearance: the U-joint's pin lies on the side of its bore towards which the leg pushes.
 
-With the force f_i that leg i transmits along the unit direction g_i, the bore (the platform) lags behind the pin (the forearm) by the radial
-clearance c_i (massless contact model; Parenti-Castelli and Venanzi, Mechanism and Machine Theory 40, 2005):
+With the force f_i that leg i transmits along the unit direction g_i (compression positive, `rrru.mechanisms.dynamics.loads`), the bore (the
+platform) lags behind the pin (the forearm) by the radial clearance c_i:
 
-    shift_i = -c_i sign(f_i) g_i
+    shift_i = -c_i sign(f_i) g_i,   or, softer,   shift_i = -c_i tanh(f_i / f_0) g_i
 
-It flips with the sign of the force and vanishes where the leg transmits none.
+The second form changes sides within a force f_0, the parameter `transition`, as contacts with friction and some elasticity do. As in
+`link_flexure`, `held` says whether f_i is the force with joint 3 free or held by friction. It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It flips with the sign of
+the force and vanishes where the leg transmits none. While the force keeps its sign it is a change of L3 by c_i, which a calibration
+with three free forearm lengths takes up, and one with tied lengths in part; it shows itself by the jump where the force changes sign.
+
+Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time); the contact lies on
+the forearm's line; the pin's radius left out.
+
+Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005. Paper A,
+section 3.3, blames it for what calibration leaves; its size is assumed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution
+from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
-    tuple(Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed") for k in (1, 2, 3))
+    (
+        *(Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed") for k in LEGS),
+        Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
+        Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
+    )
 )
+_SHAPES = tuple({"transition": force, "held": held} for held in (0.0, 1.0) for force in (0.0, 0.7, 2.0))
+_COORDINATES = plain_coordinates(_PARAMETERS, 0.05, _SHAPES)
 
 
 @dataclass(frozen=True)
@@ -26,8 +41,16 @@ class JointClearance:
 
     name: str = "joint_clearance"
     parameters: ParameterSet = _PARAMETERS
+    coordinates: Coordinates = _COORDINATES
+    needs: tuple = ("force_n",)
 
     def contribute(self, motion, values):
-        """Shifts of the platform's U-joint centres against the forearms under clearances (3,) in mm."""
-        push = np.sign(motion.force_n) * np.asarray(values, dtype=float)
+        """Shifts (n, 3, 3) of the platform's U-joint centres against the forearms.
+
+        values: clearances (3,) in mm, the transition in N and the share to which joint 3 is held.
+        """
+        transition, held = values[3:]
+        force = motion.force_n + held * (motion.held_force_n - motion.force_n)
+        side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
+        push = side * np.asarray(values[:3], dtype=float)
         return Contribution(joint_mm=-push[..., None] * motion.force_direction)

@@ -1,25 +1,35 @@
 """Transmission error: a periodic drive-angle error with a whole number of periods per turn of the drive arm.
 
-Meshing and eccentricity errors of a reduction stage repeat with the turns of its shafts (Litvin and Fuentes, Gear Geometry and Applied Theory,
-2004, ch. 17); with N periods per turn of the arm, amplitude a_i and phase p_i:
+The motor turns N times per turn of the arm (N the gear ratio). Eccentric wheels, a wave generator out of round and the errors of its
+teeth make the output lead and lag once per turn of the motor, hence N times per turn of the arm:
 
     dtheta_i = a_i sin(N theta_i + p_i)
+
+It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it is linear for a given N:
+
+    dtheta_i = s_i sin(N theta_i) + c_i cos(N theta_i)
+
+Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction of motion. The ratio is a
+number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2 degrees of the arm, and a campaign must sample more
+densely than every 3.6 degrees to see it as what it is.
+
+Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50 is a common
+ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
 """
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from rrru.effects.protocol import Contribution
+from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
+from rrru.effects.protocol import Contribution, Coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
     (
-        *(Parameter(f"amplitude{k}", "rad", 0.0, 0.0, 0.01, "assumed: up to some arc minutes") for k in (1, 2, 3)),
-        *(Parameter(f"phase{k}", "rad", 0.0, -np.pi, np.pi, "free") for k in (1, 2, 3)),
+        *harmonic_parameters("assumed: up to some arc minutes"),
         Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default"),
     )
 )
+_COORDINATES = harmonic_coordinates(_PARAMETERS, 3e-4, ({"ratio": 50.0},))
 
 
 @dataclass(frozen=True)
@@ -28,7 +38,9 @@ class TransmissionError:
 
     name: str = "transmission_error"
     parameters: ParameterSet = _PARAMETERS
+    coordinates: Coordinates = _COORDINATES
+    needs: tuple = ()
 
     def contribute(self, motion, values):
-        """Changes of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
-        return Contribution(drive_rad=values[:3] * np.sin(values[6] * motion.theta_rad + values[3:6]))
+        """Changes (n, 3) of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
+        return Contribution(drive_rad=harmonic(motion.theta_rad, values[6], values))

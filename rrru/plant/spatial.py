@@ -14,7 +14,8 @@ import numba
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-PLACES = ("base", "elbow", "knee", "wrist", "cross", "platform")
+from rrru.effects.protocol import PLACES
+
 # The rotation part of a closure residual counts as the distance it makes at this arm.
 _ARM_MM = 500.0
 _TOLERANCE_MM = 1e-10
@@ -35,7 +36,10 @@ class SpatialSolution:
 
 @dataclass(frozen=True)
 class SpatialGeometry:
-    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, and displacements (3, 6 places, 6) = shift in mm, rotation vector in rad."""
+    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) where they change from point to point, and displacements.
+
+    deviations: (3 legs, 6 PLACES, 6) = shift in mm, rotation vector in rad, in the leg's frame at that place.
+    """
 
     azimuth_rad: np.ndarray
     lengths_mm: np.ndarray
@@ -52,7 +56,7 @@ class SpatialGeometry:
         rotations = Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
         position, turned, residual = _solve_points(
             np.ascontiguousarray(self.azimuth_rad, dtype=float),
-            np.ascontiguousarray(self.lengths_mm, dtype=float),
+            np.ascontiguousarray(np.broadcast_to(self.lengths_mm, (n, 3, 5)), dtype=float),
             np.ascontiguousarray(self.deviations[..., :3], dtype=float),
             np.ascontiguousarray(rotations),
             np.ascontiguousarray(theta_rad, dtype=float),
@@ -66,10 +70,11 @@ class SpatialGeometry:
         rotations = Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
         jacobian, residual = np.empty((12, 12)), np.empty(12)
         result = []
-        for theta, passive in zip(theta_rad, passive_rad, strict=True):
+        lengths_mm = np.broadcast_to(self.lengths_mm, (len(theta_rad), 3, 5))
+        for theta, passive, lengths in zip(theta_rad, passive_rad, lengths_mm, strict=True):
             _closure(
                 np.asarray(self.azimuth_rad, dtype=float),
-                self.lengths_mm.astype(float),
+                np.ascontiguousarray(lengths, dtype=float),
                 np.ascontiguousarray(self.deviations[..., :3], dtype=float),
                 np.ascontiguousarray(rotations),
                 np.ascontiguousarray(theta, dtype=float),
@@ -180,7 +185,7 @@ def _solve_points(azimuth, lengths, shifts, rotations, theta, guess, joint_shift
             continue
         passive = guess[j] + correction
         for _ in range(_MOST_STEPS):
-            matrix, point = _closure(azimuth, lengths, shifts, rotations, theta[j], passive, joint_shift[j], jacobian, residual)
+            matrix, point = _closure(azimuth, lengths[j], shifts, rotations, theta[j], passive, joint_shift[j], jacobian, residual)
             largest = np.abs(residual).max()
             residuals[j] = largest
             if not largest > _TOLERANCE_MM:

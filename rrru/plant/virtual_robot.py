@@ -1,15 +1,17 @@
 """The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from rrru.effects.protocol import GRAVITY_MM_S2, Contribution, Motion
+from rrru.effects.motion import make_motion
+from rrru.effects.protocol import PLACES, Contribution
 from rrru.effects.registry import active_effects
 from rrru.errors import ConfigError
-from rrru.mechanisms import singularity
+from rrru.mechanisms.dynamics import Masses
 from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3
-from rrru.plant.spatial import PLACES, SpatialGeometry
+from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
 
 
@@ -29,6 +31,7 @@ class VirtualRobot:
     wobble_mm: float = 0.0
     platform_mass_kg: float = 3.0
     forearm_mass_kg: float = 1.2
+    arm_mass_kg: float = 2.0
     rotation_limit_rad: float = 0.05
 
     @property
@@ -53,9 +56,9 @@ class VirtualRobot:
         """Drive a plan; returns (measurements, truth) as frames.
 
         controller: positions (n, 3) to drive angles (n, 3), by default the nominal inverse kinematics. `measurements` fits the schema of
-        that name with the commanded positions of the plan and the angles that the controller sent; `truth` holds the exact position,
-        the platform's rotation. Noise is drawn for every row, solved or not, so that one lost
-        point does not change the others.
+        that name with the commanded positions of the plan and the angles that the controller sent; `truth` holds the exact position in
+        the tracker's frame and the platform's rotation. Noise is drawn for every row, solved or not, so that one lost point does not change
+        the others.
         """
         controller = controller or self.mechanism.inverse
         commands = plan.commands(self.mechanism)
@@ -77,31 +80,42 @@ class VirtualRobot:
         return measurements, truth
 
     def positions(self, motion, target):
-        """Platform centres (n, 3) and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
+        """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
 
-        NaN where the chains do not close near the target or the platform would turn by more than the limit.
+        NaN where the chains do not close near the target or the platform would turn by more than the limit. Displacements of effects and the
+        robot's own deviations at one place are added, which holds to first order in their angles.
         """
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
         passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
         drive = motion.theta_rad + self.drive_errors_rad + change.drive_rad
-        solution = self.geometry.solve(drive, passive, change.joint_mm)
+        geometry = self.geometry
+        geometry = replace(
+            geometry, lengths_mm=geometry.lengths_mm + change.length_mm, deviations=geometry.deviations + change.displacement
+        )
+        solution = geometry.solve(drive, passive, change.joint_mm)
         turned = np.linalg.norm(solution.rotation_rad, axis=1)
         solved = solution.converged & (turned <= self.rotation_limit_rad)
-        return np.where(solved[:, None], solution.position_mm, np.nan), turned
+        position = np.where(solved[:, None], solution.position_mm, np.nan)
+        if np.any(change.frame):
+            position = position @ Rotation.from_rotvec(change.frame[3:]).as_matrix().T + change.frame[:3]
+        return position, turned
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan driven through a controller."""
+        """What the effects may know about a plan driven through a controller; the loads are those of the nominal mechanism."""
         path, index = plan.path()
-        path_theta = controller(path)
         target = plan.targets()
-        acceleration = np.concatenate([run.acceleration_mm_s2 for run in plan.runs])
-        payload = np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs])
-        direction = singularity.leg_forces(self.mechanism, target, self.mechanism.inverse(target))
-        mass = self.platform_mass_kg + payload + 1.5 * self.forearm_mass_kg
-        # N = kg m / s^2; half of each forearm hangs on the platform
-        load = mass[:, None] * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
-        force = -np.linalg.solve(direction.transpose(0, 2, 1), load[..., None])[..., 0]
-        return Motion(controller(target), path_theta, index, force, direction)
+        return make_motion(
+            self.mechanism,
+            Masses(self.platform_mass_kg, self.forearm_mass_kg, self.arm_mass_kg),
+            target,
+            controller(target),
+            controller(path),
+            index,
+            plan.time_s(),
+            np.concatenate([run.velocity_mm_s for run in plan.runs]),
+            np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
+            np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
+        )
 
 
 def wobble(generator, count):
@@ -125,6 +139,7 @@ def from_config(mechanism, section):
         wobble_mm=section["wobble_mm"],
         platform_mass_kg=section["platform_mass_kg"],
         forearm_mass_kg=section["forearm_mass_kg"],
+        arm_mass_kg=section["arm_mass_kg"],
         rotation_limit_rad=section["rotation_limit_rad"],
     )
 

@@ -1,18 +1,22 @@
 """The virtual robot as a whole: statics by virtual work, what is reported, reproducibility."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.protocol import GRAVITY_MM_S2
+from rrru.effects.protocol import Contribution
 from rrru.effects.registry import active_effects
 from rrru.errors import ConfigError
 from rrru.mechanisms import singularity
+from rrru.mechanisms.dynamics import GRAVITY_MM_S2
 from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant import virtual_robot
 from rrru.plant.virtual_robot import VirtualRobot
+from tests.reference import rrru3_slow
 
 _ONCE = ({"reverse": False, "payload_kg": 0.0},)
 
@@ -33,6 +37,7 @@ def _section(**changes):
         "wobble_mm": 0.0,
         "platform_mass_kg": 3.0,
         "forearm_mass_kg": 1.2,
+        "arm_mass_kg": 2.0,
         "rotation_limit_rad": 0.05,
     } | changes
 
@@ -121,6 +126,50 @@ def test_clearance_moves_the_platform_down_under_its_weight():
     loose = VirtualRobot(effects=active_effects({"joint_clearance": {f"clearance{k}": 0.5 for k in (1, 2, 3)}}))
     measurements, _ = loose.run(plan, 0.0, np.random.default_rng(0))
     assert (measurements["measured_z_mm"] - measurements["command_z_mm"] > 0.0).all()
+
+
+@dataclass(frozen=True)
+class _Everything:
+    """A contribution of every kind at once."""
+
+    contribution: Contribution
+
+    def contribute(self, motion):
+        return self.contribution
+
+
+def test_every_part_of_a_contribution_reaches_the_loop_closure():
+    """Drive, length, joint, displacement and frame at once, against a general solver on 18 equations."""
+    plan, generator = _plan(x=(-600.0, -300.0)), np.random.default_rng(11)
+    target = plan.targets()
+    n = len(target)
+    change = Contribution(
+        drive_rad=generator.normal(0.0, 1e-3, (n, 3)),
+        length_mm=generator.normal(0.0, 0.3, (n, 3, 5)),
+        joint_mm=generator.normal(0.0, 0.1, (n, 3, 3)),
+        displacement=generator.normal(size=(3, 6, 6)) * np.repeat([0.3, 0.001], 3),
+        frame=np.array([3.0, -1.0, 2.0, 0.01, -0.02, 0.015]),
+    )
+    robot = VirtualRobot(errors={"dtheta2": 0.002, "dL13": 0.7, "dr": -0.5}, effects=(_Everything(change),))
+    position, _ = robot.positions(robot.motion(plan, robot.mechanism.inverse), target)
+    theta = robot.mechanism.inverse(target)
+    passive = robot.mechanism.passive_angles(target, theta)
+    lengths = np.tile([400.0, 400.0, 100.0, 800.0, 399.5], (3, 1))
+    lengths[0, 3] += 0.7
+    for k in range(0, n, 9):
+        guess = np.concatenate([passive[k].ravel(), np.zeros(3), target[k]])
+        angles = theta[k] + [0.0, 0.002, 0.0] + change.drive_rad[k]
+        pose = rrru3_slow.close(angles, lengths + change.length_mm[k], change.displacement, guess, change.joint_mm[k])
+        seen = rrru3_slow.transform(change.frame[3:], change.frame[:3]) @ pose
+        np.testing.assert_allclose(position[k], seen[:3, 3], atol=1e-7)
+
+
+def test_a_heavier_arm_loads_its_drive_only():
+    plan = _plan()
+    light, heavy = (virtual_robot.from_config(Rrru3(), _section(arm_mass_kg=mass)).motion(plan, Rrru3().inverse) for mass in (2.0, 5.0))
+    np.testing.assert_array_equal(light.force_n, heavy.force_n)
+    more = 3.0 * (GRAVITY_MM_S2 * 200.0 * np.cos(light.theta_rad) - light.theta_acceleration_rad_s2 * 400.0**2 / 3.0) / 1000.0
+    np.testing.assert_allclose(heavy.torque_nmm - light.torque_nmm, more, rtol=1e-9)
 
 
 def test_unknown_names_in_the_configuration_are_named():

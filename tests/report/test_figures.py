@@ -14,6 +14,7 @@ from matplotlib.text import Text
 from rrru.errors import ConfigError, RrruError
 from rrru.report import figures, tables
 from rrru.report.figures import FIGURES, choose, style
+from tests.report import synthetic_gap
 from tests.report import synthetic_tables as synthetic
 
 ROOT = Path(__file__).parents[2]
@@ -21,6 +22,8 @@ ROOT = Path(__file__).parents[2]
 WITHOUT_UNIT = (
     *("point", "generation", "crossover fraction $P_c$", "migration fraction $P_m$", "calibrated on", "applied to"),
     *("direction, best seen first", "error parameter", "singularity measure: 0 at a singularity, 1 at best"),
+    *("probability", "run, in the order driven", "verdict", "truth", "stated probability", "share of robots", "gap over noise, rms"),
+    *("true share closed", "predicted share closed", "effect", "trajectory"),
     "size of the weight in the unit direction (angles as arcs at the end of the drive arm)",
 )
 SMALLEST_PT = 7.0
@@ -28,7 +31,8 @@ SMALLEST_PT = 7.0
 
 @pytest.fixture(scope="module")
 def frames():
-    return synthetic.all_tables()
+    own = synthetic_gap.gap_tables(synthetic.CAMPAIGN, synthetic.commanded())
+    return synthetic.all_tables() | own | synthetic_gap.withheld_tables()
 
 
 def draw(name, frames, **options):
@@ -116,7 +120,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         ("fig12", {"calibration_spiral": "circles"}, "'circles'"),
         ("fig12", {"method": "guess"}, "'guess'"),
         ("fig06", {"sweep_calibration": "circles"}, "'circles'"),
-        *((name, {"campaign": "nowhere"}, "'nowhere'") for name in FIGURES if name not in ("fig06", "fig07")),
+        *((name, {"campaign": "nowhere"}, "'nowhere'") for name in FIGURES if name not in ("fig06", "fig07", "withheld")),
         ("fig07", {"sweep_campaign": "nowhere"}, "'nowhere'"),
     ],
 )
@@ -220,22 +224,8 @@ def test_a_sweep_without_visible_scatter_and_one_slice_are_drawn_too(frames):
     assert len(figure.axes) == 3 and len(figure.legends[0].get_texts()) == 2
 
 
-@pytest.mark.parametrize(
-    ("largest", "span", "factor"), [(8.0, 500.0, 10.0), (1.0, 500.0, 50.0), (1e3, 500.0, 1.0), (np.nan, 500.0, 500.0), (0.1, 0.0, 1.0)]
-)
-def test_magnification_is_round(largest, span, factor):
-    assert style.magnification([0.1, np.nan, -largest], span) == factor
-
-
-@pytest.mark.parametrize(
-    ("value", "text"), [(0.0471, "0.047"), (-5.031, "\N{MINUS SIGN}5.03"), (-47.11, "\N{MINUS SIGN}47.1"), (471.1, "471"), (np.nan, "–")]
-)
-def test_numbers_are_short(value, text):
-    assert style.number(value) == text
-
-
 def test_the_registry_names_tables_that_exist():
-    known = set(tables.TABLES) | {"paths", "workspace"}
+    known = set(tables.TABLES) | {"paths"}
     for name, (function, needed, caption) in FIGURES.items():
         assert function.__name__ == name and set(needed) <= known and caption.endswith(".")
 

@@ -1,5 +1,6 @@
 import hashlib
 import json
+from pathlib import Path
 
 from rrru.report.digest import code_digest
 from rrru.report.figures import FIGURES
@@ -21,10 +22,23 @@ CAMPAIGN_TABLES = [
     "genetic_against_least_squares",
 ]
 SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
+GAP_TABLES = [
+    "gap_verdicts",
+    "gap_locate",
+    "gap_identifiability",
+    "gap_attribute",
+    "gap_sets",
+    "gap_shrink",
+    "gap_parameters",
+    "gap_next_runs",
+]
 STUDY_TABLES = [*CAMPAIGN_TABLES, *SWEEP_TABLES, "published", "audit"]
 
 # figures that every campaign gets; the others show the reproduced study
 CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]
+
+# figures of the gap diagnosis and of its check, which have rules of their own
+GAP_FIGURES = ["gap", "withheld"]
 
 # rooms of the package that a stage's results depend on
 TABLE_ROOMS = ("report/tables", "report/schemas")
@@ -70,6 +84,30 @@ def campaign_file(wildcards):
 def campaign_settings(wildcards):
     """The campaign's own section of the configuration."""
     return json.dumps(config["campaigns"][wildcards.campaign], sort_keys=True)
+
+
+def campaign_robot(wildcards):
+    """Name and dimensions of the robot that a campaign was measured on."""
+    name = config["campaigns"][wildcards.campaign]["robot"]
+    return {"name": name, **config["robots"].get(name, {})}
+
+
+def campaign_noise(wildcards):
+    """The campaign's stated noise per axis in mm, None where it is to be estimated."""
+    return config["campaigns"][wildcards.campaign].get("noise_mm") or None
+
+
+def campaign_masses(wildcards):
+    """Masses in kg, the platform's own where the campaign states it."""
+    loads = config["loads"]
+    platform = config["campaigns"][wildcards.campaign].get("platform_mass_kg", loads["platform_mass_kg"])
+    return {"platform_kg": platform, "forearm_kg": loads["forearm_mass_kg"], "arm_kg": loads["arm_mass_kg"]}
+
+
+def own_effects_digest():
+    """Digest of the files that hold the user's own effects, so that editing one reruns what it changes."""
+    files = [f"{name.partition(':')[0].replace('.', '/')}.py" for name in config["gap"]["own_effects"]]
+    return [hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12] for file in files if Path(file).exists()]
 
 
 def figure_campaign(wildcards):

@@ -48,7 +48,7 @@ rule figure:
     log:
         f"{RESULTS}/logs/figures/{{figure}}.log",
     wildcard_constraints:
-        figure="|".join(FIGURES),
+        figure="|".join(set(FIGURES) - {"gap"}),
     params:
         figures=["{figure}"],
         options=figure_options,
@@ -80,7 +80,7 @@ rule campaign_figures:
 
 rule figures:
     input:
-        expand(f"{RESULTS}/figures/{{figure}}.png", figure=sorted(FIGURES)),
+        expand(f"{RESULTS}/figures/{{figure}}.png", figure=sorted(set(FIGURES) - set(GAP_FIGURES))),
         expand(
             f"{RESULTS}/figures/{{campaign}}/{{figure}}.png",
             campaign=[name for name in CAMPAIGNS if name != config["reproduce"]["campaign"]],

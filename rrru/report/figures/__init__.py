@@ -7,10 +7,11 @@ campaign, calibration_lines, calibration_spiral: whose errors are drawn, and und
 tables errors and error_summary; where a campaign was never driven again, mode "model" stands in. sweep_campaign, sweep_calibration: whose
 optimum the sweeps are compared with.
 
-The table `paths` is the measurements table of the options' campaign. A function raises ConfigError naming what is not there.
+The tables `paths` (its measurements), `workspace` and `gap_points` are the campaign's own parts.
+A function raises ConfigError naming what is not there.
 """
 
-from rrru.report.figures import convergence, cross, lines, observability, spiral, sweep, workspace
+from rrru.report.figures import convergence, cross, gap, lines, observability, spiral, sweep, withheld, workspace
 
 _SWEEP_TABLES = ("sweep_runs", "sweep_effect", "sweep_pairs", "calibrations", "published")
 _SWEEP_CAPTION = (
@@ -72,5 +73,20 @@ FIGURES = {
         cross.cross,
         ("error_summary",),
         "Every calibration applied to every trajectory: (a) mean and (b) largest position error. The first row is before any calibration.",
+    ),
+    "gap": (
+        gap.gap,
+        ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_points"),
+        "The gap between the calibrated sim and the measurement. (a) Where: measured minus calibrated sim at the points from above and from "
+        "the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour. (c) How far it shrinks: gap on "
+        "runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d) Residual of every point.",
+    ),
+    "withheld": (
+        withheld.withheld,
+        ("withheld_scores", "withheld_confusion"),
+        "The diagnosis where the answer was withheld. Confusion tables: counts, shaded by their share of the row, right answers framed; of the "
+        "effect check, the row is the effect that was taken out of the library. Unexplained counts alone or beside a name. Then the share of "
+        "right verdicts against the stated probability and against the gap over the noise, beside a test that knows the true law (1 % "
+        "false alarms), with 95 % intervals, and the share of the gap closed as predicted and in truth.",
     ),
 }

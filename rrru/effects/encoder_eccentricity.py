@@ -1,0 +1,42 @@
+"""Encoder eccentricity: the encoder's disc sits off the shaft's centre, so that its reading errs once per turn of the drive arm.
+
+A disc of grating radius rho whose centre lies at a distance e from the shaft's axis is read at the arc rho theta + e sin(theta + p), where p is
+the direction in which the centre lies off. One reading head therefore sees an angle that errs by e / rho at most. The drive stands where its
+encoder reads the command, so that the arm errs by
+
+    dtheta_i = a_i sin(theta_i + p_i),    a_i = e_i / rho
+
+It enters at the drive angle, three times two numbers. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it is linear:
+
+    dtheta_i = s_i sin(theta_i) + c_i cos(theta_i)
+
+Assumptions: one reading head per encoder (two opposite heads cancel it), the encoder on the arm's own axis (behind a gear the error is that of
+`transmission_error`), higher harmonics small; the commanded angle stands for the true one, an error of second order. Over the part of a
+turn that an arm swings through, a constant drive error imitates most of the cosine; only the curvature tells them apart.
+
+Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 2010, on optical encoders. The size is assumed: 10 um off
+at a grating radius of 20 mm make 5e-4 rad.
+"""
+
+from dataclasses import dataclass
+
+from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
+from rrru.effects.protocol import Contribution, Coordinates
+from rrru.parameters import ParameterSet
+
+_PARAMETERS = ParameterSet(harmonic_parameters("eccentricity over grating radius; up to some arc minutes, assumed"))
+_COORDINATES = harmonic_coordinates(_PARAMETERS, 3e-4)
+
+
+@dataclass(frozen=True)
+class EncoderEccentricity:
+    """Once-per-turn sine in the drive angle, amplitude and phase per leg."""
+
+    name: str = "encoder_eccentricity"
+    parameters: ParameterSet = _PARAMETERS
+    coordinates: Coordinates = _COORDINATES
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Changes (n, 3) of the drive angles under amplitudes (3,) and phases (3,) in rad."""
+        return Contribution(drive_rad=harmonic(motion.theta_rad, 1.0, values))

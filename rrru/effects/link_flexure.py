@@ -1,0 +1,53 @@
+"""Link flexure: a forearm gives way along its length to the force that it carries.
+
+Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive, `rrru.mechanisms.dynamics.loads`). With
+its end fittings and U-joint it is a spring of compliance k_i; compression shortens it:
+
+    dL3_i = -k_i f_i
+
+It enters at the length L3, one compliance per leg, and is linear in k. The platform follows its load: it sinks under its weight, and further in
+proportion to a payload, which tells it from errors of the lengths; `drive_compliance` does so too, but with the drive's torque, so
+that the pattern over the workspace differs.
+
+Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the leg is one two-force
+member from elbow to U-joint (`rrru.mechanisms.dynamics.held_force`). Both are tried; `held` is 0 or 1, or a share between.
+
+Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads are those at the
+commanded pose.
+
+Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain aluminium tube
+of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here are assumed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.parameters import Parameter, ParameterSet
+
+_FOREARM = 3
+_PARAMETERS = ParameterSet(
+    (
+        *(Parameter(f"flexure{k}", "mm/N", 0.0, 0.0, 0.1, "axial spring of forearm and its joints, size assumed") for k in LEGS),
+        Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
+    )
+)
+_COORDINATES = plain_coordinates(_PARAMETERS, 2e-3, ({"held": 0.0}, {"held": 1.0}))
+
+
+@dataclass(frozen=True)
+class LinkFlexure:
+    """Forearms that shorten under compression, compliance per leg."""
+
+    name: str = "link_flexure"
+    parameters: ParameterSet = _PARAMETERS
+    coordinates: Coordinates = _COORDINATES
+    needs: tuple = ("force_n",)
+
+    def contribute(self, motion, values):
+        """Changes (n, 3, 5) of the lengths under compliances (3,) in mm/N and the share to which joint 3 is held."""
+        force = motion.force_n + values[3] * (motion.held_force_n - motion.force_n)
+        length = np.zeros((len(motion), 3, 5))
+        length[..., _FOREARM] = -np.asarray(values[:3], dtype=float) * force
+        return Contribution(length_mm=length)

@@ -1,0 +1,85 @@
+"""Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rrru.calibrate.least_squares import least_squares
+from rrru.calibrate.residuals import Residuals
+from rrru.campaign import measurements as rows
+from rrru.errors import FitError
+from rrru.gap.case import State
+from rrru.gap.evidence import Evidence
+from rrru.gap.noise import estimate_noise, spoilt
+from rrru.gap.posterior import posterior
+from rrru.gap.refine import refine
+from rrru.gap.search import search
+
+_MOST_ROUNDS, _MOST_CLEANINGS = 4, 2
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What the search has found.
+
+    calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the covariance (k, k) of its
+    terms' coefficients; evidence: on the last linearisation, about that state; posterior over all hypotheses; hypothesis, level: the best
+    one and its discrepancy level; noise_from: "given", "repeats" or "high_frequency"; dropped: number of points left out as spoilt.
+    """
+
+    case: object
+    calibrated: State
+    state: State
+    covariance: np.ndarray
+    evidence: Evidence
+    posterior: object
+    hypothesis: object
+    level: int
+    noise_from: str
+    dropped: int
+
+
+def calibrate(case):
+    """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
+    frame = case.measurements.iloc[np.flatnonzero(case.used)]
+    fit = least_squares(Residuals(case.mechanism, rows.theta(frame), rows.measured(frame), rows.command(frame)))
+    return State(fit.errors, {})
+
+
+def attribute(case, prior, noise_from="given"):
+    """Attribution of a case; its noise is estimated first where noise_from is not "given"."""
+    total = len(case)
+    for cleaning in range(_MOST_CLEANINGS + 1):
+        calibrated = calibrate(case)
+        if noise_from != "given":
+            noise, noise_from = estimate_noise(case, case.linearise(calibrated))
+            case = replace(case, noise_mm=noise)
+        found = _rounds(case, calibrated, prior)
+        state = found[0]
+        bad = spoilt(case, case.measured_mm - (case.exact(state) if state.effects else case.sim(state.errors)[case.used]))
+        if cleaning == _MOST_CLEANINGS or not bad.any():
+            break
+        case = case.without(bad)
+    state, covariance, evidence, beliefs, hypothesis, level = found
+    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, noise_from, total - len(case))
+
+
+def _rounds(case, calibrated, prior):
+    """Search and refinement in turn until the best hypothesis repeats itself."""
+    state, covariance, last = calibrated, np.zeros((0, 0)), None
+    evidence = Evidence(case.library, case.linearise(state), case.run, case.noise_mm)
+    for _ in range(_MOST_ROUNDS):
+        beliefs = posterior(evidence, search(evidence), prior)
+        hypothesis, level = beliefs.best()
+        if not hypothesis.terms:
+            return calibrated, np.zeros((0, 0)), evidence, beliefs, hypothesis, level
+        if last is not None and last == frozenset(hypothesis.terms):
+            break
+        last = frozenset(hypothesis.terms)
+        try:
+            state, covariance = refine(case, state, hypothesis, level)
+            evidence = Evidence(case.library, case.linearise(state), case.run, case.noise_mm)
+        except FitError:
+            # the sim cannot follow: what the last linearisation says stands
+            break
+    return state, covariance, evidence, beliefs, hypothesis, level

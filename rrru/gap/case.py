@@ -1,0 +1,210 @@
+"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, and the exact corrected sim.
+
+The sim with effects is the full spatial closure of the plant; a hypothesis is fitted on its linearisation, renewed about the best one found.
+Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.effects.protocol import Contribution
+from rrru.errors import FitError
+from rrru.gap.motion import motion_of
+from rrru.mechanisms.first_order import FirstOrder
+from rrru.plant.spatial import SpatialGeometry
+
+
+# smooth functions of the pose may bend a law's signature by this much each; a shape's parameter may be off by this share
+_BEND, _SHAPE_STEP = 0.03, 0.3
+
+
+@dataclass(frozen=True)
+class State:
+    """A corrected sim: errors (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted further, by name."""
+
+    errors: np.ndarray
+    effects: dict
+    shapes: dict = field(default_factory=dict)
+
+    def shape(self, library, key):
+        """Values of the shape's parameters of one effect (name, shape) by name."""
+        name, number = key
+        return (
+            self.shapes.get(name, library[name].coordinates.shapes[number])
+            if key in self.effects
+            else library[name].coordinates.shapes[number]
+        )
+
+    def values(self, library):
+        """Parameter values (p,) by effect name."""
+        return {key[0]: library[key[0]].coordinates.to_values(value, self.shape(library, key)) for key, value in self.effects.items()}
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The sim linearised about a state.
+
+    data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the mechanism's errors;
+    columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect of the state to what its law may be wrong by,
+    (n, 3, q), each column one standard deviation; reshaped: effect to the shape's parameters that the last of these columns step, each
+    (name, value, stepped value); drive (n, 3 axes, 3): derivative by the drive angles.
+    """
+
+    data: np.ndarray
+    base: np.ndarray
+    columns: dict
+    laws: dict
+    reshaped: dict
+    drive: np.ndarray
+
+
+@dataclass(frozen=True)
+class Case:
+    """Points of a campaign, all m of them, of which the n used ones are fitted.
+
+    library: effects by name that the campaign can test; untestable: name to the reason for the others.
+    """
+
+    mechanism: object
+    measurements: object
+    motion: object
+    used: np.ndarray
+    library: dict
+    untestable: dict
+    noise_mm: float
+
+    def __len__(self):
+        return int(self.used.sum())
+
+    @property
+    def measured_mm(self):
+        """Measured positions (n, 3)."""
+        return rows.measured(self.measurements)[self.used]
+
+    @property
+    def run(self):
+        """Run numbers (n,)."""
+        return self.measurements["run"].to_numpy()[self.used]
+
+    def without(self, dropped):
+        """The case without the used points flagged in (n,)."""
+        used = self.used.copy()
+        used[np.flatnonzero(used)[dropped]] = False
+        return replace(self, used=used)
+
+    def sim(self, errors):
+        """Positions (m, 3) of the calibrated sim without effects."""
+        return self.mechanism.forward(rows.theta(self.measurements), errors, rows.command(self.measurements))
+
+    def contribution(self, state):
+        """What the state's effects change along the motion, together."""
+        values = state.values(self.library)
+        return sum((self.library[name].contribute(self.motion, values[name]) for name in values), Contribution())
+
+    def exact(self, state):
+        """Positions (n, 3) of the sim corrected by a state: the full spatial closure with its effects."""
+        change = self.contribution(state)
+        command, robot = rows.command(self.measurements), self.mechanism
+        legs = robot.legs(state.errors)
+        radial = np.full((3, 1), robot.R_mm)
+        lengths = np.concatenate([radial, legs[:, 1:4], radial + legs[:, 4:]], axis=1)
+        geometry = SpatialGeometry(np.array(robot.azimuth_rad), lengths + change.length_mm, np.zeros((3, 6, 6)) + change.displacement)
+        drive = rows.theta(self.measurements) + legs[:, 0] + change.drive_rad
+        passive = robot.passive_angles(command, robot.inverse(command))
+        position = geometry.solve(drive, passive, change.joint_mm).position_mm
+        frame = np.zeros(6) + change.frame
+        return (position @ Rotation.from_rotvec(frame[3:]).as_matrix().T + frame[:3])[self.used]
+
+    def linearise(self, state, shapes=None):
+        """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
+
+        shapes: (effect, shape) pairs to make columns for, by default all.
+        """
+        theta = rows.theta(self.measurements)
+        position = self.sim(state.errors)
+        first_order = FirstOrder(self.mechanism, position, theta, state.errors)
+        model = self.exact(state) if state.effects else position[self.used]
+        if not np.isfinite(model).all():
+            raise FitError(f"the corrected sim has no pose at {int((~np.isfinite(model).all(axis=1)).sum())} points")
+        if shapes is None:
+            shapes = [(name, shape) for name, effect in self.library.items() for shape in range(len(effect.coordinates.shapes))]
+        columns = {key: self._columns(first_order, key, state) for key in dict.fromkeys((*shapes, *state.effects))}
+        laws, reshaped = {}, {}
+        for key in state.effects:
+            laws[key[0]], reshaped[key[0]] = self._laws(first_order, key, state)
+        data = self.measured_mm - model
+        for key, coordinates in state.effects.items():
+            data = data + columns[key] @ coordinates
+        return Linear(
+            data,
+            self.mechanism.error_jacobian(position, theta, state.errors)[self.used],
+            columns,
+            laws,
+            reshaped,
+            (first_order.response[..., 0] * first_order.drive[:, None, :])[self.used],
+        )
+
+    def _laws(self, first_order, key, state):
+        """What the law of an effect of the state may be wrong by, (n, 3, q), and the steps of its shape's parameters; see Linear."""
+        coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
+        shape = state.shape(self.library, key)
+        leg = first_order.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
+        columns, steps = [_BEND * column for column in self._bent(first_order, leg)], []
+        for name, value in shape.items():
+            high = effect.parameters[name].high
+            stepped = value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
+            if stepped != value:
+                other = effect.contribute(self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped}))
+                columns.append(np.einsum("nalc,nlc->na", first_order.response, first_order.leg_errors(other) - leg)[self.used])
+                steps.append((name, value, stepped))
+        return np.stack(columns, axis=-1), tuple(steps)
+
+    def _bent(self, first_order, leg):
+        """Leg errors (m, 3, 2) times smooth functions of the pose in each leg, as moves: a list of (n, 3)."""
+        cx, cy = self.mechanism.turn
+        x, y, z = ((p - p.mean()) / max(np.ptp(p) / 2.0, 1.0) for p in first_order.position_mm[self.used].T)
+        radial, tangential = x[:, None] * cx + y[:, None] * cy, y[:, None] * cx - x[:, None] * cy
+        bends = (radial, tangential, np.repeat(z[:, None], 3, axis=1), radial**2, tangential**2, radial * tangential)
+        response, leg = first_order.response[self.used], leg[self.used]
+        return [np.einsum("nalc,nlc->na", response, bend[..., None] * leg) for bend in bends]
+
+    def _columns(self, first_order, key, state):
+        """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
+        effect, active = self.library[key[0]], state.effects.get(key)
+        shape = state.shape(self.library, key)
+        coordinates = effect.coordinates
+        step = np.array(coordinates.typical)
+        if active is not None:
+            step = np.where(np.abs(active) > 1e-3 * step, active, step)
+        result = np.empty((len(self), 3, len(coordinates)))
+        for k in range(len(coordinates)):
+            one = np.zeros(len(coordinates))
+            one[k] = step[k]
+            values = coordinates.to_values(one, shape)
+            result[..., k] = first_order.move(effect.contribute(self.motion, values))[self.used] / step[k]
+        return result
+
+
+def starts_of_runs(measurements):
+    """Rows (m,) that begin a run: what lies in the drives' play there depends on how the robot arrived, which no column tells."""
+    run = measurements["run"].to_numpy()
+    return np.concatenate([[True], np.diff(run) != 0])
+
+
+def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True):
+    """The case of a measurement table; effects whose needs the motion does not meet are set aside with the reason."""
+    motion = motion_of(measurements, mechanism, masses)
+    used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
+    used &= ~starts_of_runs(measurements)
+    used &= np.isfinite(mechanism.forward(rows.theta(measurements), guess_mm=rows.command(measurements))).all(axis=1)
+    testable, untestable = {}, {}
+    for name, effect in library.items():
+        missing = [need for need in effect.needs if not np.isfinite(getattr(motion, need)[used]).all()]
+        if missing:
+            untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
+        else:
+            testable[name] = effect
+    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm))

@@ -1,0 +1,124 @@
+"""Where the gap lies: its variance split over trajectory, region, direction, leg, sense of motion, speed, payload and time."""
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+from scipy.stats import chi2
+
+from rrru.gap.heldout import resampled_rows
+
+# the worst spot is the middle of the neighbours with the largest mean square; regions are cells of the points' box
+_NEIGHBOURS, _CELLS = 9, (3, 3, 2)
+_MOST_LEVELS = 12
+
+
+def locate(case, residual_mm, drive, generator, draws=200):
+    """Rows of `gap_locate` without the campaign.
+
+    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the drive angles. Shares are of the
+    mean square with the noise taken off; their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
+    """
+    frame = case.measurements.iloc[np.flatnonzero(case.used)].reset_index(drop=True)
+    squares = (residual_mm**2).sum(axis=1)
+    variance = case.noise_mm**2
+    resampled = resampled_rows(case.run, generator, draws)
+    rows = []
+    for name, levels in _levels(case, frame).items():
+        factor = name.split()[0]
+        for level in pd.unique(levels[levels != ""]):
+            here = levels == level
+            rows.append(
+                _row(factor, level, np.where(here, squares, 0.0), squares, 3.0 * here, np.full(len(here), 3.0), variance, resampled)
+            )
+            if factor == "region":
+                centre = case.motion.position_mm[case.used][here].mean(axis=0)
+                rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
+    for k, axis in enumerate("xyz"):
+        rows.append(
+            _row("direction", axis, residual_mm[:, k] ** 2, squares, np.ones(len(squares)), np.full(len(squares), 3.0), variance, resampled)
+        )
+    rows.extend(_leg_rows(case, residual_mm, drive, resampled))
+    columns = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_high", "share_of_noise", "noise_could")
+    return pd.DataFrame(rows).reindex(columns=[*columns, "drive_rms_rad", "x_mm", "y_mm", "z_mm"])
+
+
+def worst_spot(position_mm, residual_mm):
+    """Point (3,) of the n points around which the residual's mean square over its neighbours is largest."""
+    count = min(_NEIGHBOURS, len(position_mm))
+    _, near = cKDTree(position_mm).query(position_mm, k=count)
+    squares = (residual_mm**2).sum(axis=1)
+    return position_mm[int(squares[near.reshape(len(position_mm), count)].mean(axis=1).argmax())]
+
+
+def drive_errors(residual_mm, drive):
+    """Drive-angle errors (n, 3) in rad that would make the residuals (n, 3)."""
+    return np.linalg.solve(drive, residual_mm[..., None])[..., 0]
+
+
+def _row(factor, level, part, whole, part_freedom, whole_freedom, variance, resampled):
+    """One row: share of `part` (n,) in `whole` (n,), both sums of squares with their numbers of components (n,) of a variance."""
+    excess, total = part - part_freedom * variance, whole - whole_freedom * variance
+    drawn_total = total[resampled].sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        drawn = np.where(drawn_total > 0.0, excess[resampled].sum(axis=1) / drawn_total, 0.0)
+    share = excess.sum() / total.sum() if total.sum() > 0.0 else 0.0
+    low, high = np.quantile(np.clip(drawn, 0.0, 1.0), [0.025, 0.975])
+    share = float(np.clip(share, 0.0, 1.0))
+    freedom = part_freedom.sum()
+    count = int((part_freedom > 0.0).sum())
+    return {
+        "factor": factor,
+        "level": str(level),
+        "points": count,
+        "rms_mm": float(np.sqrt(part.sum() / max(count, 1))),
+        "share": share,
+        "share_low": float(min(low, share)),
+        "share_high": float(max(high, share)),
+        "share_of_noise": float(freedom / whole_freedom.sum()),
+        "noise_could": bool(part.sum() / variance < chi2.ppf(0.95, freedom)),
+    }
+
+
+def _levels(case, frame):
+    """Level (n,) of each point by factor; an empty text where it is unknown."""
+    position, rate = case.motion.position_mm[case.used], case.motion.theta_rate_rad_s[case.used]
+    result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
+    for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
+        values = frame[column].to_numpy(dtype=float)
+        if len(pd.unique(values[np.isfinite(values)])) <= _MOST_LEVELS:
+            result[name] = np.array([f"{v:g} {unit}" if np.isfinite(v) else "" for v in values], dtype=object)
+    time = frame["time_s"].to_numpy(dtype=float)
+    if np.isfinite(time).any():
+        edges = np.nanquantile(time, [0.25, 0.5, 0.75])
+        quarter = np.searchsorted(edges, time, side="right") + 1
+        result["time"] = np.array([f"quarter {q}" if np.isfinite(t) else "" for q, t in zip(quarter, time, strict=True)], dtype=object)
+    if np.isfinite(rate).any():
+        for leg in range(3):
+            sense = np.where(rate[:, leg] > 1e-6, "down", np.where(rate[:, leg] < -1e-6, "up", "at rest"))
+            result[f"motion_direction {leg + 1}"] = np.array(
+                [f"leg {leg + 1} {s}" if np.isfinite(r) else "" for s, r in zip(sense, rate[:, leg], strict=True)], dtype=object
+            )
+    return result
+
+
+def _cells(position):
+    """Name (n,) of the cell of the points' box that each point lies in."""
+    low, size = position.min(axis=0), np.maximum(np.ptp(position, axis=0), 1e-9)
+    index = np.minimum((position - low) / size * _CELLS, np.array(_CELLS) - 1).astype(int)
+    return np.array([f"x{i + 1} y{j + 1} z{k + 1}" for i, j, k in index], dtype=object)
+
+
+def _leg_rows(case, residual_mm, drive, resampled):
+    """Rows of the factor leg: shares of the squared drive-angle errors."""
+    errors = drive_errors(residual_mm, drive)
+    inverse = np.linalg.inv(drive)
+    noise = case.noise_mm**2 * (inverse**2).sum(axis=-1)
+    rows = []
+    for leg in range(3):
+        # in units of each angle's own noise, so that poses of a large Jacobian do not drown the others
+        scaled = errors**2 / noise
+        ones = np.ones(len(scaled))
+        row = _row("leg", f"leg {leg + 1}", scaled[:, leg], scaled.sum(axis=1), ones, 3.0 * ones, 1.0, resampled)
+        moved = np.linalg.norm(drive[:, :, leg] * errors[:, leg, None], axis=1)
+        rows.append(row | {"rms_mm": float(np.sqrt((moved**2).mean())), "drive_rms_rad": float(np.sqrt((errors[:, leg] ** 2).mean()))})
+    return rows

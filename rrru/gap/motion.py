@@ -1,0 +1,77 @@
+"""The motion behind a measurement table, as far as its columns tell: what the effects' laws are evaluated on. Lengths mm, angles rad."""
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rrru.campaign import measurements as rows
+from rrru.effects.motion import make_motion
+
+# points of the path between two commanded ones, and along a transfer between runs
+_STEPS, _TRANSFER_STEPS = 8, 30
+
+
+def motion_of(measurements, mechanism, masses):
+    """Motion at the n rows of a measurement table, all of them in the order driven.
+
+    # ASSUME the robot passes smoothly through a run's commanded points, rests at both ends of it, and goes straight to the next run.
+    Speeds and accelerations come from the times; where a run has no increasing times they are NaN.
+    """
+    position, theta = rows.command(measurements), rows.theta(measurements)
+    run = measurements["run"].to_numpy()
+    time = measurements["time_s"].to_numpy(dtype=float)
+    velocity, acceleration = np.full_like(position, np.nan), np.full_like(position, np.nan)
+    pieces, index, length, last = [], [], 0, None
+    for first, end in _runs(run):
+        points = position[first:end]
+        velocity[first:end], acceleration[first:end] = _derivatives(points, time[first:end])
+        path, at = _path(points)
+        if last is not None:
+            transfer = last + np.linspace(0.0, 1.0, _TRANSFER_STEPS)[1:-1, None] * (points[0] - last)
+            pieces.append(transfer)
+            length += len(transfer)
+        pieces.append(path)
+        index.append(length + at)
+        length += len(path)
+        last = points[-1]
+    path_theta = _known(mechanism.inverse(np.concatenate(pieces)))
+    index = np.concatenate(index)
+    # the file's own angles stand where it has them
+    path_theta[index] = theta
+    payload = measurements["payload_kg"].to_numpy(dtype=float)
+    return make_motion(mechanism, masses, position, theta, path_theta, index, time, velocity, acceleration, payload)
+
+
+def _runs(run):
+    """(first row, row after the last) of every stretch of one run."""
+    edges = np.flatnonzero(np.diff(run)) + 1
+    return list(zip([0, *edges], [*edges, len(run)], strict=True))
+
+
+def _derivatives(points, time):
+    """Velocity and acceleration (k, 3) along the points of one run, at rest at both ends; NaN without increasing times."""
+    nothing = np.full_like(points, np.nan)
+    if len(points) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
+        return nothing, nothing
+    spline = CubicSpline(time, points, bc_type="clamped")
+    acceleration = spline(time, 2)
+    acceleration[[0, -1]] = 0.0
+    return spline(time, 1), acceleration
+
+
+def _path(points):
+    """Points (N, 3) of a smooth path through the points (k, 3) of one run and the rows (k,) of these in it."""
+    at = np.arange(len(points)) * _STEPS
+    fine = np.arange(at[-1] + 1)
+    if len(points) < 3:
+        return np.stack([np.interp(fine, at, points[:, k]) for k in range(3)], axis=1), at
+    return CubicSpline(at, points)(fine), at
+
+
+def _known(theta):
+    """The angles (N, 3) with those of unreachable points taken from the last reachable one before."""
+    bad = ~np.isfinite(theta).all(axis=1)
+    if bad.any():
+        good = np.flatnonzero(~bad)
+        nearest = good[np.maximum(np.searchsorted(good, np.arange(len(theta)), side="right") - 1, 0)]
+        theta = theta[nearest]
+    return theta

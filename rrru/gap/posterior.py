@@ -1,0 +1,117 @@
+"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of something that no effect explains."""
+
+from dataclasses import dataclass
+from math import comb
+
+import numpy as np
+from scipy.special import logsumexp
+
+from rrru.gap.evidence import LEVELS
+from rrru.gap.terms import EACH, SAME, variants
+
+# hypotheses further below the best than this carry nothing
+_NEGLIGIBLE = 25.0
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
+
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own inaccuracy.
+    """
+
+    counts: tuple = (0.3, 0.45, 0.22, 0.03)
+    unexplained: float = 0.1
+    tolerance: float = 0.1
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Hypotheses with weights (h, levels) that sum to one, and which of these levels count as unexplained (h, levels)."""
+
+    hypotheses: tuple
+    weights: np.ndarray
+    unexplained: np.ndarray
+
+    def best(self):
+        """The hypothesis of highest weight and its level (an index)."""
+        row, level = np.unravel_index(self.weights.argmax(), self.weights.shape)
+        return self.hypotheses[row], int(level)
+
+    def sets(self):
+        """Probability by (frozenset of effects, unexplained), highest first."""
+        result = {}
+        for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
+            for flag in (False, True):
+                key = (hypothesis.effects, flag)
+                result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
+        return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
+
+    def marginal(self, effect):
+        """Probability that an effect acts."""
+        has = np.array([effect in h.effects for h in self.hypotheses])
+        return float(self.weights[has].sum())
+
+    def legs(self, effect, within=None):
+        """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts (and that the set of effects is `within`)."""
+        result = {}
+        for hypothesis, weight in zip(self.hypotheses, self.weights, strict=True):
+            if within is None or hypothesis.effects == within:
+                for term in hypothesis.terms:
+                    if term.effect == effect:
+                        result[term.legs] = result.get(term.legs, 0.0) + float(weight.sum())
+        total = sum(result.values())
+        return {legs: p / total for legs, p in result.items()} if total > 0.0 else {}
+
+    def best_of(self, effects, unexplained=None):
+        """The hypothesis of highest weight with exactly these effects, and its level; None where there is none."""
+        rows = [k for k, h in enumerate(self.hypotheses) if h.effects == effects]
+        if not rows:
+            return None
+        weights = self.weights[rows]
+        if unexplained is not None:
+            weights = np.where(self.unexplained[rows] == unexplained, weights, -1.0)
+        row, level = np.unravel_index(weights.argmax(), weights.shape)
+        return self.hypotheses[rows[row]], int(level)
+
+
+def posterior(evidence, hypotheses, prior):
+    """Posterior of the hypotheses that `rrru.gap.search.search` has found."""
+    library = evidence.library
+    log_weight = np.array([h.evidence + _log_prior_terms(library, h.terms, prior) for h in hypotheses])
+    # single effects stay, however improbable: tables show what each does alone
+    worth = (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE) | np.array([len(h.terms) <= 1 for h in hypotheses])
+    kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
+    log_weight = log_weight[worth]
+    unexplained = np.zeros(log_weight.shape, dtype=bool)
+    for row, hypothesis in enumerate(kept):
+        tolerated = prior.tolerance * evidence.explained(hypothesis)
+        unexplained[row] = tolerated < LEVELS
+        log_weight[row] += _log_prior_levels(unexplained[row], prior)
+    return Posterior(kept, np.exp(log_weight - logsumexp(log_weight)), unexplained)
+
+
+def _log_prior_terms(library, terms, prior):
+    """Logarithm of the prior probability of a set of terms, alike for all sets of one size."""
+    size = len(terms)
+    total = np.log(prior.counts[size]) - np.log(comb(len(library), size))
+    for term in terms:
+        choices = variants(library[term.effect])
+        kinds = {c.legs if isinstance(c.legs, str) else "one" for c in choices}
+        total -= np.log(len(kinds)) + np.log(len(library[term.effect].coordinates.shapes))
+        if term.legs not in (EACH, SAME):
+            total -= np.log(3.0)
+    return total
+
+
+def _log_prior_levels(unexplained, prior):
+    """Logarithm of the prior (levels,) of the discrepancy's level: half of what is not unexplained is none at all."""
+    result = np.empty(len(unexplained))
+    within = ~unexplained
+    spare = within.sum() - 1
+    result[within] = np.log((1.0 - prior.unexplained) * (0.5 / spare if spare else 1.0))
+    if spare:
+        result[0] = np.log((1.0 - prior.unexplained) * 0.5)
+    if unexplained.any():
+        result[unexplained] = np.log(prior.unexplained / unexplained.sum())
+    return result

@@ -1,0 +1,48 @@
+"""The hypotheses of the diagnosis: sets of terms, a term being one effect in one shape on certain legs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# on which legs a law acts: on each with its own value, on all with one value, or on one leg alone
+EACH, SAME = "each", "same"
+
+
+@dataclass(frozen=True)
+class Term:
+    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg that it acts on."""
+
+    effect: str
+    shape: int = 0
+    legs: str | int = EACH
+
+    @property
+    def leg(self):
+        """The one leg, or 0."""
+        return self.legs if isinstance(self.legs, int) else 0
+
+
+def spread(coordinates, legs):
+    """Matrix (c, k) from the k free numbers of a term to the effect's coordinates."""
+    every = np.eye(len(coordinates))
+    if legs == EACH:
+        return every
+    if legs == SAME:
+        # coordinates of one kind come in the order of the legs
+        return np.stack([every[:, coordinates.legs == leg] for leg in (1, 2, 3)]).sum(axis=0)
+    return every[:, coordinates.legs == legs]
+
+
+def per_leg(effect):
+    """Whether every coordinate of an effect belongs to one leg, and every leg has some."""
+    return set(effect.coordinates.legs.tolist()) == {1, 2, 3}
+
+
+def variants(effect):
+    """All terms of an effect: each shape with each choice of legs that makes a difference.
+
+    One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed errors of an assembly.
+    """
+    coordinates, legs = effect.coordinates, per_leg(effect)
+    choices = (EACH, *((SAME,) if legs and coordinates.positive.all() else ()), *((1, 2, 3) if legs else ()))
+    return tuple(Term(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)

@@ -1,0 +1,40 @@
+"""Virtual robots with one effect each, driven along the same lines: what the tests of the effects share."""
+
+import numpy as np
+
+from rrru.campaign.plan import make_plan
+from rrru.campaign.trajectories import Line, Spiral
+from rrru.effects.registry import active_effects
+from rrru.mechanisms.rrru3 import Rrru3
+from rrru.plant.virtual_robot import VirtualRobot
+
+ROBOT = Rrru3()
+LINE = Line("line", (-450.0, -100.0, 600.0), (350.0, 150.0, 700.0), 60)
+SPIRAL = Spiral("spiral", (0.0, 0.0), (50.0, 300.0), (560.0, 760.0), 4.0, 60)
+FORWARD = {"reverse": False, "payload_kg": 0.0}
+REVERSE = FORWARD | {"reverse": True}
+LOADED = FORWARD | {"payload_kg": 5.0}
+
+
+def plan_of(*passes, trajectories=(LINE,)):
+    """Plan of passes at 80 mm/s and 40 mm/s^2, a minute of rest between the runs."""
+    return make_plan(trajectories, passes, 80.0, 40.0, 60.0)
+
+
+def drive(effects, plan, **options):
+    """Motion, true positions (n, 3) without noise, and the platform's rotation (n,) under {effect: {parameter: value}}."""
+    robot = VirtualRobot(effects=active_effects(effects), **options)
+    motion = robot.motion(plan, ROBOT.inverse)
+    position, turned = robot.positions(motion, plan.targets())
+    assert np.isfinite(position).all()
+    return motion, position, turned
+
+
+def drive_error(motion, position):
+    """Drive-angle errors (n, 3) that explain the positions of a robot whose platform does not turn."""
+    return ROBOT.inverse(position) - motion.theta_rad
+
+
+def per_leg(name, values):
+    """{name1: .., name2: .., name3: ..} of three values, or of one for all."""
+    return {f"{name}{k}": float(value) for k, value in zip((1, 2, 3), np.broadcast_to(values, 3), strict=True)}

@@ -1,0 +1,80 @@
+"""The motion that the effects see: exact where it is planned, careful where it is not known."""
+
+import numpy as np
+import pytest
+
+from rrru.effects.motion import make_motion
+from rrru.effects.registry import EFFECTS
+from rrru.mechanisms.dynamics import Masses
+from rrru.plant.virtual_robot import VirtualRobot
+from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
+
+_PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
+
+
+def _given(**changes):
+    """Arguments of make_motion for the plan's points, with changes."""
+    target = _PLAN.targets()
+    n = len(target)
+    arguments = {
+        "mechanism": ROBOT,
+        "masses": Masses(),
+        "position_mm": target,
+        "theta_rad": ROBOT.inverse(target),
+        "path_theta_rad": ROBOT.inverse(target),
+        "path_index": np.arange(n),
+        "time_s": np.arange(n, dtype=float),
+        "velocity_mm_s": np.zeros((n, 3)),
+        "acceleration_mm_s2": np.zeros((n, 3)),
+        "payload_kg": np.zeros(n),
+    }
+    return make_motion(**(arguments | changes))
+
+
+def test_the_virtual_robots_motion_is_the_plans():
+    motion = VirtualRobot().motion(_PLAN, ROBOT.inverse)
+    commands = _PLAN.commands(ROBOT)
+    np.testing.assert_array_equal(motion.time_s, commands["time_s"])
+    np.testing.assert_array_equal(motion.payload_kg, commands["payload_kg"])
+    np.testing.assert_array_equal(motion.position_mm, commands[[f"command_{a}_mm" for a in "xyz"]])
+    np.testing.assert_array_equal(motion.theta_rad, commands[[f"theta{k}_rad" for k in (1, 2, 3)]])
+    np.testing.assert_allclose(motion.path_theta_rad[motion.path_index], motion.theta_rad, atol=1e-12)
+    assert motion.lengths_mm.tolist() == [400.0, 400.0, 100.0, 800.0, 400.0] and len(motion) == len(commands)
+
+
+def test_rates_are_the_slopes_of_the_angles_in_time():
+    """Between two sampled points of a run the rates' mean is the angles' step, as far as the trapezoidal rule tells."""
+    motion = VirtualRobot().motion(_PLAN, ROBOT.inverse)
+    run = _PLAN.commands(ROBOT)["run"].to_numpy()
+    inside = run[1:] == run[:-1]
+    step = np.diff(motion.time_s)[:, None]
+    mean = 0.5 * (motion.theta_rate_rad_s[1:] + motion.theta_rate_rad_s[:-1])
+    bend = step**2 / 12.0 * np.diff(motion.theta_acceleration_rad_s2, axis=0)
+    away = (mean * step - bend - np.diff(motion.theta_rad, axis=0))[inside]
+    assert np.median(np.abs(away)) < 1e-5 and np.abs(motion.theta_rate_rad_s).max() > 0.1
+
+
+def test_an_unknown_speed_leaves_static_loads_and_no_rates():
+    unknown = np.full((len(_PLAN.targets()), 3), np.nan)
+    still, blind = _given(), _given(velocity_mm_s=unknown, acceleration_mm_s2=unknown)
+    assert np.isnan(blind.theta_rate_rad_s).all() and np.isnan(blind.theta_acceleration_rad_s2).all()
+    for key in ("force_n", "force_direction", "torque_nmm"):
+        np.testing.assert_array_equal(getattr(blind, key), getattr(still, key))
+    assert not EFFECTS["servo_lag"].contribute(blind, np.full(3, 0.01)).drive_rad.any()
+
+
+def test_an_unknown_payload_counts_as_none():
+    blind = _given(payload_kg=np.full(len(_PLAN.targets()), np.nan))
+    assert np.isnan(blind.payload_kg).all()
+    np.testing.assert_array_equal(blind.torque_nmm, _given().torque_nmm)
+
+
+def test_an_unknown_time_leaves_the_robot_cold():
+    blind = _given(time_s=np.full(len(_PLAN.targets()), np.nan))
+    assert not EFFECTS["thermal_growth"].contribute(blind, np.array([1e-3, 100.0])).length_mm.any()
+
+
+def test_loads_are_those_of_the_commanded_pose_whatever_the_controller_adds():
+    shifted = _given(theta_rad=ROBOT.inverse(_PLAN.targets()) + 0.002)
+    np.testing.assert_array_equal(shifted.torque_nmm, _given().torque_nmm)
+    assert shifted.theta_rad[0, 0] == pytest.approx(_given().theta_rad[0, 0] + 0.002)

@@ -1,0 +1,27 @@
+"""The robots of a chunk drawn: the answers that the diagnosis must not see."""
+
+import pandas as pd
+
+from rrru.gap import withheld
+from rrru.gap.withheld_robots import answer, nominal
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, robots, output):
+    """Write the answers of a chunk; robots: check, effect taken out, first number, number after the last."""
+    check, effect, first, end = robots
+    mechanism = nominal(config["robots"])
+    rows = []
+    for number in range(first, end):
+        if check == "effect":
+            robot = withheld.draw_single(config["seed"], effect, number, mechanism)
+        else:
+            robot = withheld.draw_labelled(config["seed"], number, mechanism)
+        rows.append(answer(robot, mechanism))
+    tables.write("withheld_answers", pd.DataFrame(rows), output)
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.params.robots, snakemake.output.answers)

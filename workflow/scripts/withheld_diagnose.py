@@ -1,0 +1,36 @@
+"""The diagnosis of a chunk of robots, from their measurements alone."""
+
+import pandas as pd
+
+from rrru.gap.diagnose import GapSettings, diagnose, sim
+from rrru.gap.states import state_row
+from rrru.mechanisms.dynamics import Masses
+from rrru.mechanisms.protocol import make_mechanism
+from rrru.report import tables
+from rrru.report.job import job
+
+# the tracker's noise is known, as it is for the campaigns
+_NOISE_MM = 0.02
+_COLUMNS = ["effects", "probability", "leg", "gap_rms_mm", "noise_rms_mm", "share_closed"]
+
+
+def main(config, without, inputs, outputs):
+    """Write verdicts and states of a chunk; without: the effect that the library has to do without, empty for none."""
+    settings = GapSettings.from_config(config["gap"])
+    if without:
+        settings = settings.without(without)
+    mechanism = sim(make_mechanism("rrru3", config["robots"].get("rrru3", {})))
+    verdicts, states = [], []
+    for (robot, kind), rows in tables.read(inputs["measurements"]).groupby(["robot", "kind"], sort=True):
+        points = rows[tables.columns("measurements")].reset_index(drop=True)
+        result = diagnose(points, mechanism, Masses(), settings, noise_mm=_NOISE_MM, details=False)
+        told = {key: result.verdict[key] for key in _COLUMNS}
+        verdicts.append(told | {"check": "effect" if without else "label", "robot": robot, "kind": kind})
+        states.append(state_row(robot, result.calibrated_errors, result.state))
+    tables.write("withheld_verdicts", pd.DataFrame(verdicts), outputs["verdicts"])
+    tables.write("withheld_states", pd.DataFrame(states), outputs["states"])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.params.without, snakemake.input, snakemake.output)

@@ -1,0 +1,22 @@
+"""The robots of a chunk driven and measured: all that the diagnosis is given."""
+
+import pandas as pd
+
+from rrru.gap.withheld_robots import Robot, measure, nominal
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, answers, output):
+    """Write the measurements of the robots of a chunk, one below the other."""
+    mechanism = nominal(config["robots"])
+    frames = []
+    for text in tables.read(answers)["drawn"]:
+        robot = Robot.from_json(text)
+        frames.append(measure(robot, config["seed"], mechanism).assign(robot=robot.name, kind=robot.kind))
+    tables.write("withheld_measurements", pd.concat(frames, ignore_index=True), output)
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.input.answers, snakemake.output.measurements)

@@ -1,0 +1,21 @@
+"""The verdicts of a chunk beside the answers."""
+
+from rrru.gap import score
+from rrru.gap.diagnose import GapSettings
+from rrru.gap.withheld_robots import nominal
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, check, inputs, outputs):
+    """Write scores and limits of the robots of a chunk."""
+    frames = {name: tables.read(inputs[name]) for name in ("answers", "measurements", "verdicts", "states")}
+    library = GapSettings.from_config(config["gap"]).library()
+    scores, limits = score.score_chunk(check, config["seed"], **frames, mechanism=nominal(config["robots"]), library=library)
+    tables.write("withheld_scores", scores, outputs["scores"])
+    tables.write("withheld_limits", limits, outputs["limits"])
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.params.robots[0], snakemake.input, snakemake.output)
