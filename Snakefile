@@ -17,6 +17,7 @@ include: "workflow/rules/campaign.smk"
 include: "workflow/rules/calibrate.smk"
 include: "workflow/rules/compensate.smk"
 include: "workflow/rules/gap.smk"
+include: "workflow/rules/withheld_common.smk"
 include: "workflow/rules/withheld.smk"
 include: "workflow/rules/report.smk"
 
@@ -26,3 +27,4 @@ rule all:
     input:
         [table(name) for name in STUDY_TABLES],
         rules.figures.input,
+        rules.gap.input,

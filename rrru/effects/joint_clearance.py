@@ -6,8 +6,10 @@ platform) lags behind the pin (the forearm) by the radial clearance c_i:
     shift_i = -c_i sign(f_i) g_i,   or, softer,   shift_i = -c_i tanh(f_i / f_0) g_i
 
 The second form changes sides within a force f_0, the parameter `transition`, as contacts with friction and some elasticity do. As in
-`link_flexure`, `held` says whether f_i is the force with joint 3 free or held by friction. It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It flips with the sign of
-the force and vanishes where the leg transmits none. While the force keeps its sign it is a change of L3 by c_i, which a calibration
+`link_flexure`, `held` says whether f_i is the force with joint 3 free or held by friction.
+
+It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It flips with the sign
+of the force and vanishes where the leg transmits none. While the force keeps its sign it is a change of L3 by c_i, which a calibration
 with three free forearm lengths takes up, and one with tied lengths in part; it shows itself by the jump where the force changes sign.
 
 Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time); the contact lies on

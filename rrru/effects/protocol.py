@@ -16,11 +16,12 @@ PLACES = ("base", "elbow", "knee", "wrist", "cross", "platform")
 class Motion:
     """What the robot does at the n sampled points, as far as an effect may need it; NaN where nobody knows it.
 
-    position_mm (n, 3): commanded positions; theta_rad, theta_rate_rad_s, theta_acceleration_rad_s2 (n, 3): commanded drive angles and their
-    derivatives; path_theta_rad (N, 3): the angles along everything that is driven, path_index (n,): rows of the sampled points in it; time_s
-    (n,): since the campaign's start; payload_kg (n,); force_n (n, 3): force with which each leg pushes the platform along
-    force_direction (n, 3 legs, 3), the forearm's direction, compression positive, and held_force_n (n, 3) the same if friction holds joint 3; torque_nmm (n, 3): torque of the loads on each drive arm,
-    positive in the sense of theta; lengths_mm (5,): nominal R, L1, L2, L3, r.
+    position_mm (n, 3): commanded positions; theta_rad, theta_rate_rad_s, theta_acceleration_rad_s2 (n, 3): commanded drive angles and
+    their derivatives; path_theta_rad (N, 3): the angles along everything that is driven, path_index (n,): rows of the sampled points in
+    it; time_s (n,): since the campaign's start; payload_kg (n,); force_n (n, 3): force with which each leg pushes the platform along
+    force_direction (n, 3 legs, 3), the forearm's direction, compression positive, and held_force_n (n, 3) the same if friction holds
+    joint 3; torque_nmm (n, 3): torque of the loads on each drive arm, positive in the sense of theta; lengths_mm (5,): nominal R, L1,
+    L2, L3, r.
     """
 
     position_mm: np.ndarray

@@ -13,7 +13,7 @@ from rrru.gap.evidence import Evidence
 from rrru.gap.noise import estimate_noise, spoilt
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
-from rrru.gap.search import search
+from rrru.gap.search import Hypothesis, search
 
 _MOST_ROUNDS, _MOST_CLEANINGS = 4, 2
 
@@ -62,6 +62,22 @@ def attribute(case, prior, noise_from="given"):
         case = case.without(bad)
     state, covariance, evidence, beliefs, hypothesis, level = found
     return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, noise_from, total - len(case))
+
+
+def settle(found, effects):
+    """The attribution with its hypothesis and state those of exactly the named effects, fitted anew; the posterior stays."""
+    if found.hypothesis.effects == frozenset(effects):
+        return found
+    known = found.posterior.best_of(frozenset(effects))
+    if known is None:
+        chosen = [k for k, term in enumerate(found.hypothesis.terms) if term.effect in effects]
+        terms = tuple(found.hypothesis.terms[k] for k in chosen)
+        known = Hypothesis(terms, found.evidence.score(terms), found.hypothesis.strengths[:, chosen]), found.level
+    hypothesis, level = known
+    if not hypothesis.terms:
+        return replace(found, hypothesis=hypothesis, level=level, state=found.calibrated, covariance=np.zeros((0, 0)))
+    state, covariance = refine(found.case, found.state, hypothesis, level)
+    return replace(found, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
 
 
 def _rounds(case, calibrated, prior):

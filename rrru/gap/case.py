@@ -13,12 +13,12 @@ from rrru.campaign import measurements as rows
 from rrru.effects.protocol import Contribution
 from rrru.errors import FitError
 from rrru.gap.motion import motion_of
+from rrru.gap.unknown import UNKNOWN
 from rrru.mechanisms.first_order import FirstOrder
 from rrru.plant.spatial import SpatialGeometry
 
-
 # smooth functions of the pose may bend a law's signature by this much each; a shape's parameter may be off by this share
-_BEND, _SHAPE_STEP = 0.03, 0.3
+_BEND, _SHAPE_STEP = 0.01, 0.3
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,8 @@ class Linear:
 class Case:
     """Points of a campaign, all m of them, of which the n used ones are fitted.
 
-    library: effects by name that the campaign can test; untestable: name to the reason for the others.
+    library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can; untestable: name
+    to the reason for the other effects.
     """
 
     mechanism: object
@@ -78,6 +79,11 @@ class Case:
 
     def __len__(self):
         return int(self.used.sum())
+
+    @property
+    def effects(self):
+        """The library without the unknown functions."""
+        return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
 
     @property
     def measured_mm(self):
@@ -152,7 +158,7 @@ class Case:
         coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
         shape = state.shape(self.library, key)
         leg = first_order.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
-        columns, steps = [_BEND * column for column in self._bent(first_order, leg)], []
+        columns, steps = self._bent(first_order, leg), []
         for name, value in shape.items():
             high = effect.parameters[name].high
             stepped = value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
@@ -160,7 +166,25 @@ class Case:
                 other = effect.contribute(self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped}))
                 columns.append(np.einsum("nalc,nlc->na", first_order.response, first_order.leg_errors(other) - leg)[self.used])
                 steps.append((name, value, stepped))
-        return np.stack(columns, axis=-1), tuple(steps)
+        part = np.einsum("nalc,nlc->na", first_order.response, leg)[self.used]
+        return self._scaled(np.stack(columns, axis=-1), len(steps), part, state), tuple(steps)
+
+    def _scaled(self, columns, steps, part, state):
+        """Bending columns (n, 3, q) brought to a share of what the calibration leaves of the effect's part (n, 3); the last steps as they are.
+
+        A share of the whole part would be too much: most of what a misplaced leg does the calibration takes out.
+        """
+        theta = rows.theta(self.measurements)
+        base, _ = np.linalg.qr(self.mechanism.error_jacobian(self.sim(state.errors), theta, state.errors)[self.used].reshape(part.size, -1))
+
+        def visible(values):
+            flat = values.reshape(part.size, -1)
+            return np.linalg.norm(flat - base @ (base.T @ flat), axis=0)
+
+        bends = columns.shape[-1] - steps
+        scale = np.ones(columns.shape[-1])
+        scale[:bends] = _BEND * visible(part)[0] / np.maximum(visible(columns[..., :bends]), 1e-12)
+        return columns * scale
 
     def _bent(self, first_order, leg):
         """Leg errors (m, 3, 2) times smooth functions of the pose in each leg, as moves: a list of (n, 3)."""
@@ -207,4 +231,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
             untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
         else:
             testable[name] = effect
+    for name, function in UNKNOWN.items():
+        values = [getattr(motion, need)[used] for need in function.needs]
+        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
+            testable[name] = function
     return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm))

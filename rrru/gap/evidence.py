@@ -99,7 +99,8 @@ class Evidence:
 
     def projected(self, terms):
         """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), positive (k,), owner (k,)
-        of each coefficient; the coefficients of the terms come first, those of their laws' bending, owned by nobody, last."""
+        of each coefficient; the coefficients of the terms come first, those of their laws' bending, owned by nobody, last.
+        """
         maps, index, sizes, positive, owner = [], [], [], [], []
         for number, term in enumerate(terms):
             coordinates = self.library[term.effect].coordinates

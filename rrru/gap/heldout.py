@@ -67,6 +67,12 @@ def predict(case, evidence, terms, strengths, level, fold):
     return Prediction(residual, spread)
 
 
+def log_score(prediction, case):
+    """Log predictive score (n,) of left-out points under the instrument's noise and the prediction's own uncertainty."""
+    variance = case.noise_mm**2 + prediction.uncertainty_mm2 / 3.0
+    return -0.5 * (prediction.residual_mm**2).sum(axis=1) / variance - 1.5 * np.log(variance)
+
+
 def _chosen(evidence, terms):
     """Columns of the terms' free numbers."""
     return [evidence.linear.columns[t.effect, t.shape] @ spread(evidence.library[t.effect].coordinates, t.legs) for t in terms]

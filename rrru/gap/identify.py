@@ -13,7 +13,7 @@ _POWER, _FALSE = 0.9, 0.01
 
 def identify(case, linear):
     """Rows of `gap_identifiability` without the campaign, from the linearised sim without effects."""
-    rows = [_row(case, linear, name) for name in case.library]
+    rows = [_row(case, linear, name) for name in case.effects]
     rows += [
         {
             "effect": name,
@@ -60,7 +60,7 @@ def _row(case, linear, name):
     threshold = chi2.isf(_FALSE, freedom)
     needed = brentq(lambda x: ncx2.sf(threshold, freedom, x) - _POWER, 1e-3, 1e3)
     row["detectable_mm"] = float(case.noise_mm * np.sqrt(needed / len(case)))
-    for other in case.library:
+    for other in case.effects:
         if other != name:
             _, theirs = _visible(case, linear, other)
             basis, size, _ = np.linalg.svd(theirs, full_matrices=False)

@@ -27,6 +27,7 @@ def log_evidence(gram, moment, scale, positive):
     result = np.empty((v, m))
     low, inverse = np.zeros((k, k)), np.zeros((k, k))
     half = np.empty(k)
+    signed = positive.any()
     for level in range(v):
         for j in range(m):
             total = 0.0
@@ -43,6 +44,9 @@ def log_evidence(gram, moment, scale, positive):
                     entry -= low[r, q] * half[q]
                 half[r] = entry / low[r, r]
                 total += 0.5 * half[r] * half[r] - math.log(low[r, r])
+            if not signed:
+                result[level, j] = total
+                continue
             for c in range(k):
                 inverse[c, c] = 1.0 / low[c, c]
                 for r in range(c + 1, k):

@@ -61,10 +61,15 @@ def _derivatives(points, time):
 def _path(points):
     """Points (N, 3) of a smooth path through the points (k, 3) of one run and the rows (k,) of these in it."""
     at = np.arange(len(points)) * _STEPS
-    fine = np.arange(at[-1] + 1)
-    if len(points) < 3:
-        return np.stack([np.interp(fine, at, points[:, k]) for k in range(3)], axis=1), at
-    return CubicSpline(at, points)(fine), at
+    if len(points) == 1:
+        return points, at
+    chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    # points of no distance still follow one another
+    length = np.concatenate([[0.0], np.cumsum(np.maximum(chord, 1e-6 * max(chord.max(), 1e-6)))])
+    fine = np.interp(np.arange(at[-1] + 1), at, length)
+    if len(points) == 2:
+        return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]), at
+    return CubicSpline(length, points)(fine), at
 
 
 def _known(theta):

@@ -12,7 +12,7 @@ _SPOILT, _MOST = 8.0, 0.05
 
 
 def estimate_noise(case, linear):
-    """Noise per axis in mm and where it is from: "repeats" or "high_frequency", whichever is smaller.
+    """Noise per axis in mm and where it is from: "high_frequency", or "repeats" where these say clearly less.
 
     High frequency: what no effect of the library can fit, in the upper half of the half-wave numbers along each run; a gap that is smooth
     along the path leaves it alone, as time and hysteresis, which spoil repeats, do.
@@ -28,7 +28,7 @@ def estimate_noise(case, linear):
     freedom = 1.0 - rank / flat.shape[0]
     rough = float(np.sqrt((upper**2).mean() / max(freedom, 0.1)))
     repeated, count = repeat_noise(case.measurements.iloc[np.flatnonzero(case.used)])
-    if count >= _ENOUGH_REPEATS and 0.0 < repeated < rough:
+    if count >= _ENOUGH_REPEATS and 0.0 < repeated < rough * (1.0 - 3.0 / np.sqrt(2.0 * count)):
         return repeated, "repeats"
     return rough, "high_frequency"
 

@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 from rrru.gap.evidence import LEVELS
 from rrru.gap.terms import EACH, SAME, variants
+from rrru.gap.unknown import UNKNOWN
 
 # hypotheses further below the best than this carry nothing
 _NEGLIGIBLE = 25.0
@@ -22,7 +23,7 @@ class Prior:
 
     counts: tuple = (0.3, 0.45, 0.22, 0.03)
     unexplained: float = 0.1
-    tolerance: float = 0.1
+    tolerance: float = 0.04
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Posterior:
         result = {}
         for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
             for flag in (False, True):
-                key = (hypothesis.effects, flag)
+                key = (hypothesis.effects - set(UNKNOWN), flag)
                 result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
         return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
 
@@ -51,6 +52,13 @@ class Posterior:
         """Probability that an effect acts."""
         has = np.array([effect in h.effects for h in self.hypotheses])
         return float(self.weights[has].sum())
+
+    def without(self, effect):
+        """The posterior with an effect ruled out."""
+        keep = np.array([effect not in h.effects for h in self.hypotheses])
+        weights = self.weights[keep]
+        kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
+        return Posterior(kept, weights / max(weights.sum(), 1e-300), self.unexplained[keep])
 
     def legs(self, effect, within=None):
         """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts (and that the set of effects is `within`)."""
@@ -64,8 +72,12 @@ class Posterior:
         return {legs: p / total for legs, p in result.items()} if total > 0.0 else {}
 
     def best_of(self, effects, unexplained=None):
-        """The hypothesis of highest weight with exactly these effects, and its level; None where there is none."""
-        rows = [k for k, h in enumerate(self.hypotheses) if h.effects == effects]
+        """The hypothesis of highest weight with exactly these effects, and its level; None where there is none.
+
+        Unless `unexplained` is asked for, one without unknown functions.
+        """
+        hidden = set(UNKNOWN) if unexplained else set()
+        rows = [k for k, h in enumerate(self.hypotheses) if h.effects - hidden == effects]
         if not rows:
             return None
         weights = self.weights[rows]
@@ -87,15 +99,19 @@ def posterior(evidence, hypotheses, prior):
     for row, hypothesis in enumerate(kept):
         tolerated = prior.tolerance * evidence.explained(hypothesis)
         unexplained[row] = tolerated < LEVELS
+        if not hypothesis.effects.isdisjoint(UNKNOWN):
+            unexplained[row] = True
         log_weight[row] += _log_prior_levels(unexplained[row], prior)
     return Posterior(kept, np.exp(log_weight - logsumexp(log_weight)), unexplained)
 
 
 def _log_prior_terms(library, terms, prior):
     """Logarithm of the prior probability of a set of terms, alike for all sets of one size."""
-    size = len(terms)
-    total = np.log(prior.counts[size]) - np.log(comb(len(library), size))
-    for term in terms:
+    known = [term for term in terms if term.effect not in UNKNOWN]
+    functions = sum(name in UNKNOWN for name in library)
+    total = np.log(prior.counts[len(known)]) - np.log(comb(len(library) - functions, len(known)))
+    total += (len(terms) - len(known)) * np.log(prior.unexplained / max(functions, 1))
+    for term in known:
         choices = variants(library[term.effect])
         kinds = {c.legs if isinstance(c.legs, str) else "one" for c in choices}
         total -= np.log(len(kinds)) + np.log(len(library[term.effect].coordinates.shapes))
@@ -106,6 +122,9 @@ def _log_prior_terms(library, terms, prior):
 
 def _log_prior_levels(unexplained, prior):
     """Logarithm of the prior (levels,) of the discrepancy's level: half of what is not unexplained is none at all."""
+    if unexplained.all():
+        # its unknown function has paid for it
+        return np.log(np.where(np.arange(len(unexplained)) == 0, 0.5, 0.5 / (len(unexplained) - 1)))
     result = np.empty(len(unexplained))
     within = ~unexplained
     spare = within.sum() - 1

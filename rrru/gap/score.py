@@ -128,7 +128,8 @@ def _score_row(check, answer, verdict):
         "strength": float(answer["strength"]),
         "verdict": verdict["effects"],
         "right": is_right(answer["truth"], verdict["effects"], check),
-        "leg_right": float(int(verdict["leg"]) == int(answer["leg"])) if answer["leg"] else np.nan,
+        # a library without the effect cannot name its leg
+        "leg_right": float(int(verdict["leg"]) == int(answer["leg"])) if answer["leg"] and check != "effect" else np.nan,
         "probability": float(verdict["probability"]),
         "share_closed": np.nan if verdict["effects"] in ("none", UNEXPLAINED) else float(share),
     }

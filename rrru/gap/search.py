@@ -8,6 +8,7 @@ from scipy.special import logsumexp
 
 from rrru.gap.evidence import LEVELS, STRENGTHS
 from rrru.gap.terms import variants
+from rrru.gap.unknown import UNKNOWN
 
 # hypotheses this far below the best in log evidence are not worth refining
 _WORTH = 12.0
@@ -48,11 +49,11 @@ def search(evidence, most=3):
     for size in range(2, min(most, len(library)) + 1):
         near = _levels(found)
         if size == 2:
-            for first, second in combinations(library, 2):
+            for first, second in combinations([name for name in library if name not in UNKNOWN], 2):
                 score((choices[first][0], choices[second][0]), levels=near)
         for start in layer:
             for name in library:
-                if name not in start.effects:
+                if name not in start.effects and not (name in UNKNOWN and start.effects & set(UNKNOWN)):
                     for term in choices[name]:
                         score((*start.terms, term), _narrow(start, near), near)
         layer = _best(found, size)

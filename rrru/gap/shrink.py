@@ -48,8 +48,8 @@ def steps(attribution, ordered, unexplained, generator, draws=200):
     """Steps from the calibration alone to all effects, one after another.
 
     ordered: terms in the order in which they are added; unexplained: probability that something is left. What the last step leaves is
-    the uncertainty of its numbers where it explains all, what the residuals show beyond the noise where it does not, and the two are mixed by that
-    probability. The draws resample runs (stretches where there are fewer than ten) and redraw the fitted numbers.
+    the uncertainty of its numbers where it explains all, what the residuals show beyond the noise where it does not, and the two are
+    mixed by that probability. The draws resample runs (stretches where there are fewer than ten) and redraw the fitted numbers.
     """
     case, evidence, level = attribution.case, attribution.evidence, attribution.level
     fold = folds(case)

@@ -7,6 +7,7 @@ from rrru.gap.terms import per_leg
 # a rival that is this many times less probable than the verdict is no longer named
 _RIVAL = 0.05
 _SURE, _HALF = 0.9, 0.5
+_NOTHING = 0.2
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ def label(effects, unexplained):
 def decide(attribution, shares):
     """Verdict of an attribution; shares: effect to the share of the gap that it explains, for the order.
 
+    Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to matter.
+
     Beside something unexplained effects are named only where they act with a probability of 0.9 each and explain half of the gap together;
     else they are what could be mistaken for a part of it.
     """
@@ -56,18 +59,21 @@ def decide(attribution, shares):
     unknown = sum(p for (_, flag), p in sets.items() if flag)
     known = {key: p for key, p in sets.items() if not key[1]}
     best = max(known, key=known.get) if known else (frozenset(), False)
+    nothing = known.get((frozenset(), False), 0.0)
+    if nothing > _NOTHING:
+        best, unknown = (frozenset(), False), 0.0
     if unknown > known.get(best, 0.0):
         within = {key: p for key, p in sets.items() if key[1]}
         everywhere = {name for effects, _ in within for name in effects}
         sure = frozenset(n for n in everywhere if sum(p for (effects, _), p in within.items() if n in effects) > _SURE * unknown)
         named = sure if sum(shares.get(name, 0.0) for name in sure) >= _HALF else frozenset()
         effects, probability = named, sum(p for (names, _), p in within.items() if named <= names)
-        rivals = {(names - named, False): p for (names, flag), p in within.items() if names != named} | known
+        # what imitates a part of the unknown, and what would do without it
+        rivals = {(names, True): p for (names, _), p in within.items() if names != named} | known
     else:
         effects, probability = best[0], known[best]
         rivals = {key: p for key, p in known.items() if key != best}
-        if unknown > 0.0:
-            rivals[frozenset(), True] = unknown
+        rivals[frozenset(), True] = sum(p for (_, flag), p in sets.items() if flag)
     named = tuple(sorted(effects, key=lambda name: (-shares.get(name, 0.0), name)))
     rivals = tuple(
         (names, flag, p) for (names, flag), p in sorted(rivals.items(), key=lambda r: (-r[1], sorted(r[0][0]))) if p > _RIVAL * probability

@@ -17,7 +17,7 @@ _KNOWING = {"withheld", "withheld_robots", "outside", "score", "limits", "summar
 @pytest.fixture(scope="module")
 def jobs():
     """(rule, inputs, outputs) of every job of the check, as snakemake plans them."""
-    command = [str(_SNAKEMAKE), "-n", "--forceall", "withheld", "--configfile", "tests/minimal.yaml"]
+    command = [str(_SNAKEMAKE), "-n", "--forceall", "withheld", "gap", "--configfile", "tests/minimal.yaml"]
     plan = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
     assert plan.returncode == 0, plan.stderr
     result = []
@@ -45,9 +45,12 @@ def test_no_diagnosis_is_given_an_answer(jobs):
         if rule == "withheld_diagnose":
             assert {Path(path).parent.name for path in inputs} == {"measurements"}
             assert {Path(path).parent.name for path in outputs} == {"verdicts", "states"}
+        if rule == "diagnose":
+            assert {Path(path).name for path in inputs} == {"measurements.parquet"}
     # what is measured reaches the diagnosis, and nothing that was scored does
     scored = {path for rule, _, outputs in jobs for path in outputs if rule in ("withheld_score", "withheld_summary")}
     assert {rule for rule, inputs, _ in jobs if inputs & scored} <= {"withheld_summary", "withheld", "figure"}
+    assert {"diagnose", "withheld_diagnose"} <= {rule for rule, _, _ in jobs}
 
 
 def test_the_measurements_hold_no_answer():
@@ -78,10 +81,11 @@ def _reached(path, seen):
     return seen
 
 
-def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn():
-    reached = _reached(_ROOT / "workflow/scripts/withheld_diagnose.py", set())
+@pytest.mark.parametrize("script", ["withheld_diagnose", "diagnose"])
+def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
+    reached = _reached(_ROOT / f"workflow/scripts/{script}.py", set())
     names = {file.stem for file in reached if file.parent.name == "gap"}
-    assert {"diagnose", "case", "states"} <= names
+    assert {"diagnose", "case"} <= names
     assert not names & _KNOWING
     # and the walk would see them
     assert {file.stem for file in _reached(_ROOT / "workflow/scripts/withheld_score.py", set())} >= {

@@ -1,4 +1,4 @@
-from rrru.gap.diagnose import GapSettings
+from rrru.gap.settings import GapSettings
 
 # refuses unknown effects before anything runs
 GapSettings.from_config(config["gap"]).library()

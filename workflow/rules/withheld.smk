@@ -1,39 +1,3 @@
-from rrru.gap.chunks import check as check_withheld, chunks
-
-check_withheld(config)
-WITHHELD = chunks(config["withheld"])
-# the robots are drawn and driven by these; the diagnosis and the scoring are the whole room
-DRAWING_ROOMS = ("gap/withheld", "gap/withheld_robots", "gap/outside", "gap/chunks")
-GAP_KEYS = [key for key in ("gap",) if key in config]
-WITHHELD_TABLES = [
-    "withheld_verdicts",
-    "withheld_scores",
-    "withheld_limits",
-    "withheld_summary",
-    "withheld_confusion",
-]
-
-
-wildcard_constraints:
-    chunk="|".join(WITHHELD) or "none",
-
-
-def withheld_part(name, chunk="{chunk}"):
-    """Path of a chunk's part of a table."""
-    return f"{RESULTS}/withheld/{name}/{chunk}.parquet"
-
-
-def taken_out(wildcards):
-    """The effect that the diagnosis of a chunk has to do without, empty for none."""
-    return WITHHELD[wildcards.chunk].effect
-
-
-def chunk_robots(wildcards):
-    """Which robots a chunk holds."""
-    chunk = WITHHELD[wildcards.chunk]
-    return [chunk.check, chunk.effect, chunk.first, chunk.end]
-
-
 rule withheld_answers:
     output:
         answers=withheld_part("answers"),
@@ -71,7 +35,7 @@ rule withheld_diagnose:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         without=taken_out,
-        settings=settings("robots", *GAP_KEYS),
+        settings=settings("seed", "robots", "gap"),
         code=code_digest(*STUDY_ROOMS, "gap"),
     script:
         "../scripts/withheld_diagnose.py"
@@ -90,7 +54,7 @@ rule withheld_score:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
         robots=chunk_robots,
-        settings=settings("seed", "robots", *GAP_KEYS),
+        settings=settings("seed", "robots", "gap"),
         code=code_digest(*STUDY_ROOMS, "gap"),
     script:
         "../scripts/withheld_score.py"

@@ -2,7 +2,8 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import GapSettings, diagnose
+from rrru.gap.diagnose import diagnose
+from rrru.gap.settings import GapSettings
 from rrru.mechanisms.dynamics import Masses
 from rrru.mechanisms.protocol import make_mechanism
 from rrru.report import tables

@@ -2,7 +2,8 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import GapSettings, diagnose, sim
+from rrru.gap.diagnose import diagnose, sim
+from rrru.gap.settings import GapSettings
 from rrru.gap.states import state_row
 from rrru.mechanisms.dynamics import Masses
 from rrru.mechanisms.protocol import make_mechanism
@@ -16,14 +17,14 @@ _COLUMNS = ["effects", "probability", "leg", "gap_rms_mm", "noise_rms_mm", "shar
 
 def main(config, without, inputs, outputs):
     """Write verdicts and states of a chunk; without: the effect that the library has to do without, empty for none."""
-    settings = GapSettings.from_config(config["gap"])
+    settings = GapSettings.from_config(config["gap"], config["seed"])
     if without:
         settings = settings.without(without)
     mechanism = sim(make_mechanism("rrru3", config["robots"].get("rrru3", {})))
     verdicts, states = [], []
     for (robot, kind), rows in tables.read(inputs["measurements"]).groupby(["robot", "kind"], sort=True):
         points = rows[tables.columns("measurements")].reset_index(drop=True)
-        result = diagnose(points, mechanism, Masses(), settings, noise_mm=_NOISE_MM, details=False)
+        result = diagnose(points, mechanism, Masses(), settings, noise_mm=_NOISE_MM, details=False, name=robot)
         told = {key: result.verdict[key] for key in _COLUMNS}
         verdicts.append(told | {"check": "effect" if without else "label", "robot": robot, "kind": kind})
         states.append(state_row(robot, result.calibrated_errors, result.state))

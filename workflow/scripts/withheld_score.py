@@ -1,7 +1,7 @@
 """The verdicts of a chunk beside the answers."""
 
 from rrru.gap import score
-from rrru.gap.diagnose import GapSettings
+from rrru.gap.settings import GapSettings
 from rrru.gap.withheld_robots import nominal
 from rrru.report import tables
 from rrru.report.job import job

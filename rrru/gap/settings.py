@@ -1,0 +1,53 @@
+"""What a diagnosis is told: which effects may act, what is known of them, beliefs, seed."""
+
+from dataclasses import dataclass, field, replace
+
+from rrru.effects.registry import EFFECTS, find
+from rrru.errors import ConfigError
+from rrru.gap.posterior import Prior
+
+
+@dataclass(frozen=True)
+class GapSettings:
+    """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known, such as a gear ratio;
+    prior; draws: resamplings for intervals; seed.
+    """
+
+    effects: tuple = tuple(EFFECTS)
+    known: dict = field(default_factory=dict)
+    prior: Prior = field(default_factory=Prior)
+    draws: int = 200
+    seed: int = 0
+
+    @classmethod
+    def from_config(cls, section, seed=0):
+        """Settings of the configuration's `gap` section."""
+        prior = Prior(tuple(section["prior_counts"]), section["prior_unexplained"], section["tolerance"])
+        return cls((*section["effects"], *section["own_effects"]), section["known"], prior, section["draws"], seed)
+
+    def without(self, name):
+        """The settings with one effect taken out of the library."""
+        return replace(self, effects=tuple(effect for effect in self.effects if effect != name))
+
+    def library(self):
+        """Effects by name, what is known of them fixed; raises ConfigError for an unknown effect or parameter."""
+        found = [find(name) for name in self.effects]
+        result = {effect.name: effect for effect in found}
+        if len(result) < len(found):
+            raise ConfigError(f"gap.effects names an effect twice: {', '.join(self.effects)}")
+        for name, values in self.known.items():
+            if name not in result:
+                raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
+            result[name] = _with_known(result[name], values)
+        return result
+
+
+def _with_known(effect, values):
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError for a parameter that no shape holds."""
+    coordinates = effect.coordinates
+    unknown = [key for key in values if key not in coordinates.shapes[0]]
+    if unknown:
+        allowed = ", ".join(coordinates.shapes[0]) or "none"
+        raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
+    shapes = tuple(dict(pairs) for pairs in dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes))
+    return replace(effect, coordinates=replace(coordinates, shapes=shapes))

@@ -1,0 +1,81 @@
+"""What a gap may look like that no law of the library makes: smooth functions, with a fair number of free coefficients each.
+
+They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the gap follows the
+drive angles, the time, the place or the load in a way that the library does not hold, and the verdict says "unexplained".
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from rrru.effects.protocol import Contribution, Coordinates
+
+_DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each drive angle, else to each axis."""
+
+    name: str
+    follows: str
+    basis: object
+    count: int
+    needs: tuple
+    per_leg: bool = False
+
+    @property
+    def coordinates(self):
+        """One coefficient per function and leg or axis, rad or mm."""
+        size = 1e-4 if self.per_leg else 0.1
+        total = 3 * self.count
+        return Coordinates(np.full(total, size), np.zeros(total, dtype=int), np.zeros(total, dtype=bool), lambda values, _: values)
+
+    def contribute(self, motion, values):
+        """Changes under coefficients (3 k,)."""
+        coefficients = np.reshape(values, (3, self.count))
+        if self.per_leg:
+            functions = np.stack([self.basis(motion.theta_rad[:, leg]) for leg in range(3)], axis=1)
+            return Contribution(drive_rad=np.einsum("nlk,lk->nl", functions, coefficients))
+        shift = self.basis(motion) @ coefficients.T
+        return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
+
+
+def _unit(values):
+    """Values (n, ...) mapped to -1 to 1 over their range."""
+    low, high = np.nanmin(values, axis=0), np.nanmax(values, axis=0)
+    return 2.0 * (values - low) / np.maximum(high - low, 1e-9) - 1.0
+
+
+def _of_angle(angle):
+    """Chebyshev functions (n, k) of one drive's angle."""
+    return chebyshev.chebvander(_unit(angle), max(_DRIVE_ORDERS))[:, _DRIVE_ORDERS]
+
+
+def _of_time(motion):
+    """Chebyshev functions (n, k) of the time."""
+    return chebyshev.chebvander(_unit(motion.time_s), max(_TIME_ORDERS))[:, _TIME_ORDERS]
+
+
+def _of_place(motion):
+    """The ten functions (n, 10) of second degree of the commanded position."""
+    x, y, z = _unit(motion.position_mm).T
+    return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x], axis=-1)
+
+
+def _of_load(motion):
+    """The payload (n, 4) alone and with the commanded position."""
+    load = motion.payload_kg / max(np.nanmax(motion.payload_kg), 1e-9)
+    return load[:, None] * np.concatenate([np.ones((len(load), 1)), _unit(motion.position_mm)], axis=1)
+
+
+UNKNOWN = {
+    function.name: function
+    for function in (
+        Unknown("unknown_drive", "the drive angles", _of_angle, len(_DRIVE_ORDERS), (), True),
+        Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
+        Unknown("unknown_place", "the place", _of_place, 10, ()),
+        Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
+    )
+}

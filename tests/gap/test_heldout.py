@@ -1,0 +1,158 @@
+"""Predictions of left-out points, how far the gap shrinks, and the measuring noise, against slow and obvious computations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.fft import dct
+
+from rrru.gap import shrink
+from rrru.gap.attribute import calibrate
+from rrru.gap.evidence import LEVELS, Evidence
+from rrru.gap.heldout import folds, predict, resampled_rows
+from rrru.gap.noise import estimate_noise, spoilt
+from rrru.gap.terms import Term
+from tests.gap.campaigns import EFFECTS, FORWARD, FULL, LINES, NOISE_MM, SPIRAL, case_of, diagnosed, measure, plan_of, strong
+
+TERMS = (Term("servo_lag", 0, 2), Term("leg_asymmetry"))
+STRENGTHS = [1.0, 3.0]
+
+
+def _setting(passes, effects=()):
+    case = case_of(measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")})
+    return case, Evidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+
+
+@pytest.fixture(scope="module")
+def full():
+    return _setting(FULL, (strong("leg_asymmetry", 3.0),))
+
+
+def _refitted(case, evidence, level, fold, smooth):
+    """Residuals and covariances of predictions of each fold by a dense fit of all others."""
+    linear, n = evidence.linear, len(case)
+    columns = np.concatenate([linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1)
+    prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, STRENGTHS) ** -2.0])
+    weight = np.eye(n) / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2))
+    if smooth:
+        transform, wave = np.zeros((n, n)), np.zeros(n)
+        for run in np.unique(case.run):
+            rows = np.flatnonzero(case.run == run)
+            transform[np.ix_(rows, rows)], wave[rows] = dct(np.eye(len(rows)), axis=0, norm="ortho"), np.arange(len(rows))
+        density = 1.0 / (1.0 + (wave / 3.0) ** 2) + 0.01
+        weight = transform.T @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * density / density.mean()))) @ transform
+    residual, uncertain = np.empty((n, 3)), np.empty(n)
+    for number in np.unique(fold):
+        out, fitted = fold == number, fold != number
+        inner = weight[np.ix_(fitted, fitted)]
+        precision = np.diag(prior) + sum(columns[fitted, axis].T @ inner @ columns[fitted, axis] for axis in range(3))
+        moment = sum(columns[fitted, axis].T @ inner @ linear.data[fitted, axis] for axis in range(3))
+        covariance = np.linalg.inv(precision)
+        residual[out] = linear.data[out] - columns[out] @ covariance @ moment
+        uncertain[out] = np.einsum("nak,kl,nal->n", columns[out], covariance, columns[out])
+    return residual, uncertain
+
+
+@pytest.mark.parametrize("level", [0, 3])
+@pytest.mark.parametrize("passes", [(FORWARD,), FULL], ids=["stretches", "runs"])
+def test_predictions_equal_a_refit_without_the_fold(passes, level):
+    case, evidence = _setting(passes)
+    fold = folds(case)
+    found = predict(case, evidence, TERMS, STRENGTHS, level, fold)
+    residual, uncertain = _refitted(case, evidence, level, fold, smooth=passes is FULL)
+    np.testing.assert_allclose(found.residual_mm, residual, atol=2e-6)
+    np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
+
+
+def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(full):
+    case, _ = full
+    assert [len(np.unique(case.run[folds(case) == k])) for k in np.unique(folds(case))] == [1] * 16
+    once, _ = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))
+    fold = folds(once)
+    assert np.unique(fold).tolist() == [0, 1, 2, 3, 4]
+    for run in np.unique(once.run):
+        own = fold[once.run == run]
+        assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * ((len(own) - 1) // 5)
+
+
+def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
+    case, evidence = full
+    found = predict(case, evidence, (Term("leg_asymmetry"),), [3.0], 0, folds(case))
+    expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
+    ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
+    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(case))))
+
+
+def test_rows_are_resampled_by_runs_or_by_stretches():
+    generator = np.random.default_rng(0)
+    run = np.repeat(np.arange(12), 5)
+    drawn = resampled_rows(run, generator, 20)
+    assert drawn.shape == (20, 60) and set(drawn.ravel()) <= set(range(60))
+    assert (drawn.reshape(20, 12, 5) == drawn.reshape(20, 12, 5)[..., :1] + np.arange(5)).all() and (drawn[:, ::5] % 5 == 0).all()
+    few = resampled_rows(np.repeat([3, 1], 10), generator, 20).reshape(20, 4, 5)
+    assert (few == few[..., :1] + np.arange(5)).all() and set(few[..., 0].ravel()) == {0, 5, 10, 15}
+
+
+OTHER = (replace(LINES[0], start_mm=(-500.0, -200.0, 600.0), end_mm=(50.0, 180.0, 720.0)), replace(SPIRAL, start_deg=40.0, turns=3.0))
+
+
+@pytest.mark.parametrize("name", ["leg_asymmetry", "servo_lag", "encoder_eccentricity"])
+def test_the_share_closed_holds_on_other_trajectories(name):
+    """Against the truth on runs that the diagnosis has never seen."""
+    effect = strong(name, 5.0)
+    found = diagnosed(measure((effect,)))
+    case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
+    before = case.measured_mm - case.sim(found.calibrated_errors)[case.used]
+    after = case.measured_mm - case.exact(found.state)
+    true = 1.0 - np.sqrt((after**2).sum() / (before**2).sum())
+    assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
+    assert found.verdict["share_closed_low"] <= found.verdict["share_closed"] <= found.verdict["share_closed_high"]
+    assert found.verdict["gap_rms_mm"] == pytest.approx(5.0 * np.sqrt(3.0) * NOISE_MM, rel=0.25)
+
+
+def _step(residual_mm, draws=3):
+    squares = (residual_mm**2).sum(axis=1)
+    return shrink.Step("", (), residual_mm, squares, np.tile(squares, (draws, 1)))
+
+
+def test_shares_of_made_up_steps():
+    generator = np.random.default_rng(1)
+    residual = generator.normal(size=(50, 3))
+    for factor, share in ((0.25, 0.75), (0.0, 1.0), (1.0, 0.0), (1.5, -0.5), (5.0, -1.0)):
+        np.testing.assert_allclose(shrink.share_closed(_step(residual), _step(factor * residual)), [share] * 3, atol=1e-12)
+    assert shrink.share_closed(_step(0.0 * residual), _step(residual)) == (0.0, 0.0, 0.0)
+    assert shrink.gap_rms(np.array([4.0, -1.0, 0.0])) == 1.0 and shrink.gap_rms(np.array([-4.0])) == 0.0
+
+
+@pytest.mark.parametrize("name", [None, "thermal_growth", "leg_asymmetry", "servo_lag"])
+def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
+    case = case_of(measure((strong(name, 6.0),) if name else ()))
+    found, source = estimate_noise(case, case.linearise(calibrate(case)))
+    upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
+    assert source == "high_frequency" and found == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
+
+
+def test_repeats_give_the_noise_where_they_are_clearly_quieter():
+    """Many passes of one line with a jagged gap that repeats itself, which looks like noise along the run."""
+    frame = measure(plan=plan_of((FORWARD,) * 6, LINES[:1]))
+    jagged = np.random.default_rng(3).normal(0.0, 0.3, (16, 3))
+    for k, axis in enumerate("xyz"):
+        frame[f"measured_{axis}_mm"] += np.tile(jagged[:, k], 6)
+    case = case_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
+    found, source = estimate_noise(case, case.linearise(calibrate(case)))
+    assert source == "repeats" and found == pytest.approx(NOISE_MM, rel=0.2)
+
+
+def test_single_spikes_are_spoilt_and_smooth_gaps_and_noise_are_not(full):
+    case, _ = full
+    generator = np.random.default_rng(2)
+    noise = NOISE_MM * generator.standard_normal((len(case), 3))
+    assert not spoilt(case, noise).any()
+    smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
+    assert not spoilt(case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise).any()
+    assert not spoilt(case, smooth * 0.05 + noise).any()
+    spiked = noise.copy()
+    at = [4, 40, 100, 200]
+    spiked[at, [0, 1, 2, 0]] += [1.0, -1.0, 0.5, 0.6]
+    assert np.flatnonzero(spoilt(case, spiked)).tolist() == at
+    assert not spoilt(case, noise + 5.0 * (generator.random((len(case), 1)) < 0.3)).any()

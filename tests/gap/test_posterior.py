@@ -1,0 +1,193 @@
+"""Terms, priors and probabilities on made-up evidence; the verdict on made-up posteriors."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from rrru.effects.registry import EFFECTS
+from rrru.gap.evidence import LEVELS
+from rrru.gap.posterior import Posterior, Prior, posterior
+from rrru.gap.search import Hypothesis
+from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
+from rrru.gap.verdict import decide, label
+
+WITH_LEGS = {name for name in EFFECTS if name not in ("frame_misregistration", "thermal_growth")}
+
+
+def _stub(explained=0.0):
+    """Evidence that tells how much a hypothesis explains, in units of the noise."""
+    return SimpleNamespace(library=EFFECTS, explained=lambda h: explained if h.terms else 0.0)
+
+
+def _hypothesis(*terms, evidence=0.0):
+    value = np.broadcast_to(np.asarray(evidence, dtype=float), len(LEVELS)).copy()
+    return Hypothesis(tuple(terms), value, np.ones((len(LEVELS), len(terms))))
+
+
+def _all(size):
+    """Every hypothesis of no, one or two effects."""
+    single = [term for effect in EFFECTS.values() for term in variants(effect)]
+    if size < 2:
+        return [()] if size == 0 else [(term,) for term in single]
+    return [(a, b) for k, a in enumerate(single) for b in single[k + 1 :] if a.effect != b.effect]
+
+
+def test_effects_with_legs_are_tried_on_each_and_positive_ones_on_all_alike():
+    for name, effect in EFFECTS.items():
+        assert per_leg(effect) is (name in WITH_LEGS)
+        kinds = {term.legs for term in variants(effect)}
+        expected = {EACH, 1, 2, 3} if name in WITH_LEGS else {EACH}
+        assert kinds == expected | ({SAME} if per_leg(effect) and effect.coordinates.positive.all() else set())
+        assert len(variants(effect)) == len(kinds) * len(effect.coordinates.shapes)
+        assert {term.leg for term in variants(effect)} == ({0, 1, 2, 3} if name in WITH_LEGS else {0})
+
+
+@pytest.mark.parametrize("name", sorted(WITH_LEGS))
+def test_a_terms_numbers_spread_over_its_legs(name):
+    coordinates = EFFECTS[name].coordinates
+    for leg in (1, 2, 3):
+        values = spread(coordinates, leg) @ np.ones(np.count_nonzero(coordinates.legs == leg))
+        assert (values == (coordinates.legs == leg)).all()
+    np.testing.assert_array_equal(spread(coordinates, EACH), np.eye(len(coordinates)))
+    same = spread(coordinates, SAME)
+    np.testing.assert_array_equal(same @ np.ones(same.shape[1]), np.ones(len(coordinates)))
+    one = same @ np.eye(same.shape[1])[0]
+    assert one.sum() == 3 and sorted(coordinates.legs[one > 0]) == [1, 2, 3]
+
+
+def test_without_data_the_probabilities_are_the_prior():
+    """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and pairs."""
+    prior = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1)
+    beliefs = posterior(_stub(1.5), [_hypothesis(*terms) for size in range(3) for terms in _all(size)], prior)
+    assert beliefs.weights.sum() == pytest.approx(1.0)
+    sets = beliefs.sets()
+    for size, count, kinds in ((0, 0.3, 1), (1, 0.5, 12), (2, 0.2, 66)):
+        found = {key: p for key, p in sets.items() if len(key[0]) == size and not key[1]}
+        assert len(found) == kinds
+        np.testing.assert_allclose(list(found.values()), 0.9 * count / kinds, rtol=1e-9)
+    assert sum(p for (_, flag), p in sets.items() if flag) == pytest.approx(0.1)
+    assert list(sets.values()) == sorted(sets.values(), reverse=True)
+    assert beliefs.marginal("backlash") == pytest.approx(0.5 / 12 + 0.2 * 11 / 66)
+    assert beliefs.marginal("nothing of the kind") == 0.0
+
+
+def test_legs_have_the_prior_of_their_kinds():
+    beliefs = posterior(_stub(), [_hypothesis(*terms) for size in range(2) for terms in _all(size)], Prior())
+    np.testing.assert_allclose([beliefs.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9])
+    np.testing.assert_allclose([beliefs.legs("axis_tilt")[k] for k in (EACH, 1, 2, 3)], [1 / 2, 1 / 6, 1 / 6, 1 / 6])
+    assert beliefs.legs("axis_tilt", frozenset({"backlash"})) == {} == beliefs.legs("unknown")
+    assert sum(beliefs.legs("axis_tilt", frozenset({"axis_tilt"})).values()) == pytest.approx(1.0)
+
+
+def test_evidence_multiplies_the_prior():
+    generator = np.random.default_rng(0)
+    hypotheses = [_hypothesis(*terms, evidence=generator.normal(0.0, 3.0, len(LEVELS))) for size in range(2) for terms in _all(size)]
+    flat = posterior(_stub(20.0), [_hypothesis(*h.terms) for h in hypotheses], Prior())
+    beliefs = posterior(_stub(20.0), hypotheses, Prior())
+    log_weight = np.log(flat.weights) + np.array([h.evidence for h in hypotheses])
+    np.testing.assert_allclose(beliefs.weights, np.exp(log_weight - logsumexp(log_weight)), rtol=1e-9)
+    row, level = np.unravel_index(beliefs.weights.argmax(), beliefs.weights.shape)
+    assert beliefs.best() == (hypotheses[row], level)
+
+
+def test_a_discrepancy_counts_as_unexplained_beyond_the_tolerated_share():
+    hypotheses = [_hypothesis(), _hypothesis(Term("servo_lag"))]
+    beliefs = posterior(_stub(35.0), hypotheses, Prior(tolerance=0.1))
+    np.testing.assert_array_equal(beliefs.unexplained[0], LEVELS > 0.0)
+    np.testing.assert_array_equal(beliefs.unexplained[1], LEVELS > 3.5)
+
+
+def test_the_best_of_a_set_is_its_heaviest_hypothesis():
+    hypotheses = [_hypothesis(), _hypothesis(Term("axis_tilt")), _hypothesis(Term("axis_tilt", 0, 2), evidence=5.0)]
+    beliefs = posterior(_stub(1.5), hypotheses, Prior())
+    assert beliefs.best_of(frozenset({"axis_tilt"})) == (hypotheses[2], 0)
+    assert beliefs.best_of(frozenset({"axis_tilt"}), True)[1] > 0
+    assert beliefs.best_of(frozenset({"axis_tilt"}), False) == (hypotheses[2], 0)
+    assert beliefs.best_of(frozenset({"backlash"})) is None
+
+
+def test_improbable_pairs_are_forgotten_and_single_effects_stay():
+    far = -100.0
+    hypotheses = [
+        _hypothesis(),
+        _hypothesis(Term("axis_tilt"), evidence=far),
+        _hypothesis(Term("axis_tilt"), Term("backlash"), evidence=far),
+    ]
+    beliefs = posterior(_stub(), hypotheses, Prior())
+    assert [len(h.terms) for h in beliefs.hypotheses] == [0, 1] and beliefs.weights.sum() == pytest.approx(1.0)
+
+
+def _decided(*entries, shares=None):
+    """Verdict of (terms, probability, unexplained) entries, each a hypothesis of its own."""
+    hypotheses = tuple(_hypothesis(*terms) for terms, _, _ in entries)
+    weights, unexplained = np.zeros((len(entries), 2)), np.tile([False, True], (len(entries), 1))
+    for row, (_, probability, flag) in enumerate(entries):
+        weights[row, int(flag)] = probability
+    return decide(
+        SimpleNamespace(posterior=Posterior(hypotheses, weights, unexplained), case=SimpleNamespace(library=EFFECTS)), shares or {}
+    )
+
+
+LAG, PLAY, TILT, HEAT = (Term(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
+
+
+def test_nothing_is_decided_where_nothing_is_most_probable():
+    verdict = _decided(((), 0.8, False), ((LAG,), 0.15, False), ((), 0.05, True))
+    assert (verdict.label, verdict.effects, verdict.leg, verdict.unexplained) == ("none", (), 0, False)
+    assert verdict.probability == pytest.approx(0.8)
+    assert verdict.confusable_with == ("servo_lag", "unexplained")
+
+
+def test_the_most_probable_set_is_named_in_the_order_of_its_shares():
+    verdict = _decided(((LAG, PLAY), 0.7, False), ((PLAY,), 0.26, False), ((), 0.01, False), shares={"servo_lag": 0.2, "backlash": 0.7})
+    assert verdict.label == "backlash+servo_lag" and verdict.confusable_with == ()
+    assert [names for names, _, _ in verdict.rivals] == [frozenset({"backlash"})]
+
+
+def test_hypotheses_of_one_set_add_up():
+    legs = [Term("servo_lag", 0, leg) for leg in (1, 2, 3)]
+    verdict = _decided(*(((leg,), 0.2, False) for leg in legs), ((PLAY,), 0.4, False))
+    assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.6) and verdict.confusable_with == ("backlash",)
+
+
+def test_unexplained_wins_where_all_of_it_together_beats_the_best_set():
+    verdict = _decided(((), 0.2, True), ((LAG,), 0.2, True), ((PLAY,), 0.25, False), ((TILT,), 0.35, False))
+    assert verdict.label == "unexplained" and verdict.probability == pytest.approx(0.4)
+    assert verdict.confusable_with == ("axis_tilt", "backlash", "servo_lag")
+
+
+@pytest.mark.parametrize(
+    ("probability", "share", "expected"),
+    [(0.95, 0.6, "servo_lag+unexplained"), (0.7, 0.6, "unexplained"), (0.95, 0.3, "unexplained")],
+)
+def test_an_effect_is_named_beside_the_unexplained_only_where_sure_and_large(probability, share, expected):
+    verdict = _decided(((LAG,), probability, True), ((), 1.0 - probability, True), shares={"servo_lag": share})
+    assert verdict.label == expected
+    assert ("servo_lag" in verdict.confusable_with) is (expected == "unexplained")
+
+
+@pytest.mark.parametrize(
+    ("terms", "leg"),
+    [
+        ((Term("servo_lag", 0, 2),), 2),
+        ((Term("servo_lag", 0, 2), Term("backlash", 0, 2)), 2),
+        ((Term("servo_lag", 0, 2), Term("backlash", 0, 3)), 0),
+        ((Term("servo_lag", 0, 2), HEAT), 2),
+        ((HEAT,), 0),
+        ((LAG,), 0),
+        ((Term("servo_lag", 0, SAME),), 0),
+    ],
+)
+def test_a_leg_is_named_where_all_effects_with_legs_agree_on_it(terms, leg):
+    assert _decided((terms, 0.9, False), ((), 0.1, False)).leg == leg
+
+
+def test_labels():
+    assert [label((), False), label((), True), label(("b", "a"), False), label(("a",), True)] == [
+        "none",
+        "unexplained",
+        "b+a",
+        "a+unexplained",
+    ]

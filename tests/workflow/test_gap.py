@@ -1,0 +1,80 @@
+"""The diagnosis as a user runs it: with an effect of one's own, on a file that lacks columns, and refused."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+_ROOT = Path(__file__).resolve().parents[2]
+_SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+_DRIFT = '''
+import numpy as np
+from rrru.effects.protocol import Contribution
+from rrru.parameters import Parameter, ParameterSet
+
+class Drift:
+    name, needs = "drift", ("time_s",)
+    parameters = ParameterSet(tuple(Parameter(f"speed_{axis}", "mm/s", 0.0, -1e-3, 1e-3) for axis in "xyz"))
+    def contribute(self, motion, values):
+        shift = motion.time_s[:, None] * values
+        return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
+'''
+
+
+def _run(folder, overlay, *targets):
+    """Exit code and output of snakemake in a folder that sees the project's files through links."""
+    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests"):
+        if not (folder / name).exists():
+            (folder / name).symlink_to(_ROOT / name)
+    (folder / "mine.yaml").write_text(overlay)
+    command = [str(_SNAKEMAKE), "--cores", "2", *targets, "--configfile", "mine.yaml"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tmp_path):
+    """A measured campaign that the library cannot explain is explained by ten lines of a user's."""
+    (tmp_path / "drift.py").write_text(_DRIFT)
+    campaign = "campaigns: {mine: {robot: rrru3, ingest: tests/data/field_05.csv, noise_mm: 0.02}}\n"
+    target = "results/campaigns/mine/gap_verdicts.parquet"
+    code, output = _run(tmp_path, campaign, target)
+    assert code == 0, output
+    assert "unexplained" in pd.read_parquet(tmp_path / target)["effects"].iloc[0]
+    own = campaign + 'gap: {own_effects: ["drift:Drift"]}\n'
+    code, output = _run(tmp_path, own, target)
+    assert code == 0, output
+    verdict = pd.read_parquet(tmp_path / target).iloc[0]
+    assert verdict["effects"] == "drift" and verdict["share_closed"] > 0.95
+    (tmp_path / "drift.py").write_text(_DRIFT.replace("-1e-3, 1e-3", "-2e-3, 2e-3"))
+    _, output = _run(tmp_path, own, target, "-n")
+    assert "rule diagnose" in output
+
+
+def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not_test(tmp_path):
+    points = pd.read_csv(_ROOT / "tests/data/field_02.csv")
+    points.drop(columns=["time_s", "speed_mm_s", "payload_kg", "theta1_rad", "theta2_rad", "theta3_rad"]).to_csv(
+        tmp_path / "bare.csv", index=False
+    )
+    target = "results/campaigns/mine/gap_verdicts.parquet"
+    code, output = _run(tmp_path, "campaigns: {mine: {robot: rrru3, ingest: bare.csv}}\n", target)
+    assert code == 0, output
+    verdict = pd.read_parquet(tmp_path / target).iloc[0]
+    assert verdict["effects"] == "backlash" and verdict["noise_from"] in ("repeats", "high_frequency")
+    assert "thermal_growth not tested" in verdict["notes"] and "servo_lag not tested" in verdict["notes"]
+    assert abs(verdict["noise_rms_mm"] / (0.02 * 3.0**0.5) - 1.0) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("overlay", "told"),
+    [
+        ("gap: {effects: [backlash, wind]}\n", "unknown effect 'wind'"),
+        ('gap: {own_effects: ["nowhere:Law"]}\n', "cannot import 'nowhere'"),
+        ("gap: {known: {transmission_error: {teeth: 7}}}\n", "no known 'teeth'"),
+        ("gap: {tolerence: 0.2}\n", "tolerence"),
+    ],
+)
+def test_what_the_diagnosis_cannot_know_is_refused_before_anything_runs(tmp_path, overlay, told):
+    code, output = _run(tmp_path, overlay, "gap", "-n")
+    assert code != 0 and told in output
