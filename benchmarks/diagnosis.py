@@ -53,8 +53,10 @@ def main(count=40):
             right[name] += same or (truth.startswith("outside") and "unexplained" in answers[name])
         print(f"{len(measurements):4d} points  {truth:45s} here: {answers['here']:45s} plain: {answers['plain']}", flush=True)
     for name, times in seconds.items():
-        by_size = {size: [t for n, t in times if (n > 400) == (size == "long")] for size in ("short", "long")}
-        print(name, {size: f"median {np.median(t):.2f} s, longest {max(t):.2f} s" for size, t in by_size.items() if t}, f"right {right[name]} of {count}")
+        print(f"{name}: right {right[name]} of {count}")
+        for size, chosen in (("up to 400 points", [t for n, t in times if n <= 400]), ("more", [t for n, t in times if n > 400])):
+            if chosen:
+                print(f"  {size}: median {np.median(chosen):.2f} s, longest {max(chosen):.2f} s")
 
 
 if __name__ == "__main__":

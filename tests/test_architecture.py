@@ -17,6 +17,7 @@ _FLOORS = {
     "plant": 5,
     "compensate": 6,
     "gap": 6,
+    "withheld": 7,
     "reproduce": 7,
     "study": 7,
     "report": 0,

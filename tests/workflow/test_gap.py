@@ -9,7 +9,7 @@ import pytest
 
 _ROOT = Path(__file__).resolve().parents[2]
 _SNAKEMAKE = Path(sys.executable).parent / "snakemake"
-_DRIFT = '''
+_DRIFT = """
 import numpy as np
 from rrru.effects.protocol import Contribution
 from rrru.parameters import Parameter, ParameterSet
@@ -20,7 +20,7 @@ class Drift:
     def contribute(self, motion, values):
         shift = motion.time_s[:, None] * values
         return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
-'''
+"""
 
 
 def _run(folder, overlay, *targets):

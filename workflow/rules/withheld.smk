@@ -36,7 +36,7 @@ rule withheld_diagnose:
     params:
         without=taken_out,
         settings=settings("seed", "robots", "gap"),
-        code=code_digest(*STUDY_ROOMS, "gap"),
+        code=code_digest(*STUDY_ROOMS, "gap", "withheld/states"),
     script:
         "../scripts/withheld_diagnose.py"
 
@@ -55,7 +55,7 @@ rule withheld_score:
     params:
         robots=chunk_robots,
         settings=settings("seed", "robots", "gap"),
-        code=code_digest(*STUDY_ROOMS, "gap"),
+        code=code_digest(*STUDY_ROOMS, "gap", "withheld"),
     script:
         "../scripts/withheld_score.py"
 
@@ -72,7 +72,7 @@ rule withheld_summary:
     log:
         f"{RESULTS}/logs/withheld_summary.log",
     params:
-        code=code_digest(*TABLE_ROOMS, "gap"),
+        code=code_digest(*TABLE_ROOMS, "withheld"),
     script:
         "../scripts/withheld_summary.py"
 

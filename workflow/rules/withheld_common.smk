@@ -1,9 +1,9 @@
-from rrru.gap.chunks import check as check_withheld, chunks
+from rrru.withheld.chunks import check as check_withheld, chunks
 
 check_withheld(config)
 WITHHELD = chunks(config["withheld"])
-# the robots are drawn and driven by these; the diagnosis and the scoring are the whole room
-DRAWING_ROOMS = ("gap/withheld", "gap/withheld_robots", "gap/outside", "gap/chunks")
+# the robots are drawn and driven by these alone
+DRAWING_ROOMS = ("withheld/draw", "withheld/robots", "withheld/outside", "withheld/chunks")
 WITHHELD_TABLES = [
     "withheld_verdicts",
     "withheld_scores",

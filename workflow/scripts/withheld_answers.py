@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from rrru.gap import withheld
-from rrru.gap.withheld_robots import answer, nominal
 from rrru.report import tables
 from rrru.report.job import job
+from rrru.withheld import draw
+from rrru.withheld.robots import answer, nominal
 
 
 def main(config, robots, output):
@@ -15,9 +15,9 @@ def main(config, robots, output):
     rows = []
     for number in range(first, end):
         if check == "effect":
-            robot = withheld.draw_single(config["seed"], effect, number, mechanism)
+            robot = draw.draw_single(config["seed"], effect, number, mechanism)
         else:
-            robot = withheld.draw_labelled(config["seed"], number, mechanism)
+            robot = draw.draw_labelled(config["seed"], number, mechanism)
         rows.append(answer(robot, mechanism))
     tables.write("withheld_answers", pd.DataFrame(rows), output)
 

@@ -1,10 +1,10 @@
 """The verdicts of a chunk beside the answers."""
 
-from rrru.gap import score
 from rrru.gap.settings import GapSettings
-from rrru.gap.withheld_robots import nominal
 from rrru.report import tables
 from rrru.report.job import job
+from rrru.withheld import score
+from rrru.withheld.robots import nominal
 
 
 def main(config, check, inputs, outputs):

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from rrru.gap import score
-from rrru.gap.summary import summary
 from rrru.report import tables
 from rrru.report.job import job
+from rrru.withheld import score
+from rrru.withheld.summary import summary
 
 
 def _together(paths):

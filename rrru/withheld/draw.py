@@ -11,12 +11,12 @@ import numpy as np
 from rrru.campaign.trajectories import from_config
 from rrru.effects.registry import EFFECTS
 from rrru.errors import UnreachableError
-from rrru.gap.outside import OUTSIDE
-from rrru.gap.withheld_robots import NOISE_RMS_MM, PASSES, Acting, Robot, true_gap_mm
 from rrru.mechanisms import singularity
 from rrru.mechanisms.first_order import FirstOrder
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.seeds import stream
+from rrru.withheld.outside import OUTSIDE
+from rrru.withheld.robots import NOISE_RMS_MM, PASSES, Acting, Robot, true_gap_mm
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
 WEAKEST, STRONGEST, CLEAR = 0.1, 10.0, 2.0

@@ -13,10 +13,10 @@ from rrru.campaign.trajectories import from_config
 from rrru.effects.protocol import ActiveEffect
 from rrru.effects.registry import EFFECTS
 from rrru.errors import FitError
-from rrru.gap.outside import OUTSIDE, PREFIX
 from rrru.mechanisms.protocol import make_mechanism
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.seeds import stream
+from rrru.withheld.outside import OUTSIDE, PREFIX
 
 NOISE_MM = 0.02
 NOISE_RMS_MM = NOISE_MM * np.sqrt(3.0)

@@ -8,16 +8,16 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.effects.registry import EFFECTS
-from rrru.gap import withheld
 from rrru.gap.case import make_case
-from rrru.gap.chunks import check, chunks
-from rrru.gap.limits import limits, with_truth
-from rrru.gap.outside import OUTSIDE
-from rrru.gap.withheld_robots import NOISE_MM, NOISE_RMS_MM, Robot, answer, measure, nominal, simulate, true_gap_mm
 from rrru.mechanisms import singularity
 from rrru.mechanisms.dynamics import Masses
 from rrru.mechanisms.first_order import FirstOrder
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.withheld import draw
+from rrru.withheld.chunks import check, chunks
+from rrru.withheld.oracle import limits, with_truth
+from rrru.withheld.outside import OUTSIDE
+from rrru.withheld.robots import NOISE_MM, NOISE_RMS_MM, Robot, answer, measure, nominal, simulate, true_gap_mm
 
 _MECHANISM = nominal({})
 
@@ -35,21 +35,21 @@ def _calibrated(measurements):
 
 
 def _bare(number, kind="paper"):
-    return replace(withheld._bare("bare", np.random.default_rng(number), _MECHANISM), kind=kind)
+    return replace(draw._bare("bare", np.random.default_rng(number), _MECHANISM), kind=kind)
 
 
 @pytest.mark.parametrize("number", [0, 4, 8])
 def test_a_robot_is_its_seed_and_survives_as_text(number):
-    robot = withheld.draw_labelled(2021, number, _MECHANISM)
-    assert robot == withheld.draw_labelled(2021, number, _MECHANISM)
-    assert robot != withheld.draw_labelled(2022, number, _MECHANISM)
+    robot = draw.draw_labelled(2021, number, _MECHANISM)
+    assert robot == draw.draw_labelled(2021, number, _MECHANISM)
+    assert robot != draw.draw_labelled(2022, number, _MECHANISM)
     assert Robot.from_json(robot.to_json()) == robot
     np.testing.assert_array_equal(rows.measured(measure(robot, 1, _MECHANISM)), rows.measured(measure(robot, 1, _MECHANISM)))
 
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_is_as_strong_as_the_answer_says(effect):
-    robot = withheld.draw_single(5, effect, 0, _MECHANISM)
+    robot = draw.draw_single(5, effect, 0, _MECHANISM)
     told = answer(robot, _MECHANISM)
     assert told["truth"] == effect and 2.0 <= told["strength"] <= 10.0
     measurements, truth = simulate(robot, _MECHANISM, 0.0, np.random.default_rng(0))
@@ -63,29 +63,29 @@ def test_one_leg_means_that_leg_alone():
     bare = _bare(3)
     found = Counter()
     for _ in range(12):
-        acting = withheld._draw_acting(bare, "servo_lag", True, (0.5, 1.0), generator, _MECHANISM)
+        acting = draw._draw_acting(bare, "servo_lag", True, (0.5, 1.0), generator, _MECHANISM)
         coordinates = np.array(acting.coordinates)
         assert (coordinates >= 0.0).all()
         assert not acting.leg or (np.flatnonzero(coordinates) == acting.leg - 1).all()
         found[bool(acting.leg)] += 1
     assert 1 <= found[True] <= 8
     # a pair, or an effect without legs, sits on none alone
-    assert withheld._draw_acting(bare, "thermal_growth", True, (0.5, 1.0), generator, _MECHANISM).leg == 0
+    assert draw._draw_acting(bare, "thermal_growth", True, (0.5, 1.0), generator, _MECHANISM).leg == 0
 
 
 def test_truths_come_in_the_stated_shares(monkeypatch):
     drawn = Counter()
-    monkeypatch.setattr(withheld, "_trajectories", lambda *_: {})
-    monkeypatch.setattr(withheld, "true_gap_mm", lambda *_: 1.0)
-    monkeypatch.setattr(withheld, "_draw_acting", lambda robot, name, *_: name)
+    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
+    monkeypatch.setattr(draw, "_draw_acting", lambda robot, name, *_: name)
     effects, kinds = Counter(), Counter()
     for number in range(2000):
-        robot = withheld.draw_labelled(1, number, _MECHANISM)
+        robot = draw.draw_labelled(1, number, _MECHANISM)
         outside = any(name in OUTSIDE for name in robot.acting)
         drawn["outside" if outside else ("none", "one", "two")[len(robot.acting)]] += 1
         effects.update(robot.acting)
         kinds[robot.kind] += 1
-    for truth, share in withheld.TRUTHS.items():
+    for truth, share in draw.TRUTHS.items():
         np.testing.assert_allclose(drawn[truth] / 2000, share, atol=0.03)
     assert set(effects) == {*EFFECTS, *OUTSIDE}
     assert max(effects[name] for name in EFFECTS) < 1.5 * min(effects[name] for name in EFFECTS)
@@ -112,7 +112,7 @@ def test_campaigns_keep_clear_of_singularities_and_fresh_runs_go_elsewhere():
         theta = _MECHANISM.inverse(points)
         for measure_of in (singularity.translational_measure, singularity.constraint_measure):
             assert measure_of(_MECHANISM, points, theta).min() > 0.1
-        other = withheld.fresh(robot, 1, _MECHANISM)
+        other = draw.fresh(robot, 1, _MECHANISM)
         assert other.errors == robot.errors and other.acting == robot.acting
         assert np.abs(other.plan.targets() - points).max() > 5.0
 
@@ -124,7 +124,7 @@ def test_errors_alone_leave_no_gap():
 @pytest.mark.parametrize("name", OUTSIDE)
 def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it(name):
     bare = _bare(0, "full")
-    acting = withheld._draw_acting(bare, name, False, (2.0, 2.001), np.random.default_rng(1), _MECHANISM)
+    acting = draw._draw_acting(bare, name, False, (2.0, 2.001), np.random.default_rng(1), _MECHANISM)
     robot = replace(bare, acting=(acting,))
     assert answer(robot, _MECHANISM)["truth"] == f"outside:{name}"
     virtual = replace(robot.virtual(_MECHANISM), errors={})

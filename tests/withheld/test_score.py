@@ -11,14 +11,14 @@ from rrru.calibrate.residuals import Residuals
 from rrru.campaign import measurements as rows
 from rrru.effects.registry import EFFECTS
 from rrru.errors import ConfigError
-from rrru.gap import score, withheld
 from rrru.gap.case import State, make_case
-from rrru.gap.limits import limits, with_truth
-from rrru.gap.states import state_of, state_row
-from rrru.gap.summary import calibration_error, summary, wilson
-from rrru.gap.withheld_robots import NOISE_MM, answer, measure, nominal
 from rrru.mechanisms.dynamics import Masses
 from rrru.report import tables
+from rrru.withheld import draw, score
+from rrru.withheld.oracle import limits, with_truth
+from rrru.withheld.robots import NOISE_MM, answer, measure, nominal
+from rrru.withheld.states import state_of, state_row
+from rrru.withheld.summary import calibration_error, summary, wilson
 
 _MECHANISM = nominal({})
 _SEED = 11
@@ -27,8 +27,8 @@ _SEED = 11
 @pytest.fixture(scope="module")
 def robots():
     """A robot with backlash on leg 2 of twice the noise, and one with nothing, with their measurements and calibrations."""
-    bare = withheld._bare("bare", np.random.default_rng(7), _MECHANISM)
-    acting = withheld._draw_acting(bare, "backlash", False, (2.0, 2.001), np.random.default_rng(3), _MECHANISM)
+    bare = draw._bare("bare", np.random.default_rng(7), _MECHANISM)
+    acting = draw._draw_acting(bare, "backlash", False, (2.0, 2.001), np.random.default_rng(3), _MECHANISM)
     faulty = replace(bare, name="faulty", acting=(replace(acting, leg=2, coordinates=(0.0, 6e-4, 0.0)),))
     result = {}
     for robot in (replace(bare, name="sound"), faulty):

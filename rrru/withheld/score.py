@@ -6,12 +6,12 @@ import pandas as pd
 from rrru.effects.registry import EFFECTS
 from rrru.errors import ConfigError
 from rrru.gap.case import make_case
-from rrru.gap.limits import limits, with_truth
-from rrru.gap.outside import PREFIX
-from rrru.gap.states import state_of
-from rrru.gap.withheld import fresh
-from rrru.gap.withheld_robots import NOISE_MM, Robot, simulate
 from rrru.mechanisms.dynamics import Masses
+from rrru.withheld.draw import fresh
+from rrru.withheld.oracle import limits, with_truth
+from rrru.withheld.outside import PREFIX
+from rrru.withheld.robots import NOISE_MM, Robot, simulate
+from rrru.withheld.states import state_of
 
 UNEXPLAINED = "unexplained"
 
