@@ -14,8 +14,11 @@ from rrru.gap.noise import estimate_noise, spoilt
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
+from rrru.gap.unknown import UNKNOWN
 
 _MOST_ROUNDS, _MOST_CLEANINGS = 4, 2
+# a gap of fewer times the noise is linear in everything that can cause it
+_SMALL = 10.0
 
 
 @dataclass(frozen=True)
@@ -83,13 +86,18 @@ def settle(found, effects):
 def _rounds(case, calibrated, prior):
     """Search and refinement in turn until the best hypothesis repeats itself."""
     state, covariance, last = calibrated, np.zeros((0, 0)), None
-    evidence = Evidence(case.library, case.linearise(state), case.run, case.noise_mm)
+    linear = case.linearise(state)
+    evidence = Evidence(case.library, linear, case.run, case.noise_mm)
+    # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the linear sim or a law's
+    # shape is still to be fitted
+    small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
     for _ in range(_MOST_ROUNDS):
         beliefs = posterior(evidence, search(evidence), prior)
         hypothesis, level = beliefs.best()
         if not hypothesis.terms:
             return calibrated, np.zeros((0, 0)), evidence, beliefs, hypothesis, level
-        if last is not None and last == frozenset(hypothesis.terms):
+        shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
+        if last == frozenset(hypothesis.terms) or (small and not shaped and not hypothesis.effects.isdisjoint(UNKNOWN)):
             break
         last = frozenset(hypothesis.terms)
         try:

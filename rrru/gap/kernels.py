@@ -15,7 +15,7 @@ def log_ndtr(x):
     return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / (x * x)
 
 
-@numba.njit(cache=True, error_model="numpy")
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def log_evidence(gram, moment, scale, positive):
     """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
 
@@ -27,7 +27,6 @@ def log_evidence(gram, moment, scale, positive):
     result = np.empty((v, m))
     low, inverse = np.zeros((k, k)), np.zeros((k, k))
     half = np.empty(k)
-    signed = positive.any()
     for level in range(v):
         for j in range(m):
             total = 0.0
@@ -44,22 +43,19 @@ def log_evidence(gram, moment, scale, positive):
                     entry -= low[r, q] * half[q]
                 half[r] = entry / low[r, r]
                 total += 0.5 * half[r] * half[r] - math.log(low[r, r])
-            if not signed:
-                result[level, j] = total
-                continue
             for c in range(k):
+                if not positive[c]:
+                    continue
                 inverse[c, c] = 1.0 / low[c, c]
                 for r in range(c + 1, k):
                     entry = 0.0
                     for q in range(c, r):
                         entry -= low[r, q] * inverse[q, c]
                     inverse[r, c] = entry / low[r, r]
-            for c in range(k):
-                if positive[c]:
-                    mean, variance = 0.0, 0.0
-                    for r in range(c, k):
-                        mean += inverse[r, c] * half[r]
-                        variance += inverse[r, c] * inverse[r, c]
-                    total += log_ndtr(mean / math.sqrt(variance)) + math.log(2.0)
+                mean, variance = 0.0, 0.0
+                for r in range(c, k):
+                    mean += inverse[r, c] * half[r]
+                    variance += inverse[r, c] * inverse[r, c]
+                total += log_ndtr(mean / math.sqrt(variance)) + math.log(2.0)
             result[level, j] = total
     return result

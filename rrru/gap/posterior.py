@@ -44,8 +44,9 @@ class Posterior:
         result = {}
         for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
             for flag in (False, True):
-                key = (hypothesis.effects - set(UNKNOWN), flag)
-                result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
+                if (unexplained == flag).any():
+                    key = (hypothesis.effects - set(UNKNOWN), flag)
+                    result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
         return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
 
     def marginal(self, effect):

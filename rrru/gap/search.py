@@ -12,6 +12,7 @@ from rrru.gap.unknown import UNKNOWN
 
 # hypotheses this far below the best in log evidence are not worth refining
 _WORTH = 12.0
+_HOPELESS = 30.0
 _BEST_SETS = 4
 
 
@@ -32,12 +33,14 @@ class Hypothesis:
 def search(evidence, most=3):
     """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones."""
     library = evidence.library
-    found = {}
+    found, best = {}, [(0, -np.inf)]
 
     def score(terms, strengths=None, levels=None):
         key = frozenset(terms)
         if key not in found:
-            found[key] = _score(evidence, terms, strengths, levels)
+            found[key] = _score(evidence, terms, strengths, levels, best[0])
+            if found[key].evidence.max() > best[0][1]:
+                best[0] = int(found[key].evidence.argmax()), found[key].evidence.max()
         return found[key]
 
     score(())
@@ -69,12 +72,24 @@ def search(evidence, most=3):
     return list(found.values())
 
 
-def _score(evidence, terms, strengths, levels):
-    """The hypothesis of a set of terms at the chosen levels, -inf at the others."""
+def _score(evidence, terms, strengths, levels, leader):
+    """The hypothesis of a set of terms at the chosen levels, -inf at the others.
+
+    leader: level and evidence of the best hypothesis so far. A larger set is tried at that level first; where it is hopeless there, the other levels
+    are left out.
+    """
     full = np.full(len(LEVELS), -np.inf)
     best = np.ones((len(LEVELS), len(terms)))
     if not terms:
         return Hypothesis((), evidence.none.copy(), best)
+    if len(terms) > 1:
+        probe = leader[0]
+        coarse = tuple(grid[1::2] if len(grid) == len(STRENGTHS) else grid for grid in strengths or (STRENGTHS,) * len(terms))
+        value, grid = evidence.over_strengths(terms, coarse, [probe])
+        full[probe] = logsumexp(value) - len(terms) * np.log(len(STRENGTHS))
+        best[probe] = grid[value[0].argmax()]
+        if full[probe] < leader[1] - _HOPELESS:
+            return Hypothesis(tuple(terms), full, best)
     levels = np.arange(len(LEVELS)) if levels is None else levels
     value, grid = evidence.over_strengths(terms, strengths, levels)
     full[levels] = logsumexp(value, axis=1) - len(terms) * np.log(len(STRENGTHS))
@@ -85,7 +100,7 @@ def _score(evidence, terms, strengths, levels):
 def _levels(found):
     """Indices of the discrepancy levels next to the best hypothesis' own, and none at all."""
     best = max(found.values(), key=lambda h: h.evidence.max()).evidence.argmax()
-    return np.unique([0, 1, 2, *(np.clip([best - 2, best - 1, best, best + 1], 0, len(LEVELS) - 1))])
+    return np.unique([0, 1, *(np.clip([best - 1, best, best + 1], 0, len(LEVELS) - 1))])
 
 
 def _narrow(start, levels):

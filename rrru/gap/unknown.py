@@ -64,6 +64,11 @@ def _of_place(motion):
     return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x], axis=-1)
 
 
+def _of_place_linearly(motion):
+    """The four functions (n, 4) of first degree of the commanded position."""
+    return _of_place(motion)[:, :4]
+
+
 def _of_load(motion):
     """The payload (n, 4) alone and with the commanded position."""
     load = motion.payload_kg / max(np.nanmax(motion.payload_kg), 1e-9)
@@ -75,6 +80,7 @@ UNKNOWN = {
     for function in (
         Unknown("unknown_drive", "the drive angles", _of_angle, len(_DRIVE_ORDERS), (), True),
         Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
+        Unknown("unknown_affine", "the place as a rigid motion or a change of scale does", _of_place_linearly, 4, ()),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
         Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
     )
