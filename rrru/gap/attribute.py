@@ -16,7 +16,7 @@ from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.unknown import UNKNOWN
 
-_MOST_ROUNDS, _MOST_CLEANINGS = 4, 2
+_MOST_ROUNDS, _MOST_CLEANINGS = 4, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
 
@@ -55,11 +55,17 @@ def attribute(case, prior, noise_from="given"):
     for cleaning in range(_MOST_CLEANINGS + 1):
         calibrated = calibrate(case)
         if noise_from != "given":
+            # spikes would pass for noise
+            bad = spoilt(case, case.measured_mm - case.sim(calibrated.errors)[case.used], 0.0)
+            if bad.any():
+                case = case.without(bad)
+                calibrated = calibrate(case)
+        if noise_from != "given":
             noise, noise_from = estimate_noise(case, case.linearise(calibrated))
             case = replace(case, noise_mm=noise)
         found = _rounds(case, calibrated, prior)
         state = found[0]
-        bad = spoilt(case, case.measured_mm - (case.exact(state) if state.effects else case.sim(state.errors)[case.used]))
+        bad = spoilt(case, case.measured_mm - (case.exact(state) if state.effects else case.sim(state.errors)[case.used]), case.noise_mm)
         if cleaning == _MOST_CLEANINGS or not bad.any():
             break
         case = case.without(bad)
@@ -79,7 +85,11 @@ def settle(found, effects):
     hypothesis, level = known
     if not hypothesis.terms:
         return replace(found, hypothesis=hypothesis, level=level, state=found.calibrated, covariance=np.zeros((0, 0)))
-    state, covariance = refine(found.case, found.state, hypothesis, level)
+    try:
+        state, covariance = refine(found.case, found.state, hypothesis, level)
+    except FitError:
+        # the exact sim cannot follow: only the linear one is corrected
+        return replace(found, hypothesis=hypothesis, level=level, state=found.calibrated, covariance=np.zeros((0, 0)))
     return replace(found, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
 
 

@@ -12,13 +12,15 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.effects.protocol import Contribution
 from rrru.errors import FitError
-from rrru.gap.motion import motion_of
+from rrru.gap.motion import at_turn_back, motion_of
 from rrru.gap.unknown import UNKNOWN
 from rrru.mechanisms.first_order import FirstOrder
 from rrru.plant.spatial import SpatialGeometry
 
-# smooth functions of the pose may bend a law's signature by this much each; a shape's parameter may be off by this share
-_BEND, _SHAPE_STEP = 0.01, 0.3
+# a parameter of a law's shape may be off by this share
+_SHAPE_STEP = 0.3
+# an effect is tested where at least this share of the points has what it needs
+_ENOUGH = 0.8
 
 
 @dataclass(frozen=True)
@@ -48,9 +50,9 @@ class Linear:
     """The sim linearised about a state.
 
     data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the mechanism's errors;
-    columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect of the state to what its law may be wrong by,
-    (n, 3, q), each column one standard deviation; reshaped: effect to the shape's parameters that the last of these columns step, each
-    (name, value, stepped value); drive (n, 3 axes, 3): derivative by the drive angles.
+    columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect of the state to what the parameters of
+    its shape may be wrong by, (n, 3, q), each column one standard deviation; reshaped: effect to these parameters, each (name, value,
+    stepped value); drive (n, 3 axes, 3): derivative by the drive angles.
     """
 
     data: np.ndarray
@@ -154,11 +156,11 @@ class Case:
         )
 
     def _laws(self, first_order, key, state):
-        """What the law of an effect of the state may be wrong by, (n, 3, q), and the steps of its shape's parameters; see Linear."""
+        """What the shape of an effect of the state may be wrong by, (n, 3, q), and the steps of its parameters; see Linear."""
         coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
         shape = state.shape(self.library, key)
         leg = first_order.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
-        columns, steps = self._bent(first_order, leg), []
+        columns, steps = [], []
         for name, value in shape.items():
             high = effect.parameters[name].high
             stepped = value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
@@ -166,34 +168,8 @@ class Case:
                 other = effect.contribute(self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped}))
                 columns.append(np.einsum("nalc,nlc->na", first_order.response, first_order.leg_errors(other) - leg)[self.used])
                 steps.append((name, value, stepped))
-        part = np.einsum("nalc,nlc->na", first_order.response, leg)[self.used]
-        return self._scaled(np.stack(columns, axis=-1), len(steps), part, state), tuple(steps)
-
-    def _scaled(self, columns, steps, part, state):
-        """Bending columns (n, 3, q) brought to a share of what the calibration leaves of the effect's part (n, 3); the last steps as they are.
-
-        A share of the whole part would be too much: most of what a misplaced leg does the calibration takes out.
-        """
-        theta = rows.theta(self.measurements)
-        base, _ = np.linalg.qr(self.mechanism.error_jacobian(self.sim(state.errors), theta, state.errors)[self.used].reshape(part.size, -1))
-
-        def visible(values):
-            flat = values.reshape(part.size, -1)
-            return np.linalg.norm(flat - base @ (base.T @ flat), axis=0)
-
-        bends = columns.shape[-1] - steps
-        scale = np.ones(columns.shape[-1])
-        scale[:bends] = _BEND * visible(part)[0] / np.maximum(visible(columns[..., :bends]), 1e-12)
-        return columns * scale
-
-    def _bent(self, first_order, leg):
-        """Leg errors (m, 3, 2) times smooth functions of the pose in each leg, as moves: a list of (n, 3)."""
-        cx, cy = self.mechanism.turn
-        x, y, z = ((p - p.mean()) / max(np.ptp(p) / 2.0, 1.0) for p in first_order.position_mm[self.used].T)
-        radial, tangential = x[:, None] * cx + y[:, None] * cy, y[:, None] * cx - x[:, None] * cy
-        bends = (radial, tangential, np.repeat(z[:, None], 3, axis=1), radial**2, tangential**2, radial * tangential)
-        response, leg = first_order.response[self.used], leg[self.used]
-        return [np.einsum("nalc,nlc->na", response, bend[..., None] * leg) for bend in bends]
+        nothing = np.zeros((len(self), 3, 0))
+        return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
 
     def _columns(self, first_order, key, state):
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
@@ -219,18 +195,27 @@ def starts_of_runs(measurements):
 
 
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True):
-    """The case of a measurement table; effects whose needs the motion does not meet are set aside with the reason."""
+    """The case of a measurement table.
+
+    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what a tested effect
+    needs are left out. Raises FitError for an empty table.
+    """
+    if not len(measurements):
+        raise FitError("the campaign has no points")
     motion = motion_of(measurements, mechanism, masses)
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
-    used &= ~starts_of_runs(measurements)
+    used &= ~starts_of_runs(measurements) & ~at_turn_back(motion)
     used &= np.isfinite(mechanism.forward(rows.theta(measurements), guess_mm=rows.command(measurements))).all(axis=1)
-    testable, untestable = {}, {}
+    testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
-        missing = [need for need in effect.needs if not np.isfinite(getattr(motion, need)[used]).all()]
+        known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
+        missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
         if missing:
             untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
         else:
             testable[name] = effect
+            complete &= np.all(list(known.values()), axis=0) if known else True
+    used &= complete
     for name, function in UNKNOWN.items():
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):

@@ -10,8 +10,8 @@ diagonal in the cosine basis of the run and falls with the frequency, so that w 
 gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of their prior. Strengths are
 averaged over a grid, even in their logarithm.
 
-A law is not exact either: its signature about the state may be bent by smooth functions of the pose, and its shape be off, each with a
-coefficient N(0, 1) on `Linear.laws`. Without these a strong effect's small misfit, which repeats in every run, would be laid to a second effect.
+The parameters of a law's shape, such as a time constant, may be off the grid on which they were tried: each has a coefficient N(0, 1) on
+`Linear.laws`.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from scipy.special import logsumexp
 from rrru.gap import kernels
 from rrru.gap.terms import spread
 
-LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
 _HALF_WAVES, _WHITE = 3.0, 0.01
@@ -99,7 +99,7 @@ class Evidence:
 
     def projected(self, terms):
         """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), positive (k,), owner (k,)
-        of each coefficient; the coefficients of the terms come first, those of their laws' bending, owned by nobody, last.
+        of each coefficient; the coefficients of the terms come first, those of their shapes, owned by nobody, last.
         """
         maps, index, sizes, positive, owner = [], [], [], [], []
         for number, term in enumerate(terms):

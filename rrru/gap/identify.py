@@ -13,7 +13,9 @@ _POWER, _FALSE = 0.9, 0.01
 
 def identify(case, linear):
     """Rows of `gap_identifiability` without the campaign, from the linearised sim without effects."""
-    rows = [_row(case, linear, name) for name in case.effects]
+    visible = {name: _visible(case, linear, name) for name in case.effects}
+    bases = {name: _basis(columns) for name, (_, columns) in visible.items()}
+    rows = [_row(case, name, *visible[name], bases) for name in case.effects]
     rows += [
         {
             "effect": name,
@@ -39,9 +41,14 @@ def _visible(case, linear, name):
     return raw, raw - base @ (base.T @ raw)
 
 
-def _row(case, linear, name):
-    """The row of one testable effect."""
-    raw, visible = _visible(case, linear, name)
+def _basis(columns):
+    """Orthonormal basis of columns (3n, k)."""
+    basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return basis[:, size > 1e-9 * max(size[0], 1e-300)]
+
+
+def _row(case, name, raw, visible, bases):
+    """The row of one testable effect; raw, visible: its columns (3n, k) with and without the calibration's part."""
     count = len(case.library[name].coordinates)
     own, total = float((visible**2).sum()), float((raw**2).sum())
     share = np.sqrt(own / total) if total > 0.0 else 0.0
@@ -60,11 +67,8 @@ def _row(case, linear, name):
     threshold = chi2.isf(_FALSE, freedom)
     needed = brentq(lambda x: ncx2.sf(threshold, freedom, x) - _POWER, 1e-3, 1e3)
     row["detectable_mm"] = float(case.noise_mm * np.sqrt(needed / len(case)))
-    for other in case.effects:
+    for other, basis in bases.items():
         if other != name:
-            _, theirs = _visible(case, linear, other)
-            basis, size, _ = np.linalg.svd(theirs, full_matrices=False)
-            basis = basis[:, size > 1e-9 * max(size[0], 1e-300)]
             imitated = float(((basis.T @ visible) ** 2).sum() / own)
             if not imitated <= (row["imitated_share"] if np.isfinite(row["imitated_share"]) else -1.0):
                 row |= {"imitated_by": other, "imitated_share": min(imitated, 1.0)}

@@ -1,19 +1,23 @@
 """The motion behind a measurement table, as far as its columns tell: what the effects' laws are evaluated on. Lengths mm, angles rad."""
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from rrru.campaign import measurements as rows
 from rrru.effects.motion import make_motion
 
 # points of the path between two commanded ones, and along a transfer between runs
 _STEPS, _TRANSFER_STEPS = 8, 30
+# an interval at a run's end that is this much slower than the next leads to rest
+_SLOWER = 0.9
+# nearer than this to a turning point the interpolated path may be on the wrong side of it
+_TURN_RAD = 3e-4
 
 
 def motion_of(measurements, mechanism, masses):
     """Motion at the n rows of a measurement table, all of them in the order driven.
 
-    # ASSUME the robot passes smoothly through a run's commanded points, rests at both ends of it, and goes straight to the next run.
+    # ASSUME the robot passes smoothly through a run's commanded points, rests where it slows down at an end, and goes straight to the next run.
     Speeds and accelerations come from the times; where a run has no increasing times they are NaN.
     """
     position, theta = rows.command(measurements), rows.theta(measurements)
@@ -41,6 +45,19 @@ def motion_of(measurements, mechanism, masses):
     return make_motion(mechanism, masses, position, theta, path_theta, index, time, velocity, acceleration, payload)
 
 
+def at_turn_back(motion):
+    """Rows (n,) at which a drive turns back: whether it is on its way up or down there the commanded points alone do not tell."""
+    path, result = motion.path_theta_rad, np.zeros(len(motion.theta_rad), dtype=bool)
+    for leg in range(3):
+        step = np.diff(path[:, leg])
+        turns = np.flatnonzero(step[:-1] * step[1:] < 0.0) + 1
+        if len(turns):
+            nearest = turns[np.abs(turns[:, None] - motion.path_index).argmin(axis=0)]
+            close = np.abs(nearest - motion.path_index) <= _STEPS
+            result |= close & (np.abs(path[nearest, leg] - motion.theta_rad[:, leg]) < _TURN_RAD)
+    return result
+
+
 def _runs(run):
     """(first row, row after the last) of every stretch of one run."""
     edges = np.flatnonzero(np.diff(run)) + 1
@@ -48,13 +65,20 @@ def _runs(run):
 
 
 def _derivatives(points, time):
-    """Velocity and acceleration (k, 3) along the points of one run, at rest at both ends; NaN without increasing times."""
+    """Velocity and acceleration (k, 3) along the points of one run, NaN without increasing times.
+
+    An end is one of rest where the robot slows down towards it; else the recording stopped or began on the way.
+    """
     nothing = np.full_like(points, np.nan)
     if len(points) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
         return nothing, nothing
-    spline = CubicSpline(time, points, bc_type="clamped")
+    speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(time)
+    rest = (speed[0] < _SLOWER * speed[1], speed[-1] < _SLOWER * speed[-2])
+    spline = CubicSpline(time, points, bc_type=tuple("clamped" if here else "not-a-knot" for here in rest))
     acceleration = spline(time, 2)
-    acceleration[[0, -1]] = 0.0
+    for end, here in zip((0, -1), rest, strict=True):
+        if here:
+            acceleration[end] = 0.0
     return spline(time, 1), acceleration
 
 
@@ -69,7 +93,8 @@ def _path(points):
     fine = np.interp(np.arange(at[-1] + 1), at, length)
     if len(points) == 2:
         return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]), at
-    return CubicSpline(length, points)(fine), at
+    # of fifth degree, since where a drive turns back has to be known to a fraction of its play
+    return make_interp_spline(length, points, k=min(5, len(points) - 1 - len(points) % 2))(fine), at
 
 
 def _known(theta):

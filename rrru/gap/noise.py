@@ -8,7 +8,7 @@ from rrru.gap.evidence import along_runs
 # repeats count from so many degrees of freedom on
 _ENOUGH_REPEATS = 30
 # a point this many robust deviations from its neighbours on both sides is spoilt; no more than this share may be
-_SPOILT, _MOST = 8.0, 0.05
+_SPOILT, _MOST = 8.0, 0.1
 
 
 def estimate_noise(case, linear):
@@ -18,6 +18,9 @@ def estimate_noise(case, linear):
     along the path leaves it alone, as time and hysteresis, which spoil repeats, do.
     """
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
+    if columns.shape[-1] > len(case):
+        # too few points to fit everything: what the calibration leaves has to do
+        columns = linear.base
     flat = columns.reshape(-1, columns.shape[-1])
     size = np.linalg.norm(flat, axis=0)
     fitted, _, rank, _ = np.linalg.lstsq(flat / np.where(size > 0.0, size, 1.0), linear.data.ravel(), rcond=1e-9)
@@ -33,17 +36,24 @@ def estimate_noise(case, linear):
     return rough, "high_frequency"
 
 
-def spoilt(case, residual_mm):
-    """Used points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run, where such jumps are rare."""
-    jump = np.zeros(len(residual_mm))
+def spoilt(case, residual_mm, floor_mm):
+    """Used points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run, where such jumps are rare.
+
+    floor_mm: noise per axis below which no jump counts, 0 where nobody knows it.
+    """
+    jump, worst = np.zeros(len(residual_mm)), np.zeros(len(residual_mm), dtype=bool)
     for run in np.unique(case.run):
         rows = np.flatnonzero(case.run == run)
         if len(rows) < 5:
             continue
         padded = np.pad(residual_mm[rows], ((2, 2), (0, 0)), mode="reflect")
         around = np.stack([padded[k : k + len(rows)] for k in (0, 1, 3, 4)])
-        jump[rows] = np.abs(residual_mm[rows] - np.median(around, axis=0)).max(axis=1)
+        far = np.abs(residual_mm[rows] - np.median(around, axis=0)).max(axis=1)
+        # of neighbours the worst one alone: it may have pulled at the others' median
+        beside = np.pad(far, 2)
+        jump[rows] = far
+        worst[rows] = far >= np.max([beside[k : k + len(rows)] for k in range(5)], axis=0)
     # the median of the largest of three absolute normal numbers is 1.55 times their deviation
-    scale = max(float(np.median(jump)) / 1.55, 1.2 * case.noise_mm)
-    flagged = jump > _SPOILT * scale
+    scale = max(float(np.median(jump)) / 1.55, 1.2 * floor_mm)
+    flagged = worst & (jump > _SPOILT * scale)
     return flagged if flagged.mean() <= _MOST else np.zeros(len(jump), dtype=bool)

@@ -75,8 +75,8 @@ def search(evidence, most=3):
 def _score(evidence, terms, strengths, levels, leader):
     """The hypothesis of a set of terms at the chosen levels, -inf at the others.
 
-    leader: level and evidence of the best hypothesis so far. A larger set is tried at that level first; where it is hopeless there, the other levels
-    are left out.
+    leader: level and evidence of the best hypothesis so far. A larger set is tried at that level first; where it is hopeless there, the
+    other levels are left out.
     """
     full = np.full(len(LEVELS), -np.inf)
     best = np.ones((len(LEVELS), len(terms)))

@@ -46,11 +46,7 @@ def _gauge_free(name, effect):
     return active(name, (values - values.mean(axis=0)).ravel())
 
 
-# a play that is not yet taken up at a few points beside a turn-back looks like a second cause and like noise
-_TURNING = pytest.mark.xfail(reason="points beside a drive's turn-back, where the state of the play is unknown, are used like all others")
-
-
-@pytest.mark.parametrize("name", [pytest.param(name, marks=_TURNING if name == "backlash" else ()) for name in EFFECTS])
+@pytest.mark.parametrize("name", list(EFFECTS))
 def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     """At a gap of four times the noise, all numbers within four standard errors."""
     effect = _gauge_free(name, strong(name, 4.0))
@@ -162,9 +158,6 @@ def test_missing_points_and_runs_of_unequal_length_change_nothing(lagging):
     assert found.verdict["points"] == found.tables["gap_points"]["used"].sum() < 0.8 * len(lagging)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a run whose recording stops while the robot moves is taken to end at rest, and its speeds are wrong"
-)
 def test_recordings_that_stop_in_the_middle_of_a_run_change_nothing(lagging):
     length = lagging.groupby("run")["point"].transform("max")
     frame = lagging[(lagging["run"] % 2 == 0) | (lagging["point"] <= 0.67 * length)]
@@ -183,7 +176,7 @@ def test_outliers_are_dropped_and_change_nothing(lagging, noise_mm):
     assert found.verdict["dropped_points"] <= 2 * len(at)
 
 
-@pytest.mark.parametrize("name", [None, "servo_lag", pytest.param("backlash", marks=_TURNING)])
+@pytest.mark.parametrize("name", [None, "servo_lag", "backlash"])
 def test_an_unknown_noise_is_estimated_and_the_verdict_stays(name):
     found = diagnosed(measure((strong(name, 4.0),) if name else ()), None)
     assert found.verdict["effects"] == (name or "none") and found.verdict["noise_from"] == "high_frequency"

@@ -147,12 +147,12 @@ def test_single_spikes_are_spoilt_and_smooth_gaps_and_noise_are_not(full):
     case, _ = full
     generator = np.random.default_rng(2)
     noise = NOISE_MM * generator.standard_normal((len(case), 3))
-    assert not spoilt(case, noise).any()
+    assert not spoilt(case, noise, NOISE_MM).any()
     smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
-    assert not spoilt(case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise).any()
-    assert not spoilt(case, smooth * 0.05 + noise).any()
+    assert not spoilt(case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise, NOISE_MM).any()
+    assert not spoilt(case, smooth * 0.05 + noise, NOISE_MM).any()
     spiked = noise.copy()
     at = [4, 40, 100, 200]
     spiked[at, [0, 1, 2, 0]] += [1.0, -1.0, 0.5, 0.6]
-    assert np.flatnonzero(spoilt(case, spiked)).tolist() == at
-    assert not spoilt(case, noise + 5.0 * (generator.random((len(case), 1)) < 0.3)).any()
+    assert np.flatnonzero(spoilt(case, spiked, NOISE_MM)).tolist() == at
+    assert not spoilt(case, noise + 5.0 * (generator.random((len(case), 1)) < 0.3), NOISE_MM).any()

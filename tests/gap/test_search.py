@@ -132,7 +132,6 @@ def test_what_no_run_tells_apart_shares_the_probability(twins):
     assert verdict.probability < 0.6 and {*verdict.effects, *verdict.confusable_with} >= TWINS
 
 
-@pytest.mark.xfail(strict=True, reason="only the effect that is found first is allowed a law that bends, which is worth 3 nats here")
 def test_it_still_does_once_one_of_them_has_been_fitted():
     beliefs = attribute(_twins()[0], Prior()).posterior
     assert beliefs.marginal("own_weight") == pytest.approx(beliefs.marginal("drive_compliance"), rel=0.1)
