@@ -31,7 +31,7 @@ _PARAMETERS = ParameterSet(
         Parameter("time_constant", "s", 600.0, 1.0, 1e5, "lumped body, assumed"),
     )
 )
-_SHAPES = tuple({"time_constant": tau} for tau in (30.0, 100.0, 300.0, 1000.0, 3000.0))
+_SHAPES = tuple({"time_constant": tau} for tau in (30.0, 60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0))
 _COORDINATES = plain_coordinates(_PARAMETERS, 2e-4, _SHAPES)
 
 

@@ -107,9 +107,13 @@ def _rounds(case, calibrated, prior):
         if not hypothesis.terms:
             return calibrated, np.zeros((0, 0)), evidence, beliefs, hypothesis, level
         shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
-        if last == frozenset(hypothesis.terms) or (small and not shaped and not hypothesis.effects.isdisjoint(UNKNOWN)):
+        unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
+        if last == frozenset(hypothesis.terms) or (small and not shaped and unknown):
             break
-        last = frozenset(hypothesis.terms)
+        first, last = last is None, frozenset(hypothesis.terms)
+        if first and shaped and unknown:
+            # a law off the grid of its shapes gets its chance before an unknown function takes what it leaves
+            hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
             state, covariance = refine(case, state, hypothesis, level)
             evidence = Evidence(case.library, case.linearise(state), case.run, case.noise_mm)

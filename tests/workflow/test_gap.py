@@ -78,3 +78,18 @@ def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not
 def test_what_the_diagnosis_cannot_know_is_refused_before_anything_runs(tmp_path, overlay, told):
     code, output = _run(tmp_path, overlay, "gap", "-n")
     assert code != 0 and told in output
+
+
+def test_the_check_on_withheld_effects_runs_from_robots_to_figure(tmp_path):
+    answers = "campaign,effects,leg\nfield_09,thermal_growth,0\n"
+    (tmp_path / "answers.csv").write_text(answers)
+    overlay = "withheld: {robots: 3, per_effect: 1, chunk: 2, effects: [backlash], field: [field_09], field_answers: answers.csv}\n"
+    code, output = _run(tmp_path, overlay, "withheld")
+    assert code == 0, output
+    folder = tmp_path / "results/tables"
+    scores = pd.read_parquet(folder / "withheld_scores.parquet").set_index(["check", "robot"])
+    assert len(scores.loc["label"]) == 3 and len(scores.loc["effect"]) == 1
+    assert scores.loc[("field", "field_09"), "right"]
+    assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
+    summary = pd.read_parquet(folder / "withheld_summary.parquet")
+    assert set(summary["check"]) == {"label", "effect", "field"} and (tmp_path / "results/figures/withheld.png").stat().st_size > 10_000
