@@ -237,3 +237,14 @@ def test_the_papers_campaign_each_trajectory_once_suffices_for_a_plain_effect():
     """No repeats: folds are stretches."""
     frame = measure((strong("encoder_eccentricity", 6.0),), plan=plan_of((campaigns.FORWARD,)))
     assert _checked(diagnosed(frame, details=True)).verdict["effects"] == "encoder_eccentricity"
+
+
+@pytest.mark.parametrize("time_constant", [40.0, 700.0])
+def test_a_time_constant_between_those_of_the_grid_is_fitted(time_constant):
+    """A strong growth whose misfit at the nearest grid value would look like a drift besides."""
+    effect = EFFECTS["thermal_growth"]
+    grown = ActiveEffect(effect, {"strain": 8e-4, "time_constant": time_constant})
+    found = diagnosed(measure((grown,)), details=True)
+    assert found.verdict["effects"] == "thermal_growth"
+    numbers = found.tables["gap_parameters"].set_index("parameter")["value"]
+    assert numbers["time_constant"] == pytest.approx(time_constant, rel=0.1) and numbers["strain"] == pytest.approx(8e-4, rel=0.05)
