@@ -21,7 +21,7 @@ class Prior:
     tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own inaccuracy.
     """
 
-    counts: tuple = (0.3, 0.5, 0.18, 0.02)
+    counts: tuple = (0.3, 0.55, 0.13, 0.02)
     unexplained: float = 0.1
     tolerance: float = 0.04
 
