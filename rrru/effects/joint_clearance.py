@@ -33,7 +33,7 @@ _PARAMETERS = ParameterSet(
         Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
     )
 )
-_SHAPES = tuple({"transition": force, "held": held} for held in (0.0, 1.0) for force in (0.0, 0.7, 2.0))
+_SHAPES = tuple({"transition": force, "held": held} for held in (0.0, 1.0) for force in (0.2, 0.7, 2.0))
 _COORDINATES = plain_coordinates(_PARAMETERS, 0.05, _SHAPES)
 
 
