@@ -92,9 +92,11 @@ def _set_rows(found, most=20):
 
 
 def _parameter_rows(found):
-    """Rows of `gap_parameters`: the numbers of the corrected sim, with standard errors by their change with the coordinates."""
+    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors by their change with the coordinates."""
     columns = ("effect", "parameter", "unit", "value", "standard_error", "at_bound")
     result, start, library = [], 0, found.case.library
+    for parameter, value in zip(found.case.mechanism.parameters, found.state.errors, strict=True):
+        result.append(dict(zip(columns, ("calibration", parameter.name, parameter.unit, value, np.nan, False), strict=True)))
     for term in found.hypothesis.terms:
         key, effect = (term.effect, term.shape), library[term.effect]
         if key not in found.state.effects:

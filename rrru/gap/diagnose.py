@@ -16,6 +16,8 @@ from rrru.gap.settings import GapSettings
 from rrru.gap.verdict import decide
 from rrru.seeds import stream
 
+# fewer points fit any effect, and left-out ones are extrapolated
+_POINTS_PER_PARAMETER = 3
 # what an effect may lose on left-out points before it is ruled out
 _VETO_NATS = 3.0
 # the diagnosis looks further than a calibration's bounds, which a strong effect would press against
@@ -48,8 +50,10 @@ def diagnose(measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None,
     of the campaign, for its random stream. Raises FitError where there are too few points to calibrate on.
     """
     case = make_case(measurements, sim(mechanism), masses, noise_mm or 1.0, settings.library(), use_near_singularity)
-    if 3 * len(case) < 2 * len(case.mechanism.parameters):
-        raise FitError(f"{len(case)} usable points are too few for a diagnosis; allowed: at least {len(case.mechanism.parameters)}")
+    least = _POINTS_PER_PARAMETER * len(case.mechanism.parameters)
+    if len(case) < least:
+        whose = f"campaign {name}: " if name else ""
+        raise FitError(f"{whose}{len(case)} usable points are too few for a diagnosis; allowed: at least {least}")
     found = attribute(case, settings.prior, "given" if noise_mm else "estimated")
     case = found.case
     generator = stream(settings.seed, "gap", name)

@@ -137,7 +137,8 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     errors, _ = _calibrated(measurements)
     case = make_case(measurements, _MECHANISM, Masses(), NOISE_MM, with_truth(EFFECTS, robot.acting))
     found = limits(case, errors, robot.acting, list(EFFECTS))
-    assert found.detects and found.rival_chi2 > 100.0
+    # a library that could make this gap would leave 50 once in a million noises
+    assert found.detects and found.rival_chi2 > 50.0
 
 
 def test_the_laws_from_outside_do_as_they_say():

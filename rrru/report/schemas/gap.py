@@ -25,10 +25,18 @@ TABLES = (
             ),
             Column("noise_rms_mm", NUMBER, "measuring noise, 3-D"),
             Column("gap_rms_mm", NUMBER, "what the calibrated sim gets wrong, noise taken out"),
-            Column("gap_after_rms_mm", NUMBER, "the same under the corrected sim, on held-out runs"),
+            Column(
+                "gap_after_rms_mm",
+                NUMBER,
+                "the same, expected of the corrected sim on held-out runs",
+            ),
             *(Column(name, NUMBER, f"{text}, on held-out runs") for name, text in _CLOSED),
             *(Column(f"worst_{axis}_mm", NUMBER, f"where the gap is largest, {axis}, robot frame") for axis in "xyz"),
-            Column("next_runs", "str", "runs that would tell the causes apart best; empty where none is needed"),
+            Column(
+                "next_runs",
+                "str",
+                "runs that would tell the causes apart best; empty where none is needed, helps or can be computed",
+            ),
             Column(
                 "noise_from",
                 "str",
@@ -140,7 +148,12 @@ TABLES = (
             Column("rms_mm", NUMBER, "measured minus sim"),
             Column("max_mm", NUMBER, "largest distance"),
             Column("noise_rms_mm", NUMBER, "measuring noise, 3-D"),
-            Column("gap_rms_mm", NUMBER, "rms with the noise taken out, 0 at least"),
+            Column(
+                "gap_rms_mm",
+                NUMBER,
+                "rms with the noise taken out, 0 at least; at the last held-out step the error to expect from the fitted numbers' uncertainty, "
+                "mixed with that by the probability that something is unexplained",
+            ),
             *(Column(name, NUMBER, f"{text}; null at step 0 and where there is no gap", True) for name, text in _CLOSED),
         ),
         ("campaign", "step", "trajectory", "kind"),
@@ -148,14 +161,19 @@ TABLES = (
     Table(
         "gap_parameters",
         "tables/gap_parameters.parquet",
-        "Fitted parameters of the effects in the verdict, to correct the simulator with.",
+        "The corrected simulator: parameters of the effects in the verdict, and the errors (effect: calibration) fitted with them.",
         (
             CAMPAIGN,
             Column("effect", "str", "name"),
             Column("parameter", "str", "name of the parameter"),
             Column("unit", "str", "unit of the value"),
             Column("value", NUMBER, "fitted value"),
-            Column("standard_error", NUMBER, "1 sigma; null where the points do not determine it", True),
+            Column(
+                "standard_error",
+                NUMBER,
+                "1 sigma, correlated among them; null for shapes, calibration and what was not fitted",
+                True,
+            ),
             Column("at_bound", "bool", "true where the fit ended at a bound"),
         ),
         ("campaign", "effect", "parameter"),
