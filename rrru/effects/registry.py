@@ -56,8 +56,11 @@ class UserEffect:
     label: str
 
     def contribute(self, motion, values):
-        """Changes at the points of a motion under parameter values (p,), in full shape; raises ConfigError where a shape does not fit."""
-        result = self.law.contribute(motion, values)
+        """Changes at the points of a motion under parameter values (p,), in full shape; raises ConfigError where it fails or does not fit."""
+        try:
+            result = self.law.contribute(motion, values)
+        except Exception as error:
+            raise ConfigError(f"effect {self.label!r}: contribute failed with {type(error).__name__}: {error}") from error
         if not isinstance(result, Contribution):
             raise ConfigError(f"effect {self.label!r}: contribute gave a {type(result).__name__}; allowed: a Contribution")
         shapes = {

@@ -142,3 +142,18 @@ def test_no_effects_at_all_leave_the_robot_ideal():
         assert active_effects(section) == ()
     _, position, _ = drive({}, plan)
     np.testing.assert_allclose(position, ROBOT.forward(ROBOT.inverse(plan.targets()), guess_mm=plan.targets()), atol=1e-8)
+
+
+def test_a_law_that_fails_is_named_in_the_error(tmp_path, monkeypatch):
+    (tmp_path / "broken_law.py").write_text(
+        "from rrru.parameters import Parameter, ParameterSet\n"
+        "class Broken:\n"
+        "    name = 'broken'\n"
+        "    parameters = ParameterSet((Parameter('size', 'mm', 0.0, 0.0, 1.0),))\n"
+        "    def contribute(self, motion, values):\n"
+        "        return motion.speeds\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ConfigError, match="'broken_law:Broken': contribute failed with AttributeError"):
+        find("broken_law:Broken").contribute(object(), [0.0])
