@@ -123,7 +123,7 @@ def noise(config, campaign, measurements):
     if given is not None:
         return given, "given"
     repeated, freedom = rows.repeat_noise(measurements)
-    if freedom >= 30 and repeated > 0.0:
+    if freedom >= rows.ENOUGH_REPEATS and repeated > 0.0:
         return repeated, "repeats"
     residuals = select(measurements, mechanism(config, campaign), ["*"], config["calibration"]["use_near_singularity"])
     if residuals is None:

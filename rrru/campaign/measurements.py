@@ -5,6 +5,8 @@ from fnmatch import fnmatchcase
 import numpy as np
 from scipy.spatial import cKDTree
 
+# degrees of freedom from which on repeated points tell the noise
+ENOUGH_REPEATS = 30
 USED = ("ok", "near_singularity")
 
 

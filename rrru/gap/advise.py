@@ -50,7 +50,7 @@ def _worth(attribution, truth, imitator, candidates, table, masses):
     """Nats between two (hypothesis, level) now and what each candidate adds."""
     case, evidence = attribution.case, attribution.evidence
     keys = list(dict.fromkeys((t.effect, t.shape) for h, _ in (truth, imitator) for t in h.terms))
-    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.library)
+    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects)
     there = planned.linearise(attribution.calibrated, keys)
     here = evidence.linear
     hypothesis, level = truth

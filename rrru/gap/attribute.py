@@ -56,16 +56,14 @@ def attribute(case, prior, noise_from="given"):
         calibrated = calibrate(case)
         if noise_from != "given":
             # spikes would pass for noise
-            bad = spoilt(case, case.measured_mm - case.sim(calibrated.errors)[case.used], 0.0)
+            bad = spoilt(case, case.measured_mm - case.model(calibrated), 0.0)
             if bad.any():
                 case = case.without(bad)
                 calibrated = calibrate(case)
-        if noise_from != "given":
             noise, noise_from = estimate_noise(case, case.linearise(calibrated))
             case = replace(case, noise_mm=noise)
         found = _rounds(case, calibrated, prior)
-        state = found[0]
-        bad = spoilt(case, case.measured_mm - (case.exact(state) if state.effects else case.sim(state.errors)[case.used]), case.noise_mm)
+        bad = spoilt(case, case.measured_mm - case.model(found[0]), case.noise_mm)
         if cleaning == _MOST_CLEANINGS or not bad.any():
             break
         case = case.without(bad)

@@ -7,12 +7,11 @@ Lengths in mm, angles in rad.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
-from rrru.effects.protocol import Contribution
+from rrru.effects.protocol import PLACES, Contribution
 from rrru.errors import FitError
-from rrru.gap.motion import at_turn_back, motion_of
+from rrru.gap.motion import at_turn_back, motion_of, starts_of_runs
 from rrru.gap.unknown import UNKNOWN
 from rrru.mechanisms.first_order import FirstOrder
 from rrru.plant.spatial import SpatialGeometry
@@ -34,11 +33,8 @@ class State:
     def shape(self, library, key):
         """Values of the shape's parameters of one effect (name, shape) by name."""
         name, number = key
-        return (
-            self.shapes.get(name, library[name].coordinates.shapes[number])
-            if key in self.effects
-            else library[name].coordinates.shapes[number]
-        )
+        listed = library[name].coordinates.shapes[number]
+        return self.shapes.get(name, listed) if key in self.effects else listed
 
     def values(self, library):
         """Parameter values (p,) by effect name."""
@@ -119,12 +115,13 @@ class Case:
         legs = robot.legs(state.errors)
         radial = np.full((3, 1), robot.R_mm)
         lengths = np.concatenate([radial, legs[:, 1:4], radial + legs[:, 4:]], axis=1)
-        geometry = SpatialGeometry(np.array(robot.azimuth_rad), lengths + change.length_mm, np.zeros((3, 6, 6)) + change.displacement)
-        drive = rows.theta(self.measurements) + legs[:, 0] + change.drive_rad
+        geometry = SpatialGeometry(np.array(robot.azimuth_rad), lengths, np.zeros((3, len(PLACES), 6)))
         passive = robot.passive_angles(command, robot.inverse(command))
-        position = geometry.solve(drive, passive, change.joint_mm).position_mm
-        frame = np.zeros(6) + change.frame
-        return (position @ Rotation.from_rotvec(frame[3:]).as_matrix().T + frame[:3])[self.used]
+        return geometry.solve_under(rows.theta(self.measurements) + legs[:, 0], passive, change).position_mm[self.used]
+
+    def model(self, state):
+        """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has none."""
+        return self.exact(state) if state.effects else self.sim(state.errors)[self.used]
 
     def linearise(self, state, shapes=None):
         """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
@@ -134,7 +131,7 @@ class Case:
         theta = rows.theta(self.measurements)
         position = self.sim(state.errors)
         first_order = FirstOrder(self.mechanism, position, theta, state.errors)
-        model = self.exact(state) if state.effects else position[self.used]
+        model = self.model(state)
         if not np.isfinite(model).all():
             raise FitError(f"the corrected sim has no pose at {int((~np.isfinite(model).all(axis=1)).sum())} points")
         if shapes is None:
@@ -188,12 +185,6 @@ class Case:
         return result
 
 
-def starts_of_runs(measurements):
-    """Rows (m,) that begin a run: what lies in the drives' play there depends on how the robot arrived, which no column tells."""
-    run = measurements["run"].to_numpy()
-    return np.concatenate([[True], np.diff(run) != 0])
-
-
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True):
     """The case of a measurement table.
 
@@ -204,7 +195,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         raise FitError("the campaign has no points")
     motion = motion_of(measurements, mechanism, masses)
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
-    used &= ~starts_of_runs(measurements) & ~at_turn_back(motion)
+    # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
+    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_turn_back(motion)
     used &= np.isfinite(mechanism.forward(rows.theta(measurements), guess_mm=rows.command(measurements))).all(axis=1)
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():

@@ -62,7 +62,7 @@ def diagnose(measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None,
     named = [term for term, _ in ordered]
     steps = shrink.steps(found, named, unknown, generator, settings.draws)
     closed = shrink.share_closed(steps[0], steps[-1]) if named else (0.0, 0.0, 0.0)
-    residual = case.measured_mm - case.sim(found.calibrated.errors)[case.used]
+    residual = case.measured_mm - case.model(found.calibrated)
     worst = worst_spot(case.motion.position_mm[case.used], residual)
     further = advise(found, verdict, masses)
     row = {

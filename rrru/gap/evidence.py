@@ -148,11 +148,11 @@ class Evidence:
         return self.none[levels, None] + gained, combinations
 
     def score(self, terms, strengths=None, levels=slice(None)):
-        """Log evidence (levels,) of a set of terms, averaged over their strengths; a grid cut short counts as the whole one."""
+        """Log evidence (levels,) of a set of terms, averaged over their strengths."""
         if not terms:
             return self.none[levels]
         value, _ = self.over_strengths(terms, strengths, levels)
-        return logsumexp(value, axis=1) - len(terms) * np.log(len(STRENGTHS))
+        return averaged(value, len(terms))
 
     def scales(self, terms, strengths):
         """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
@@ -186,8 +186,16 @@ class Evidence:
         return mean, covariance
 
 
+def averaged(value, terms):
+    """Log evidence (levels,) averaged over the strengths of a number of terms from that of every combination (levels, m) of them.
+
+    A grid that was cut short counts as the whole one.
+    """
+    return logsumexp(value, axis=1) - terms * np.log(len(STRENGTHS))
+
+
 def _with_laws(strengths):
-    """Strengths (m, terms) with the strength 1 of all laws' bending appended: (m, terms + 1)."""
+    """Strengths (m, terms) with the strength 1 of all laws' shapes appended: (m, terms + 1)."""
     return np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
 
 

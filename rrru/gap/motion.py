@@ -1,5 +1,7 @@
 """The motion behind a measurement table, as far as its columns tell: what the effects' laws are evaluated on. Lengths mm, angles rad."""
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
@@ -25,7 +27,8 @@ def motion_of(measurements, mechanism, masses):
     time = measurements["time_s"].to_numpy(dtype=float)
     velocity, acceleration = np.full_like(position, np.nan), np.full_like(position, np.nan)
     pieces, index, length, last = [], [], 0, None
-    for first, end in _runs(run):
+    edges = [*np.flatnonzero(starts_of_runs(run)), len(run)]
+    for first, end in pairwise(edges):
         points = position[first:end]
         velocity[first:end], acceleration[first:end] = _derivatives(points, time[first:end])
         path, at = _path(points)
@@ -58,10 +61,9 @@ def at_turn_back(motion):
     return result
 
 
-def _runs(run):
-    """(first row, row after the last) of every stretch of one run."""
-    edges = np.flatnonzero(np.diff(run)) + 1
-    return list(zip([0, *edges], [*edges, len(run)], strict=True))
+def starts_of_runs(run):
+    """Rows (m,) that begin a run, from the rows' run numbers (m,)."""
+    return np.concatenate([[True], np.diff(run) != 0])
 
 
 def _derivatives(points, time):

@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from rrru.campaign.measurements import repeat_noise
+from rrru.campaign.measurements import ENOUGH_REPEATS, repeat_noise
 from rrru.gap.evidence import along_runs
 
-# repeats count from so many degrees of freedom on
-_ENOUGH_REPEATS = 30
 # a point this many robust deviations from its neighbours on both sides is spoilt; no more than this share may be
 _SPOILT, _MOST = 8.0, 0.1
 
@@ -31,7 +29,7 @@ def estimate_noise(case, linear):
     freedom = 1.0 - rank / flat.shape[0]
     rough = float(np.sqrt((upper**2).mean() / max(freedom, 0.1)))
     repeated, count = repeat_noise(case.measurements.iloc[np.flatnonzero(case.used)])
-    if count >= _ENOUGH_REPEATS and 0.0 < repeated < rough * (1.0 - 3.0 / np.sqrt(2.0 * count)):
+    if count >= ENOUGH_REPEATS and 0.0 < repeated < rough * (1.0 - 3.0 / np.sqrt(2.0 * count)):
         return repeated, "repeats"
     return rough, "high_frequency"
 

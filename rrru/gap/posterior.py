@@ -61,14 +61,13 @@ class Posterior:
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
         return Posterior(kept, weights / max(weights.sum(), 1e-300), self.unexplained[keep])
 
-    def legs(self, effect, within=None):
-        """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts (and that the set of effects is `within`)."""
+    def legs(self, effect):
+        """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
         result = {}
         for hypothesis, weight in zip(self.hypotheses, self.weights, strict=True):
-            if within is None or hypothesis.effects == within:
-                for term in hypothesis.terms:
-                    if term.effect == effect:
-                        result[term.legs] = result.get(term.legs, 0.0) + float(weight.sum())
+            for term in hypothesis.terms:
+                if term.effect == effect:
+                    result[term.legs] = result.get(term.legs, 0.0) + float(weight.sum())
         total = sum(result.values())
         return {legs: p / total for legs, p in result.items()} if total > 0.0 else {}
 

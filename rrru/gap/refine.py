@@ -46,7 +46,7 @@ def refine(case, state, hypothesis, level):
     return state, covariance[:count, :count]
 
 
-def coordinates_of(library, terms, coefficients):
+def _coordinates(library, terms, coefficients):
     """Coordinates (c,) by (effect, shape) from the terms' coefficients in order."""
     result, start = {}, 0
     for term in terms:
@@ -58,7 +58,7 @@ def coordinates_of(library, terms, coefficients):
 
 def _target(linear, state, hypothesis, mean, library):
     """The state that the linearisation asks for: the terms' coefficients, their shapes, and the calibration that goes with them."""
-    effects = coordinates_of(library, hypothesis.terms, mean)
+    effects = _coordinates(library, hypothesis.terms, mean)
     rest = linear.data - sum(linear.columns[key] @ value for key, value in effects.items())
     shapes, start = dict(state.shapes), len(mean) - sum(columns.shape[-1] for columns in linear.laws.values())
     for term in hypothesis.terms:

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-from scipy.special import logsumexp
 
-from rrru.gap.evidence import LEVELS, STRENGTHS
+from rrru.gap.evidence import LEVELS, STRENGTHS, averaged
 from rrru.gap.terms import variants
 from rrru.gap.unknown import UNKNOWN
 
@@ -59,10 +58,9 @@ def search(evidence, most=3):
                 if name not in start.effects and not (name in UNKNOWN and start.effects & set(UNKNOWN)):
                     for term in choices[name]:
                         score((*start.terms, term), _narrow(start, near), near)
-        layer = _best(found, size)
-        for hypothesis in layer:
-            others = [[t for t in choices[term.effect] if t.shape == term.shape] for term in hypothesis.terms]
-            if size == 2:
+        if size == 2:
+            for hypothesis in _best(found, size):
+                others = [[t for t in choices[term.effect] if t.shape == term.shape] for term in hypothesis.terms]
                 for terms in product(*others):
                     score(terms, levels=near)
         layer = _best(found, size)
@@ -86,13 +84,13 @@ def _score(evidence, terms, strengths, levels, leader):
         probe = leader[0]
         coarse = tuple(grid[1::2] if len(grid) == len(STRENGTHS) else grid for grid in strengths or (STRENGTHS,) * len(terms))
         value, grid = evidence.over_strengths(terms, coarse, [probe])
-        full[probe] = logsumexp(value) - len(terms) * np.log(len(STRENGTHS))
+        full[probe] = averaged(value, len(terms))[0]
         best[probe] = grid[value[0].argmax()]
         if full[probe] < leader[1] - _HOPELESS:
             return Hypothesis(tuple(terms), full, best)
     levels = np.arange(len(LEVELS)) if levels is None else levels
     value, grid = evidence.over_strengths(terms, strengths, levels)
-    full[levels] = logsumexp(value, axis=1) - len(terms) * np.log(len(STRENGTHS))
+    full[levels] = averaged(value, len(terms))
     best[levels] = grid[value.argmax(axis=1)]
     return Hypothesis(tuple(terms), full, best)
 

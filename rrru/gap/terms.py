@@ -16,11 +16,6 @@ class Term:
     shape: int = 0
     legs: str | int = EACH
 
-    @property
-    def leg(self):
-        """The one leg, or 0."""
-        return self.legs if isinstance(self.legs, int) else 0
-
 
 def spread(coordinates, legs):
     """Matrix (c, k) from the k free numbers of a term to the effect's coordinates."""

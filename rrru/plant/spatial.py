@@ -8,7 +8,7 @@ with a small rigid displacement D after every fixed part. T_1 = T_2 = T_3 gives 
 turn. Nothing here uses eq. (8), which the calibration solves. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -64,6 +64,18 @@ class SpatialGeometry:
             np.ascontiguousarray(shift, dtype=float),
         )
         return SpatialSolution(position, turned, residual, residual < 1e3 * _TOLERANCE_MM)
+
+    def solve_under(self, theta_rad, passive_guess_rad, change):
+        """Close the chains as `solve` does under what effects contribute; positions are in the tracker's frame.
+
+        Displacements of effects and the geometry's own at one place are added, which holds to first order in their angles.
+        """
+        changed = replace(self, lengths_mm=self.lengths_mm + change.length_mm, deviations=self.deviations + change.displacement)
+        solution = changed.solve(theta_rad + change.drive_rad, passive_guess_rad, change.joint_mm)
+        if not np.any(change.frame):
+            return solution
+        turn = Rotation.from_rotvec(change.frame[3:]).as_matrix()
+        return replace(solution, position_mm=solution.position_mm @ turn.T + change.frame[:3])
 
     def closure_determinant(self, theta_rad, passive_rad):
         """Determinant (n,) of the 12 x 12 closure Jacobian at drive angles (n, 3) and passive angles (n, 3, 4), lengths in units of 500 mm."""

@@ -1,9 +1,8 @@
 """The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rrru.effects.motion import make_motion
 from rrru.effects.protocol import PLACES, Contribution
@@ -82,23 +81,14 @@ class VirtualRobot:
     def positions(self, motion, target):
         """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
 
-        NaN where the chains do not close near the target or the platform would turn by more than the limit. Displacements of effects and the
-        robot's own deviations at one place are added, which holds to first order in their angles.
+        NaN where the chains do not close near the target or the platform would turn by more than the limit.
         """
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
         passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
-        drive = motion.theta_rad + self.drive_errors_rad + change.drive_rad
-        geometry = self.geometry
-        geometry = replace(
-            geometry, lengths_mm=geometry.lengths_mm + change.length_mm, deviations=geometry.deviations + change.displacement
-        )
-        solution = geometry.solve(drive, passive, change.joint_mm)
+        solution = self.geometry.solve_under(motion.theta_rad + self.drive_errors_rad, passive, change)
         turned = np.linalg.norm(solution.rotation_rad, axis=1)
         solved = solution.converged & (turned <= self.rotation_limit_rad)
-        position = np.where(solved[:, None], solution.position_mm, np.nan)
-        if np.any(change.frame):
-            position = position @ Rotation.from_rotvec(change.frame[3:]).as_matrix().T + change.frame[:3]
-        return position, turned
+        return np.where(solved[:, None], solution.position_mm, np.nan), turned
 
     def motion(self, plan, controller):
         """What the effects may know about a plan driven through a controller; the loads are those of the nominal mechanism."""

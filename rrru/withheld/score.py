@@ -5,7 +5,7 @@ import pandas as pd
 
 from rrru.effects.registry import EFFECTS
 from rrru.errors import ConfigError
-from rrru.gap.case import make_case
+from rrru.gap.case import State, make_case
 from rrru.mechanisms.dynamics import Masses
 from rrru.withheld.draw import fresh
 from rrru.withheld.oracle import limits, with_truth
@@ -30,8 +30,8 @@ def true_share(robot, seed, calibrated, state, mechanism, library):
     if driven is None:
         return np.nan
     case = make_case(driven[0], mechanism, Masses(), NOISE_MM, library)
-    before = case.measured_mm - case.sim(calibrated)[case.used]
-    after = case.measured_mm - (case.exact(state) if state.effects else case.sim(state.errors)[case.used])
+    before = case.measured_mm - case.model(State(calibrated, {}))
+    after = case.measured_mm - case.model(state)
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))
 
 

@@ -10,8 +10,8 @@ from rrru.campaign import measurements as rows
 from rrru.effects.registry import EFFECTS
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State, starts_of_runs
-from rrru.gap.motion import at_turn_back
+from rrru.gap.case import State
+from rrru.gap.motion import at_turn_back, starts_of_runs
 from tests.gap import campaigns
 from tests.gap.campaigns import ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 
@@ -25,7 +25,7 @@ def case():
 
 def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     run = case.measurements["run"].to_numpy()
-    starts = starts_of_runs(case.measurements)
+    starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
     np.testing.assert_array_equal(case.used, ~starts & ~at_turn_back(case.motion))
     assert len(case) == case.used.sum() == len(case.measured_mm) == len(case.run)
@@ -40,7 +40,7 @@ def test_points_that_are_lost_or_marked_are_not_used():
     frame.loc[60:70, "status"] = "near_singularity"
     near = slice(60, 71)
     kept = case_of(frame).used[near]
-    assert kept.any() and kept.sum() == (~starts_of_runs(frame) & ~at_turn_back(case_of(frame).motion))[near].sum()
+    assert kept.any() and kept.sum() == (~starts_of_runs(frame["run"].to_numpy()) & ~at_turn_back(case_of(frame).motion))[near].sum()
 
 
 def test_points_dropped_later_stay_dropped(case):
@@ -54,7 +54,7 @@ def test_points_dropped_later_stay_dropped(case):
 def test_the_motion_read_from_the_columns_is_the_one_that_was_driven(case):
     """Rates, loads and drive path of the table against those of the plan, which knows them in closed form; away from a run's ends."""
     driven = robot_of().motion(plan_of(), ROBOT.inverse)
-    inner = case.used & np.append(~starts_of_runs(case.measurements)[1:], False)
+    inner = case.used & np.append(~starts_of_runs(case.measurements["run"].to_numpy())[1:], False)
     for name, share in (("theta_rate_rad_s", 0.04), ("torque_nmm", 0.01), ("force_n", 0.01), ("held_force_n", 0.01)):
         found, true = getattr(case.motion, name)[inner], getattr(driven, name)[inner]
         assert np.sqrt(((found - true) ** 2).mean()) < share * np.sqrt((true**2).mean()), name

@@ -1,14 +1,12 @@
 """The diagnosis as a user runs it: with an effect of one's own, on a file that lacks columns, and refused."""
 
 import subprocess
-import sys
-from pathlib import Path
 
 import pandas as pd
 import pytest
 
-_ROOT = Path(__file__).resolve().parents[2]
-_SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+from tests.workflow.folder import ROOT, SNAKEMAKE, link
+
 _DRIFT = """
 import numpy as np
 from rrru.effects.protocol import Contribution
@@ -25,11 +23,9 @@ class Drift:
 
 def _run(folder, overlay, *targets):
     """Exit code and output of snakemake in a folder that sees the project's files through links."""
-    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests"):
-        if not (folder / name).exists():
-            (folder / name).symlink_to(_ROOT / name)
+    link(folder)
     (folder / "mine.yaml").write_text(overlay)
-    command = [str(_SNAKEMAKE), "--cores", "2", *targets, "--configfile", "mine.yaml"]
+    command = [SNAKEMAKE, "--cores", "2", *targets, "--configfile", "mine.yaml"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
     return done.returncode, done.stdout + done.stderr
 
@@ -53,7 +49,7 @@ def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tm
 
 
 def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not_test(tmp_path):
-    points = pd.read_csv(_ROOT / "tests/data/field_02.csv")
+    points = pd.read_csv(ROOT / "tests/data/field_02.csv")
     points.drop(columns=["time_s", "speed_mm_s", "payload_kg", "theta1_rad", "theta2_rad", "theta3_rad"]).to_csv(
         tmp_path / "bare.csv", index=False
     )

@@ -3,20 +3,18 @@
 import ast
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
-_ROOT = Path(__file__).resolve().parents[2]
-_SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+from tests.workflow.folder import ROOT, SNAKEMAKE
 
 
 @pytest.fixture(scope="module")
 def jobs():
     """(rule, inputs, outputs) of every job of the check, as snakemake plans them."""
-    command = [str(_SNAKEMAKE), "-n", "--forceall", "withheld", "gap", "--configfile", "tests/minimal.yaml"]
-    plan = subprocess.run(command, cwd=_ROOT, capture_output=True, text=True, check=False)
+    command = [SNAKEMAKE, "-n", "--forceall", "withheld", "gap", "--configfile", "tests/minimal.yaml"]
+    plan = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert plan.returncode == 0, plan.stderr
     result = []
     for block in re.split(r"^(?=(?:local)?rule \w+:$)", plan.stdout + plan.stderr, flags=re.MULTILINE):
@@ -72,7 +70,7 @@ def _reached(path, seen):
     """Every file of the package that a file imports, by itself or through others."""
     for name in _imports(path):
         parts = name.split(".")
-        file = _ROOT.joinpath(*parts).with_suffix(".py")
+        file = ROOT.joinpath(*parts).with_suffix(".py")
         if parts[0] == "rrru" and file.is_file() and file not in seen:
             seen.add(file)
             _reached(file, seen)
@@ -81,10 +79,10 @@ def _reached(path, seen):
 
 @pytest.mark.parametrize("script", ["withheld_diagnose", "diagnose"])
 def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
-    reached = _reached(_ROOT / f"workflow/scripts/{script}.py", set())
+    reached = _reached(ROOT / f"workflow/scripts/{script}.py", set())
     assert {"diagnose", "case"} <= {file.stem for file in reached if file.parent.name == "gap"}
     # of the room that draws the robots only how a corrected sim is written down
     assert {file.stem for file in reached if file.parent.name == "withheld"} <= {"states"}
     # and the walk would see them
-    seen = {file.stem for file in _reached(_ROOT / "workflow/scripts/withheld_score.py", set()) if file.parent.name == "withheld"}
+    seen = {file.stem for file in _reached(ROOT / "workflow/scripts/withheld_score.py", set()) if file.parent.name == "withheld"}
     assert seen >= {"draw", "robots", "outside"}

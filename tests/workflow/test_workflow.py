@@ -4,28 +4,21 @@ import hashlib
 import os
 import signal
 import subprocess
-import sys
 import time
-from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from rrru.reproduce import paper_a
-
-_ROOT = Path(__file__).resolve().parents[2]
-_SNAKEMAKE = Path(sys.executable).parent / "snakemake"
+from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 
 def _start(folder, *arguments, cores=2):
     """A running snakemake in a folder of its own, which sees the project's files through links."""
-    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests"):
-        link = folder / name
-        if not link.exists():
-            link.symlink_to(_ROOT / name)
+    link(folder)
     overlay = ["--configfile", "tests/minimal.yaml", *[a for a in arguments if a.endswith(".yaml")]]
     rest = [a for a in arguments if not a.endswith(".yaml")]
-    command = [str(_SNAKEMAKE), "--cores", str(cores), *rest, *overlay]
+    command = [SNAKEMAKE, "--cores", str(cores), *rest, *overlay]
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
 
 
@@ -111,7 +104,7 @@ def test_a_killed_run_ends_with_the_same_bytes(finished, tmp_path):
 
 def test_a_user_campaign_is_added_by_an_overlay(finished, tmp_path):
     """Only the campaign's own part is made: the rest is the same study."""
-    data = pd.read_csv(_ROOT / "tests/data/field_01.csv").drop(columns=["theta1_rad", "theta2_rad", "theta3_rad", "payload_kg"])
+    data = pd.read_csv(ROOT / "tests/data/field_01.csv").drop(columns=["theta1_rad", "theta2_rad", "theta3_rad", "payload_kg"])
     position = [f"{kind}_{axis}_mm" for kind in ("command", "measured") for axis in "xyz"]
     data[position] /= 25.4
     data.to_csv(tmp_path / "mine.csv", index=False)
@@ -128,7 +121,7 @@ def test_a_user_campaign_is_added_by_an_overlay(finished, tmp_path):
 
 
 def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
-    lines = (_ROOT / "tests/data/field_01.csv").read_text().splitlines()
+    lines = (ROOT / "tests/data/field_01.csv").read_text().splitlines()
     lines[17] = lines[17].replace(lines[17].split(",")[11], "oops")
     (tmp_path / "bad.csv").write_text("\n".join(lines))
     (tmp_path / "bad.yaml").write_text("campaigns: {bad: {robot: rrru3, ingest: bad.csv}}\n")

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import diagnose, sim
+from rrru.gap.diagnose import diagnose
 from rrru.gap.settings import GapSettings
 from rrru.mechanisms.dynamics import Masses
 from rrru.mechanisms.protocol import make_mechanism
@@ -20,7 +20,7 @@ def main(config, without, inputs, outputs):
     settings = GapSettings.from_config(config["gap"], config["seed"])
     if without:
         settings = settings.without(without)
-    mechanism = sim(make_mechanism("rrru3", config["robots"].get("rrru3", {})))
+    mechanism = make_mechanism("rrru3", config["robots"].get("rrru3", {}))
     verdicts, states = [], []
     for (robot, kind), rows in tables.read(inputs["measurements"]).groupby(["robot", "kind"], sort=True):
         points = rows[tables.columns("measurements")].reset_index(drop=True)
