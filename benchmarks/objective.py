@@ -37,7 +37,7 @@ def _fsolve_rate(residuals, errors, count):
         return x * x + z * z - (legs[:, 2] + np.sqrt(legs[:, 3] ** 2 - v * v)) ** 2
 
     start = perf_counter()
-    positions = [fsolve(closure, g, args=(t,)) for t, g in zip(residuals.theta_rad[:count], residuals.start_mm[:count], strict=True)]
+    positions = [fsolve(closure, g, args=(t,)) for t, g in zip(residuals.actuators[:count], residuals.start_mm[:count], strict=True)]
     return count / (perf_counter() - start), np.array(positions)
 
 

@@ -133,7 +133,7 @@ def noise(config, campaign, measurements):
 
 def with_singularities(robot, measurements, margin):
     """The measurements with points near a constraint singularity marked, and the rows of `singularity` (without the campaign's name)."""
-    position, theta = rows.command(measurements), rows.theta(measurements)
+    position, theta = rows.command(measurements), rows.actuators(measurements)
     measurements = rows.mark_near_singularity(measurements, singularity.constraint_measure(robot, position, theta), margin)
     return measurements, measurements[["run", "trajectory", "point", "status"]].assign(
         translational_measure=singularity.translational_measure(robot, position, theta),

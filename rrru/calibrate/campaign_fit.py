@@ -17,7 +17,7 @@ def select(measurements, mechanism, patterns, use_near_singularity=True):
     if 3 * chosen.sum() < len(mechanism.parameters):
         return None
     frame = measurements.loc[chosen]
-    return Residuals(mechanism, rows.theta(frame), rows.measured(frame), rows.command(frame))
+    return Residuals(mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame))
 
 
 def fit_sets(measurements, mechanism, settings, noise_mm=None):

@@ -14,8 +14,8 @@ RANK_TOLERANCE = 1e-6
 
 
 def parameter_scale(mechanism):
-    """Size (p,) of each parameter that moves something by 1 mm: 1 mm for lengths, 1 mm / L1 for angles."""
-    return np.array([1.0 / mechanism.L1_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
+    """Size (p,) of each parameter that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm for angles."""
+    return np.array([1.0 / mechanism.angle_arm_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
 
 
 @dataclass(frozen=True)

@@ -59,8 +59,9 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     Raises FitError, carrying scipy's result, where there are fewer equations than parameters or the search fails.
     """
     parameters = residuals.mechanism.parameters
-    if 3 * len(residuals) < len(parameters):
-        raise FitError(f"{len(residuals)} points give {3 * len(residuals)} equations; allowed: at least {len(parameters)}")
+    equations = residuals.residual(parameters.nominal).size
+    if equations < len(parameters):
+        raise FitError(f"{len(residuals)} points give {equations} equations; allowed: at least {len(parameters)}")
     start = analyse(residuals.mechanism, residuals.jacobian(parameters.nominal))
     seen = (start.directions[: start.rank] * start.scale).T
     linear = loss == "linear"

@@ -7,23 +7,24 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.mechanisms import kernels
+from rrru.mechanisms.rrru3 import Rrru3
 
 
 @dataclass(frozen=True)
 class Residuals:
     """Points of a calibration.
 
-    mechanism: its `parameters` are fitted; theta_rad, measured_mm, start_mm: (n, 3) commanded drive angles, measured positions and
+    mechanism: its `parameters` are fitted; actuators, measured_mm, start_mm: (n, 3) actuator values, measured positions and
     positions near which the model's are found (the commanded ones). Raises FitError where a number is not finite.
     """
 
     mechanism: object
-    theta_rad: np.ndarray
+    actuators: np.ndarray
     measured_mm: np.ndarray
     start_mm: np.ndarray
 
     def __post_init__(self):
-        for name in ("theta_rad", "measured_mm", "start_mm"):
+        for name in ("actuators", "measured_mm", "start_mm"):
             bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
             if bad.size:
                 raise FitError(f"{name} is not finite at {bad.size} of {len(self)} points, the first is point {bad[0] + 1}")
@@ -32,21 +33,21 @@ class Residuals:
             raise FitError(f"the nominal robot cannot take {lost.size} of {len(self)} poses, the first is point {lost[0] + 1}")
 
     def __len__(self):
-        return len(self.theta_rad)
+        return len(self.actuators)
 
     @cached_property
     def nominal_mm(self):
         """Model positions (n, 3) without errors."""
-        return self.mechanism.forward(self.theta_rad, guess_mm=self.start_mm)
+        return self.mechanism.forward(self.actuators, guess_mm=self.start_mm)
 
     @cached_property
     def _kernel_arguments(self):
         """Arrays of the compiled objective that do not change with the errors."""
-        slope = self.mechanism.error_jacobian(self.nominal_mm, self.theta_rad)
+        slope = self.mechanism.error_jacobian(self.nominal_mm, self.actuators)
         return (
             self.mechanism.turn,
-            np.ascontiguousarray(np.cos(self.theta_rad).T),
-            np.ascontiguousarray(np.sin(self.theta_rad).T),
+            np.ascontiguousarray(np.cos(self.actuators).T),
+            np.ascontiguousarray(np.sin(self.actuators).T),
             np.ascontiguousarray(self.nominal_mm.T),
             np.ascontiguousarray(slope.transpose(2, 1, 0)),
             np.ascontiguousarray(self.measured_mm.T),
@@ -54,7 +55,7 @@ class Residuals:
 
     def model(self, errors):
         """Model positions (n, 3) in mm under errors (p,)."""
-        return self.mechanism.forward(self.theta_rad, errors, self.nominal_mm)
+        return self.mechanism.forward(self.actuators, errors, self.nominal_mm)
 
     def residual(self, errors):
         """Measured minus model positions (n, 3) in mm under errors (p,)."""
@@ -62,9 +63,12 @@ class Residuals:
 
     def jacobian(self, errors):
         """Derivative (n, 3, p) of the residual with respect to the errors."""
-        return -self.mechanism.error_jacobian(self.model(errors), self.theta_rad, errors)
+        return -self.mechanism.error_jacobian(self.model(errors), self.actuators, errors)
 
     def mean_distance(self, errors):
         """Objective of paper A, eq. (11): mean distance (m,) in mm for errors (m, p); inf where the model leaves the reach."""
         errors = np.ascontiguousarray(errors, dtype=float)
+        if not isinstance(self.mechanism, Rrru3):
+            distance = np.linalg.norm(self.measured_mm - self.mechanism.forward_batch(self.actuators, errors), axis=-1).mean(axis=-1)
+            return np.where(np.isfinite(distance), distance, np.inf)
         return kernels.mean_distance(errors, self.mechanism.legs(errors), *self._kernel_arguments)

@@ -20,9 +20,15 @@ def measured(measurements):
     return measurements[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
 
 
-def theta(measurements):
-    """Commanded drive angles (n, 3)."""
-    return measurements[[f"theta{k}_rad" for k in (1, 2, 3)]].to_numpy(dtype=float)
+def actuator_columns(drive_unit):
+    """Names of the columns of commanded actuator values: drive angles in "rad" or slider positions in "mm"."""
+    return [f"theta{k}_rad" if drive_unit == "rad" else f"slider{k}_mm" for k in (1, 2, 3)]
+
+
+def actuators(measurements):
+    """Commanded actuator values (n, 3), drive angles in rad or slider positions in mm."""
+    unit = "mm" if "slider1_mm" in measurements else "rad"
+    return measurements[actuator_columns(unit)].to_numpy(dtype=float)
 
 
 def on_trajectories(measurements, patterns):

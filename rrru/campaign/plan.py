@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 
+from rrru.campaign.measurements import actuator_columns
 from rrru.campaign.motion import Trapezoid
 from rrru.campaign.trajectories import sample
 
@@ -40,13 +41,13 @@ class Plan:
     dwell_s: float
 
     def commands(self, mechanism):
-        """Table of the commanded points: run, trajectory, point, time, position, drive angles, speed, payload.
+        """Table of the commanded points: run, trajectory, point, time, position, actuator values, speed, payload.
 
         Raises UnreachableError where a point is out of the mechanism's reach.
         """
         frames, first, time = [], 0, self.time_s()
         for number, run in enumerate(self.runs, start=1):
-            theta = mechanism.require_reachable(run.points_mm)
+            values = mechanism.require_reachable(run.points_mm)
             frames.append(
                 pd.DataFrame(
                     {
@@ -55,7 +56,7 @@ class Plan:
                         "point": np.arange(1, len(run.points_mm) + 1),
                         "time_s": time[first : first + len(run.points_mm)],
                         **{f"command_{axis}_mm": run.points_mm[:, k] for k, axis in enumerate("xyz")},
-                        **{f"theta{k + 1}_rad": theta[:, k] for k in range(3)},
+                        **dict(zip(actuator_columns(mechanism.drive_unit), values.T, strict=True)),
                         "speed_mm_s": run.speed_mm_s,
                         "payload_kg": run.payload_kg,
                     }

@@ -22,7 +22,7 @@ def before(measurements):
 
 def model_residual(measurements, mechanism, errors, calibration, method):
     """Rows of `errors` in mode "model": measured position minus the one that the calibrated model gives for the angles that were sent."""
-    model = mechanism.forward(rows.theta(measurements), errors, rows.command(measurements))
+    model = mechanism.forward(rows.actuators(measurements), errors, rows.command(measurements))
     return _rows(measurements, rows.measured(measurements) - model, calibration, method, "model")
 
 

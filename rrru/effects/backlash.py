@@ -16,7 +16,8 @@ sign would hold the arm at one side and make a constant of it); the play starts 
 are those commanded. Points of the path at which the angle is unknown are passed over.
 
 Source: as above; Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002. The size is assumed:
-worm and planetary drives of the cheaper kind have some arc minutes, 1 arc minute is 2.9e-4 rad.
+worm and planetary drives of the cheaper kind have some arc minutes, 1 arc minute is 2.9e-4 rad. SLIDER is the law of a
+screw drive, with the play of its nut in mm (paper B, section 3.1).
 """
 
 from dataclasses import dataclass
@@ -52,7 +53,7 @@ _COORDINATES = plain_coordinates(_PARAMETERS, 5e-4)
 
 @dataclass(frozen=True)
 class Backlash:
-    """Play of a width per leg in the drive angle."""
+    """Play of a width per leg in the drive."""
 
     name: str = "backlash"
     parameters: ParameterSet = _PARAMETERS
@@ -60,6 +61,10 @@ class Backlash:
     needs: tuple = ()
 
     def contribute(self, motion, values):
-        """Changes (n, 3) of the drive angles under widths (3,) in rad."""
-        along_path = play(np.ascontiguousarray(motion.path_theta_rad), 0.5 * np.asarray(values, dtype=float))
-        return Contribution(drive_rad=along_path[motion.path_index])
+        """Changes (n, 3) of the actuator values under widths (3,) in their unit."""
+        along_path = play(np.ascontiguousarray(motion.path_drive), 0.5 * np.asarray(values, dtype=float))
+        return Contribution(drive=along_path[motion.path_index])
+
+
+_SCREW = ParameterSet(tuple(Parameter(f"width{k}", "mm", 0.0, 0.0, 1.0, "paper B, eq. (19) measures it; size assumed") for k in LEGS))
+SLIDER = Backlash(parameters=_SCREW, coordinates=plain_coordinates(_SCREW, 0.02))

@@ -16,6 +16,8 @@ drives; a second payload shows it plainly, since nothing else but `link_flexure`
 Assumptions: linear spring (harmonic drives stiffen with torque by a factor of about two over their range), no lost motion (that is
 `backlash`), wind-up small enough that loads are those at the commanded pose, no vibration (a motion slow against the drive's resonance).
 
+SLIDER is the law of a carriage on a screw or belt: b_i errs by k_i F_i with the force F_i of all loads along its rail.
+
 Source: Tsai, Robot Analysis, 1999, chapter 10 (loads); Spong, Modeling and control of elastic joint robots, ASME Journal of Dynamic Systems,
 Measurement, and Control 109, 1987 (joint as a torsion spring). The size is assumed: 15 N m on 50 kN m/rad make 3e-4 rad.
 """
@@ -35,13 +37,19 @@ _COORDINATES = plain_coordinates(_PARAMETERS, 2e-8)
 
 @dataclass(frozen=True)
 class DriveCompliance:
-    """Drive angles that give way to static and inertial torque, compliance per leg."""
+    """Drives that give way to static and inertial loads, compliance per leg."""
 
     name: str = "drive_compliance"
     parameters: ParameterSet = _PARAMETERS
     coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("torque_nmm",)
+    needs: tuple = ("drive_load",)
 
     def contribute(self, motion, values):
-        """Changes (n, 3) of the drive angles under compliances (3,) in rad/(N mm)."""
-        return Contribution(drive_rad=np.asarray(values, dtype=float) * motion.torque_nmm)
+        """Changes (n, 3) of the actuator values under compliances (3,), rad/(N mm) or mm/N."""
+        return Contribution(drive=np.asarray(values, dtype=float) * motion.drive_load)
+
+
+_SCREW = ParameterSet(
+    tuple(Parameter(f"compliance{k}", "mm/N", 0.0, 0.0, 0.05, "screw, nut, bearing and carriage, size assumed") for k in LEGS)
+)
+SLIDER = DriveCompliance(parameters=_SCREW, coordinates=plain_coordinates(_SCREW, 1e-3))

@@ -39,4 +39,4 @@ class EncoderEccentricity:
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles under amplitudes (3,) and phases (3,) in rad."""
-        return Contribution(drive_rad=harmonic(motion.theta_rad, 1.0, values))
+        return Contribution(drive=harmonic(motion.drive, 1.0, values))

@@ -15,6 +15,8 @@ with three free forearm lengths takes up, and one with tied lengths in part; it 
 Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time); the contact lies on
 the forearm's line; the pin's radius left out.
 
+SLIDER is the law of a robot whose link has no joint of its own that could be held.
+
 Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005. Paper A,
 section 3.3, blames it for what calibration leaves; its size is assumed.
 """
@@ -56,3 +58,8 @@ class JointClearance:
         side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
         push = side * np.asarray(values[:3], dtype=float)
         return Contribution(joint_mm=-push[..., None] * motion.force_direction)
+
+
+SLIDER = JointClearance(
+    coordinates=plain_coordinates(_PARAMETERS, 0.05, tuple({"transition": force, "held": 0.0} for force in (0.2, 0.7, 2.0)))
+)

@@ -11,6 +11,8 @@ The part common to the legs, (dLk_1 + dLk_2 + dLk_3) / 3, is the calibration's o
 new. L2 and L3 of one leg act nearly alike, since rho = L2 + sqrt(L3^2 - v^2) tells them apart only where the tangential offset v of the
 platform is large.
 
+A robot with one link per leg (`LinkAsymmetry`) has the three dL3_i only.
+
 Assumptions: rigid links, constant over the campaign.
 
 Source: paper A, section 2.2 (the 14 errors); the bounds are those of its calibration here. Typical size assumed: what a workshop holds on
@@ -45,3 +47,26 @@ class LegAsymmetry:
         length = np.zeros((len(motion), 3, 5))
         length[..., 1:4] = np.reshape(values, (3, 3))
         return Contribution(length_mm=length)
+
+
+_ONE_LINK = ParameterSet(tuple(Parameter(f"dL_leg{leg}", "mm", 0.0, -4.0, 4.0, "workshop tolerance, assumed") for leg in LEGS))
+_ONE_LINK_COORDINATES = plain_coordinates(_ONE_LINK, 0.3)
+
+
+@dataclass(frozen=True)
+class LinkAsymmetry:
+    """Length of every leg's one link by itself."""
+
+    name: str = "leg_asymmetry"
+    parameters: ParameterSet = _ONE_LINK
+    coordinates: Coordinates = _ONE_LINK_COORDINATES
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Changes (n, 3, 5) of the lengths under dL of legs 1 to 3, (3,) in mm."""
+        length = np.zeros((len(motion), 3, 5))
+        length[..., 3] = values
+        return Contribution(length_mm=length)
+
+
+SLIDER = LinkAsymmetry()

@@ -15,6 +15,8 @@ member from elbow to U-joint (`rrru.mechanisms.dynamics.held_force`). Both are t
 Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads are those at the
 commanded pose.
 
+SLIDER is the law of a robot whose link has no joint of its own that could be held.
+
 Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain aluminium tube
 of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here are assumed.
 """
@@ -51,3 +53,6 @@ class LinkFlexure:
         length = np.zeros((len(motion), 3, 5))
         length[..., _FOREARM] = -np.asarray(values[:3], dtype=float) * force
         return Contribution(length_mm=length)
+
+
+SLIDER = LinkFlexure(coordinates=plain_coordinates(_PARAMETERS, 2e-3, ({"held": 0.0},)))

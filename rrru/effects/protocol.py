@@ -16,43 +16,43 @@ PLACES = ("base", "elbow", "knee", "wrist", "cross", "platform")
 class Motion:
     """What the robot does at the n sampled points, as far as an effect may need it; NaN where nobody knows it.
 
-    position_mm (n, 3): commanded positions; theta_rad, theta_rate_rad_s, theta_acceleration_rad_s2 (n, 3): commanded drive angles and
-    their derivatives; path_theta_rad (N, 3): the angles along everything that is driven, path_index (n,): rows of the sampled points in
-    it; time_s (n,): since the campaign's start; payload_kg (n,); force_n (n, 3): force with which each leg pushes the platform along
-    force_direction (n, 3 legs, 3), the forearm's direction, compression positive, and held_force_n (n, 3) the same if friction holds
-    joint 3; torque_nmm (n, 3): torque of the loads on each drive arm, positive in the sense of theta; lengths_mm (5,): nominal R, L1,
-    L2, L3, r.
+    position_mm (n, 3): commanded positions; drive, drive_rate, drive_acceleration (n, 3): commanded actuator values, angles in rad or slider
+    positions in mm, and their derivatives by the time; path_drive (N, 3): the values along everything that is driven, path_index (n,): rows
+    of the sampled points in it; time_s (n,): since the campaign's start; payload_kg (n,); force_n (n, 3): force with which each leg pushes
+    the platform along force_direction (n, 3 legs, 3), the forearm's direction, compression positive, and held_force_n (n, 3) the same
+    if friction holds joint 3; drive_load (n, 3): torque in N mm or force in N of the loads on each drive, positive in the drive's sense;
+    lengths_mm (5,): nominal R, L1, L2, L3, r; L3 is the link that reaches the platform, 0 what a robot does not have.
     """
 
     position_mm: np.ndarray
-    theta_rad: np.ndarray
-    theta_rate_rad_s: np.ndarray
-    theta_acceleration_rad_s2: np.ndarray
-    path_theta_rad: np.ndarray
+    drive: np.ndarray
+    drive_rate: np.ndarray
+    drive_acceleration: np.ndarray
+    path_drive: np.ndarray
     path_index: np.ndarray
     time_s: np.ndarray
     payload_kg: np.ndarray
     force_n: np.ndarray
     held_force_n: np.ndarray
     force_direction: np.ndarray
-    torque_nmm: np.ndarray
+    drive_load: np.ndarray
     lengths_mm: np.ndarray
 
     def __len__(self):
-        return len(self.theta_rad)
+        return len(self.drive)
 
 
 @dataclass(frozen=True)
 class Contribution:
     """What one effect changes at the n points.
 
-    drive_rad (n, 3): added to the drive angles; length_mm (n, 3 legs, 5): added to R, L1, L2, L3, r; joint_mm (n, 3 legs, 3): shift of the
-    platform's U-joint centres against the forearms, robot frame; displacement (3 legs, 6 places, 6): rigid displacements at the places
+    drive (n, 3): added to the actuator values, rad or mm; length_mm (n, 3 legs, 5): added to R, L1, L2, L3, r; joint_mm (n, 3 legs, 3): shift of
+    the platform's U-joint centres against the forearms, robot frame; displacement (3 legs, 6 places, 6): rigid displacements at the places
     of PLACES, shift in mm and rotation vector in rad, leg frame; frame (6,): shift in mm and rotation vector in rad that carry
     true positions into measured ones.
     """
 
-    drive_rad: np.ndarray | float = 0.0
+    drive: np.ndarray | float = 0.0
     length_mm: np.ndarray | float = 0.0
     joint_mm: np.ndarray | float = 0.0
     displacement: np.ndarray | float = 0.0
@@ -60,7 +60,7 @@ class Contribution:
 
     def __add__(self, other):
         return Contribution(
-            self.drive_rad + other.drive_rad,
+            self.drive + other.drive,
             self.length_mm + other.length_mm,
             self.joint_mm + other.joint_mm,
             self.displacement + other.displacement,

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rrru.effects import backlash, drive_compliance, joint_clearance, leg_asymmetry, link_flexure, transmission_error
 from rrru.effects.axis_tilt import AxisTilt
 from rrru.effects.backlash import Backlash
 from rrru.effects.base_placement import BasePlacement
@@ -17,6 +18,7 @@ from rrru.effects.joint_clearance import JointClearance
 from rrru.effects.leg_asymmetry import LegAsymmetry
 from rrru.effects.link_flexure import LinkFlexure
 from rrru.effects.protocol import PLACES, ActiveEffect, Contribution, Coordinates, plain_coordinates
+from rrru.effects.rail_tilt import RailTilt
 from rrru.effects.servo_lag import ServoLag
 from rrru.effects.thermal_growth import ThermalGrowth
 from rrru.effects.transmission_error import TransmissionError
@@ -40,6 +42,24 @@ EFFECTS = {
         ServoLag(),
     )
 }
+# of robots with screw- or belt-driven sliders: some laws in other units, rails instead of axes
+SLIDER_EFFECTS = {
+    effect.name: effect
+    for effect in (
+        backlash.SLIDER,
+        drive_compliance.SLIDER,
+        link_flexure.SLIDER,
+        joint_clearance.SLIDER,
+        leg_asymmetry.SLIDER,
+        RailTilt(),
+        BasePlacement(),
+        FrameMisregistration(),
+        transmission_error.SLIDER,
+        ThermalGrowth(),
+        ServoLag(),
+    )
+}
+LIBRARY = {"rad": EFFECTS, "mm": SLIDER_EFFECTS}
 # a user's effect that names no typical sizes gets this share of its bounds' width
 _TYPICAL_SHARE = 0.1
 
@@ -64,7 +84,7 @@ class UserEffect:
         if not isinstance(result, Contribution):
             raise ConfigError(f"effect {self.label!r}: contribute gave a {type(result).__name__}; allowed: a Contribution")
         shapes = {
-            "drive_rad": (len(motion), 3),
+            "drive": (len(motion), 3),
             "length_mm": (len(motion), 3, 5),
             "joint_mm": (len(motion), 3, 3),
             "displacement": (3, len(PLACES), 6),
@@ -82,25 +102,29 @@ class UserEffect:
             raise ConfigError(f"effect {self.label!r}: {key} has the shape {np.shape(value)}; allowed: {shape}") from error
 
 
-def find(name):
+def find(name, drive_unit="rad"):
     """The effect of a library name or of `module:object`, an effect or a class without arguments in a module of the working directory.
+
+    drive_unit: "rad" or "mm", that of the robot's actuator values. None for a name that is an effect of the other kind of drives only.
 
     A user's effect needs name, parameters and contribute; without `coordinates` these are the parameters with a tenth of their bounds'
     width as typical size, without `needs` nothing is needed. Raises ConfigError where there is none or where it is incomplete.
     """
-    if name in EFFECTS:
-        return EFFECTS[name]
+    if any(name in library for library in LIBRARY.values()):
+        return LIBRARY[drive_unit].get(name)
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name and all(part.isidentifier() for part in module_name.split("."))):
-        raise ConfigError(f"unknown effect {name!r}; known: {', '.join(EFFECTS)}, or module:object for one of your own")
+        raise ConfigError(f"unknown effect {name!r}; known: {', '.join(EFFECTS | SLIDER_EFFECTS)}, or module:object for one of your own")
     return _complete(name, _load(name, module_name, object_name))
 
 
-def active_effects(section):
+def active_effects(section, drive_unit="rad"):
     """Effects with their values from a mapping {effect: {parameter: value}}; raises ConfigError for unknown names and values out of bounds."""
     result = []
     for name, values in dict(section or {}).items():
-        effect = find(name)
+        effect = find(name, drive_unit)
+        if effect is None:
+            raise ConfigError(f"effect {name!r} is none of a robot with drives in {drive_unit}; known: {', '.join(LIBRARY[drive_unit])}")
         for key, value in values.items():
             allowed = effect.parameters[key]
             if not allowed.low <= value <= allowed.high:
@@ -136,7 +160,7 @@ def _complete(name, law):
         raise ConfigError(f"effect {name!r} lacks {', '.join(missing)}; needed: name, parameters, contribute")
     if not isinstance(law.parameters, ParameterSet) or not callable(law.contribute):
         raise ConfigError(f"effect {name!r}: parameters is no rrru.parameters.ParameterSet or contribute no function")
-    if law.name in EFFECTS:
+    if law.name in EFFECTS | SLIDER_EFFECTS:
         raise ConfigError(f"effect {name!r}: its name {law.name!r} belongs to the library; allowed: another one")
     coordinates = getattr(law, "coordinates", None)
     if coordinates is None:

@@ -35,11 +35,9 @@ class ServoLag:
     name: str = "servo_lag"
     parameters: ParameterSet = _PARAMETERS
     coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("theta_rate_rad_s",)
+    needs: tuple = ("drive_rate",)
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles under delays (3,) in s."""
         delay = np.asarray(values, dtype=float)
-        return Contribution(
-            drive_rad=0.5 * delay**2 * np.nan_to_num(motion.theta_acceleration_rad_s2) - delay * np.nan_to_num(motion.theta_rate_rad_s)
-        )
+        return Contribution(drive=0.5 * delay**2 * np.nan_to_num(motion.drive_acceleration) - delay * np.nan_to_num(motion.drive_rate))

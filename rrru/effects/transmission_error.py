@@ -9,6 +9,8 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
 
     dtheta_i = s_i sin(N theta_i) + c_i cos(N theta_i)
 
+A screw of lead h (`ScrewError`) leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
+
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction of motion. The ratio is a
 number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2 degrees of the arm, and a campaign must sample more
 densely than every 3.6 degrees to see it as what it is.
@@ -18,6 +20,8 @@ ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
 """
 
 from dataclasses import dataclass
+
+import numpy as np
 
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
 from rrru.effects.protocol import Contribution, Coordinates
@@ -43,4 +47,30 @@ class TransmissionError:
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
-        return Contribution(drive_rad=harmonic(motion.theta_rad, values[6], values))
+        return Contribution(drive=harmonic(motion.drive, values[6], values))
+
+
+_SCREW = ParameterSet(
+    (
+        *harmonic_parameters("screw out of true, assumed: up to some hundredths of a millimetre", "mm", 1.0),
+        Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default"),
+    )
+)
+_SCREW_COORDINATES = harmonic_coordinates(_SCREW, 0.01, ({"lead": 10.0},))
+
+
+@dataclass(frozen=True)
+class ScrewError:
+    """Sine in the slider's position once per turn of its screw, amplitude and phase per leg."""
+
+    name: str = "transmission_error"
+    parameters: ParameterSet = _SCREW
+    coordinates: Coordinates = _SCREW_COORDINATES
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Changes (n, 3) of the slider positions under amplitudes (3,) in mm, phases (3,) in rad and the lead in mm."""
+        return Contribution(drive=harmonic(motion.drive, 2.0 * np.pi / values[6], values))
+
+
+SLIDER = ScrewError()

@@ -45,7 +45,7 @@ class Attribution:
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
     frame = case.measurements.iloc[np.flatnonzero(case.used)]
-    fit = least_squares(Residuals(case.mechanism, rows.theta(frame), rows.measured(frame), rows.command(frame)))
+    fit = least_squares(Residuals(case.mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame)))
     return State(fit.errors, {})
 
 

@@ -1,6 +1,6 @@
 """One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, and the exact corrected sim.
 
-The sim with effects is the full spatial closure of the plant; a hypothesis is fitted on its linearisation, renewed about the best one found.
+The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the best one found.
 Lengths in mm, angles in rad.
 """
 
@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.effects.protocol import PLACES, Contribution
+from rrru.effects.protocol import Contribution
 from rrru.errors import FitError
 from rrru.gap.motion import at_turn_back, motion_of, starts_of_runs
-from rrru.gap.unknown import UNKNOWN
-from rrru.mechanisms.first_order import FirstOrder
-from rrru.plant.spatial import SpatialGeometry
+from rrru.gap.unknown import UNKNOWN, unknown_functions
+from rrru.mechanisms.first_order import first_order
+from rrru.plant.closure import corrected_sim
 
 # a parameter of a law's shape may be off by this share
 _SHAPE_STEP = 0.3
@@ -48,7 +48,7 @@ class Linear:
     data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the mechanism's errors;
     columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect of the state to what the parameters of
     its shape may be wrong by, (n, 3, q), each column one standard deviation; reshaped: effect to these parameters, each (name, value,
-    stepped value); drive (n, 3 axes, 3): derivative by the drive angles.
+    stepped value); drive (n, 3 axes, 3): derivative by the actuator values.
     """
 
     data: np.ndarray
@@ -101,7 +101,7 @@ class Case:
 
     def sim(self, errors):
         """Positions (m, 3) of the calibrated sim without effects."""
-        return self.mechanism.forward(rows.theta(self.measurements), errors, rows.command(self.measurements))
+        return self.mechanism.forward(rows.actuators(self.measurements), errors, rows.command(self.measurements))
 
     def contribution(self, state):
         """What the state's effects change along the motion, together."""
@@ -109,15 +109,9 @@ class Case:
         return sum((self.library[name].contribute(self.motion, values[name]) for name in values), Contribution())
 
     def exact(self, state):
-        """Positions (n, 3) of the sim corrected by a state: the full spatial closure with its effects."""
-        change = self.contribution(state)
-        command, robot = rows.command(self.measurements), self.mechanism
-        legs = robot.legs(state.errors)
-        radial = np.full((3, 1), robot.R_mm)
-        lengths = np.concatenate([radial, legs[:, 1:4], radial + legs[:, 4:]], axis=1)
-        geometry = SpatialGeometry(np.array(robot.azimuth_rad), lengths, np.zeros((3, len(PLACES), 6)))
-        passive = robot.passive_angles(command, robot.inverse(command))
-        return geometry.solve_under(rows.theta(self.measurements) + legs[:, 0], passive, change).position_mm[self.used]
+        """Positions (n, 3) of the sim corrected by a state: the exact closure with its effects."""
+        actuators, command = rows.actuators(self.measurements), rows.command(self.measurements)
+        return corrected_sim(self.mechanism, state.errors, actuators, command, self.contribution(state))[self.used]
 
     def model(self, state):
         """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has none."""
@@ -128,47 +122,47 @@ class Case:
 
         shapes: (effect, shape) pairs to make columns for, by default all.
         """
-        theta = rows.theta(self.measurements)
+        actuators = rows.actuators(self.measurements)
         position = self.sim(state.errors)
-        first_order = FirstOrder(self.mechanism, position, theta, state.errors)
+        legs = first_order(self.mechanism, position, actuators, state.errors)
         model = self.model(state)
         if not np.isfinite(model).all():
             raise FitError(f"the corrected sim has no pose at {int((~np.isfinite(model).all(axis=1)).sum())} points")
         if shapes is None:
             shapes = [(name, shape) for name, effect in self.library.items() for shape in range(len(effect.coordinates.shapes))]
-        columns = {key: self._columns(first_order, key, state) for key in dict.fromkeys((*shapes, *state.effects))}
+        columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*shapes, *state.effects))}
         laws, reshaped = {}, {}
         for key in state.effects:
-            laws[key[0]], reshaped[key[0]] = self._laws(first_order, key, state)
+            laws[key[0]], reshaped[key[0]] = self._laws(legs, key, state)
         data = self.measured_mm - model
         for key, coordinates in state.effects.items():
             data = data + columns[key] @ coordinates
         return Linear(
             data,
-            self.mechanism.error_jacobian(position, theta, state.errors)[self.used],
+            self.mechanism.error_jacobian(position, actuators, state.errors)[self.used],
             columns,
             laws,
             reshaped,
-            (first_order.response[..., 0] * first_order.drive[:, None, :])[self.used],
+            (legs.response[..., 0] * legs.drive[:, None, :])[self.used],
         )
 
-    def _laws(self, first_order, key, state):
+    def _laws(self, legs, key, state):
         """What the shape of an effect of the state may be wrong by, (n, 3, q), and the steps of its parameters; see Linear."""
         coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
         shape = state.shape(self.library, key)
-        leg = first_order.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
+        leg = legs.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
         columns, steps = [], []
         for name, value in shape.items():
             high = effect.parameters[name].high
             stepped = value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
             if stepped != value:
                 other = effect.contribute(self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped}))
-                columns.append(np.einsum("nalc,nlc->na", first_order.response, first_order.leg_errors(other) - leg)[self.used])
+                columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_errors(other) - leg)[self.used])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
         return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
 
-    def _columns(self, first_order, key, state):
+    def _columns(self, legs, key, state):
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
         effect, active = self.library[key[0]], state.effects.get(key)
         shape = state.shape(self.library, key)
@@ -181,7 +175,7 @@ class Case:
             one = np.zeros(len(coordinates))
             one[k] = step[k]
             values = coordinates.to_values(one, shape)
-            result[..., k] = first_order.move(effect.contribute(self.motion, values))[self.used] / step[k]
+            result[..., k] = legs.move(effect.contribute(self.motion, values))[self.used] / step[k]
         return result
 
 
@@ -196,8 +190,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     motion = motion_of(measurements, mechanism, masses)
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
-    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_turn_back(motion)
-    used &= np.isfinite(mechanism.forward(rows.theta(measurements), guess_mm=rows.command(measurements))).all(axis=1)
+    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_turn_back(motion, mechanism.drive_unit)
+    used &= np.isfinite(mechanism.forward(rows.actuators(measurements), guess_mm=rows.command(measurements))).all(axis=1)
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
@@ -208,7 +202,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
             testable[name] = effect
             complete &= np.all(list(known.values()), axis=0) if known else True
     used &= complete
-    for name, function in UNKNOWN.items():
+    for name, function in unknown_functions(mechanism.drive_unit).items():
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function

@@ -49,7 +49,7 @@ def diagnose(measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None,
     masses: `rrru.mechanisms.dynamics.Masses`; noise_mm: per axis, estimated where None; details: also the tables that no verdict needs; name:
     of the campaign, for its random stream. Raises FitError where there are too few points to calibrate on.
     """
-    case = make_case(measurements, sim(mechanism), masses, noise_mm or 1.0, settings.library(), use_near_singularity)
+    case = make_case(measurements, sim(mechanism), masses, noise_mm or 1.0, settings.library(mechanism.drive_unit), use_near_singularity)
     least = _POINTS_PER_PARAMETER * len(case.mechanism.parameters)
     if len(case) < least:
         whose = f"campaign {name}: " if name else ""

@@ -30,6 +30,8 @@ LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
 _HALF_WAVES, _WHITE = 3.0, 0.01
+# a term of which the calibration leaves a smaller share of the mean square is not seen
+_LEAST_VISIBLE = 1e-9
 
 
 def along_runs(values, run):
@@ -76,13 +78,16 @@ class Evidence:
 
     @cached_property
     def _grams(self):
-        """Gram matrices (levels, K, K) of the whitened effects' columns and the data, the calibration projected out, and constants (levels,)."""
+        """Gram matrices (levels, K, K) of the whitened effects' columns and the data, the calibration projected out, constants (levels,), and
+        the Gram matrix (K, K) of the same columns with the calibration's part, without discrepancy.
+        """
         linear = self.linear
         p = linear.base.shape[-1]
         together = np.concatenate([linear.base, *self._blocks.values(), linear.data[..., None]], axis=-1)
         turned, wave = along_runs(together.reshape(len(self), -1), self.run)
         turned, shape = turned.reshape(together.shape), spectrum(wave)
         grams, constants = [], []
+        whole = (together[..., p:] / self.noise_mm).reshape(-1, together.shape[-1] - p)
         for level in LEVELS:
             variance = 1.0 + level**2 * shape
             white = (turned / (self.noise_mm * np.sqrt(variance))[:, None, None]).reshape(-1, together.shape[-1])
@@ -90,7 +95,7 @@ class Evidence:
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
             grams.append(rest.T @ rest)
             constants.append(-1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * grams[-1][-1, -1])
-        return np.array(grams), np.array(constants)
+        return np.array(grams), np.array(constants), whole.T @ whole
 
     @property
     def none(self):
@@ -124,14 +129,16 @@ class Evidence:
         for matrix in maps:
             join[row : row + matrix.shape[0], column : column + matrix.shape[1]] = matrix
             row, column = row + matrix.shape[0], column + matrix.shape[1]
-        grams = self._grams[0]
+        grams, _, whole = self._grams
         gram = join.T @ grams[:, index[:, None], index] @ join
+        raw = join.T @ whole[index[:, None], index] @ join
         moment = grams[:, index, -1] @ join
         size, owner = np.concatenate(sizes), np.concatenate(owner)
         for number in range(len(terms)):
             own = owner == number
-            power = (np.diag(gram[0])[own] * size[own] ** 2).sum() / (3.0 * len(self))
-            size[own] /= np.sqrt(max(power, 1e-30))
+            power, total = ((np.diag(g)[own] * size[own] ** 2).sum() / (3.0 * len(self)) for g in (gram[0], raw))
+            # of what the calibration takes up, rounding is all that is left: it must not be blown up to the size of an effect
+            size[own] /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
         return gram, moment, size, np.concatenate(positive), owner
 
     def over_strengths(self, terms, strengths=None, levels=slice(None)):

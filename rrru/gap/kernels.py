@@ -37,7 +37,8 @@ def log_evidence(gram, moment, scale, positive):
                         entry += 1.0
                     for q in range(c):
                         entry -= low[r, q] * low[c, q]
-                    low[r, c] = math.sqrt(max(entry, 1e-300)) if r == c else entry / low[c, c]
+                    # pivots of the identity plus a Gram matrix are at least 1; rounding must not make them less
+                    low[r, c] = math.sqrt(max(entry, 1.0)) if r == c else entry / low[c, c]
                 entry = scale[j, r] * moment[level, r]
                 for q in range(r):
                     entry -= low[r, q] * half[q]

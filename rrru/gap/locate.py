@@ -15,7 +15,7 @@ _MOST_LEVELS = 12
 def locate(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
-    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the drive angles. Shares are of the
+    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the actuator values. Shares are of the
     mean square with the noise taken off; their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
     """
     frame = case.measurements.iloc[np.flatnonzero(case.used)].reset_index(drop=True)
@@ -39,7 +39,7 @@ def locate(case, residual_mm, drive, generator, draws=200):
         )
     rows.extend(_leg_rows(case, residual_mm, drive, resampled))
     columns = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_high", "share_of_noise", "noise_could")
-    return pd.DataFrame(rows).reindex(columns=[*columns, "drive_rms_rad", "x_mm", "y_mm", "z_mm"])
+    return pd.DataFrame(rows).reindex(columns=[*columns, "drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm"])
 
 
 def worst_spot(position_mm, residual_mm):
@@ -51,7 +51,7 @@ def worst_spot(position_mm, residual_mm):
 
 
 def drive_errors(residual_mm, drive):
-    """Drive-angle errors (n, 3) in rad that would make the residuals (n, 3)."""
+    """Errors (n, 3) of the actuator values that would make the residuals (n, 3)."""
     return np.linalg.solve(drive, residual_mm[..., None])[..., 0]
 
 
@@ -81,7 +81,7 @@ def _row(factor, level, part, whole, part_freedom, whole_freedom, variance, resa
 
 def _levels(case, frame):
     """Level (n,) of each point by factor; an empty text where it is unknown."""
-    position, rate = case.motion.position_mm[case.used], case.motion.theta_rate_rad_s[case.used]
+    position, rate = case.motion.position_mm[case.used], case.motion.drive_rate[case.used]
     result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
     for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
         values = frame[column].to_numpy(dtype=float)
@@ -93,8 +93,9 @@ def _levels(case, frame):
         quarter = np.searchsorted(edges, time, side="right") + 1
         result["time"] = np.array([f"quarter {q}" if np.isfinite(t) else "" for q, t in zip(quarter, time, strict=True)], dtype=object)
     if np.isfinite(rate).any():
+        more, less = ("down", "up") if case.mechanism.drive_unit == "rad" else ("out", "in")
         for leg in range(3):
-            sense = np.where(rate[:, leg] > 1e-6, "down", np.where(rate[:, leg] < -1e-6, "up", "at rest"))
+            sense = np.where(rate[:, leg] > 1e-6, more, np.where(rate[:, leg] < -1e-6, less, "at rest"))
             result[f"motion_direction {leg + 1}"] = np.array(
                 [f"leg {leg + 1} {s}" if np.isfinite(r) else "" for s, r in zip(sense, rate[:, leg], strict=True)], dtype=object
             )
@@ -109,16 +110,22 @@ def _cells(position):
 
 
 def _leg_rows(case, residual_mm, drive, resampled):
-    """Rows of the factor leg: shares of the squared drive-angle errors."""
+    """Rows of the factor leg: shares of the squared errors of the drives."""
     errors = drive_errors(residual_mm, drive)
     inverse = np.linalg.inv(drive)
     noise = case.noise_mm**2 * (inverse**2).sum(axis=-1)
     rows = []
     for leg in range(3):
-        # in units of each angle's own noise, so that poses of a large Jacobian do not drown the others
+        # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
         scaled = errors**2 / noise
         ones = np.ones(len(scaled))
         row = _row("leg", f"leg {leg + 1}", scaled[:, leg], scaled.sum(axis=1), ones, 3.0 * ones, 1.0, resampled)
         moved = np.linalg.norm(drive[:, :, leg] * errors[:, leg, None], axis=1)
-        rows.append(row | {"rms_mm": float(np.sqrt((moved**2).mean())), "drive_rms_rad": float(np.sqrt((errors[:, leg] ** 2).mean()))})
+        rows.append(
+            row
+            | {
+                "rms_mm": float(np.sqrt((moved**2).mean())),
+                f"drive_rms_{case.mechanism.drive_unit}": float(np.sqrt((errors[:, leg] ** 2).mean())),
+            }
+        )
     return rows

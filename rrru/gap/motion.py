@@ -13,7 +13,7 @@ _STEPS, _TRANSFER_STEPS = 8, 30
 # an interval at a run's end that is this much slower than the next leads to rest
 _SLOWER = 0.9
 # nearer than this to a turning point the interpolated path may be on the wrong side of it
-_TURN_RAD = 3e-4
+_TURN = {"rad": 3e-4, "mm": 0.1}
 
 
 def motion_of(measurements, mechanism, masses):
@@ -22,7 +22,7 @@ def motion_of(measurements, mechanism, masses):
     # ASSUME the robot passes smoothly through a run's commanded points, rests where it slows down at an end, and goes straight to the next run.
     Speeds and accelerations come from the times; where a run has no increasing times they are NaN.
     """
-    position, theta = rows.command(measurements), rows.theta(measurements)
+    position, drive = rows.command(measurements), rows.actuators(measurements)
     run = measurements["run"].to_numpy()
     time = measurements["time_s"].to_numpy(dtype=float)
     velocity, acceleration = np.full_like(position, np.nan), np.full_like(position, np.nan)
@@ -40,24 +40,24 @@ def motion_of(measurements, mechanism, masses):
         index.append(length + at)
         length += len(path)
         last = points[-1]
-    path_theta = _known(mechanism.inverse(np.concatenate(pieces)))
+    path_drive = _known(mechanism.inverse(np.concatenate(pieces)))
     index = np.concatenate(index)
-    # the file's own angles stand where it has them
-    path_theta[index] = theta
+    # the file's own values stand where it has them
+    path_drive[index] = drive
     payload = measurements["payload_kg"].to_numpy(dtype=float)
-    return make_motion(mechanism, masses, position, theta, path_theta, index, time, velocity, acceleration, payload)
+    return make_motion(mechanism, masses, position, drive, path_drive, index, time, velocity, acceleration, payload)
 
 
-def at_turn_back(motion):
+def at_turn_back(motion, drive_unit):
     """Rows (n,) at which a drive turns back: whether it is on its way up or down there the commanded points alone do not tell."""
-    path, result = motion.path_theta_rad, np.zeros(len(motion.theta_rad), dtype=bool)
+    path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
     for leg in range(3):
         step = np.diff(path[:, leg])
         turns = np.flatnonzero(step[:-1] * step[1:] < 0.0) + 1
         if len(turns):
             nearest = turns[np.abs(turns[:, None] - motion.path_index).argmin(axis=0)]
             close = np.abs(nearest - motion.path_index) <= _STEPS
-            result |= close & (np.abs(path[nearest, leg] - motion.theta_rad[:, leg]) < _TURN_RAD)
+            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _TURN[drive_unit])
     return result
 
 
@@ -99,11 +99,11 @@ def _path(points):
     return make_interp_spline(length, points, k=min(5, len(points) - 1 - len(points) % 2))(fine), at
 
 
-def _known(theta):
-    """The angles (N, 3) with those of unreachable points taken from the last reachable one before."""
-    bad = ~np.isfinite(theta).all(axis=1)
+def _known(drive):
+    """The actuator values (N, 3) with those of unreachable points taken from the last reachable one before."""
+    bad = ~np.isfinite(drive).all(axis=1)
     if bad.any():
         good = np.flatnonzero(~bad)
-        nearest = good[np.maximum(np.searchsorted(good, np.arange(len(theta)), side="right") - 1, 0)]
-        theta = theta[nearest]
-    return theta
+        nearest = good[np.maximum(np.searchsorted(good, np.arange(len(drive)), side="right") - 1, 0)]
+        drive = drive[nearest]
+    return drive

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from rrru.effects.registry import EFFECTS, find
+from rrru.effects.registry import EFFECTS, SLIDER_EFFECTS, find
 from rrru.errors import ConfigError
 from rrru.gap.posterior import Prior
 
@@ -13,7 +13,7 @@ class GapSettings:
     prior; draws: resamplings for intervals; seed.
     """
 
-    effects: tuple = tuple(EFFECTS)
+    effects: tuple = tuple(EFFECTS | SLIDER_EFFECTS)
     known: dict = field(default_factory=dict)
     prior: Prior = field(default_factory=Prior)
     draws: int = 200
@@ -29,16 +29,20 @@ class GapSettings:
         """The settings with one effect taken out of the library."""
         return replace(self, effects=tuple(effect for effect in self.effects if effect != name))
 
-    def library(self):
-        """Effects by name, what is known of them fixed; raises ConfigError for an unknown effect or parameter."""
-        found = [find(name) for name in self.effects]
+    def library(self, drive_unit="rad"):
+        """Effects by name that robots with drives in "rad" or "mm" may have, what is known of them fixed.
+
+        Raises ConfigError for an unknown effect or parameter.
+        """
+        found = [effect for effect in (find(name, drive_unit) for name in self.effects) if effect is not None]
         result = {effect.name: effect for effect in found}
         if len(result) < len(found):
             raise ConfigError(f"gap.effects names an effect twice: {', '.join(self.effects)}")
         for name, values in self.known.items():
-            if name not in result:
+            if name in result:
+                result[name] = _with_known(result[name], values)
+            elif name not in self.effects:
                 raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
-            result[name] = _with_known(result[name], values)
         return result
 
 

@@ -1,10 +1,10 @@
 """What a gap may look like that no law of the library makes: smooth functions, with a fair number of free coefficients each.
 
 They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the gap follows the
-drive angles, the time, the place or the load in a way that the library does not hold, and the verdict says "unexplained".
+drives, the time, the place or the load in a way that the library does not hold, and the verdict says "unexplained".
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -16,7 +16,10 @@ _DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each drive angle, else to each axis."""
+    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each actuator value, else to each axis.
+
+    typical: size of its coefficients in the drive's unit or mm.
+    """
 
     name: str
     follows: str
@@ -24,20 +27,20 @@ class Unknown:
     count: int
     needs: tuple
     per_leg: bool = False
+    typical: float = 0.1
 
     @property
     def coordinates(self):
-        """One coefficient per function and leg or axis, rad or mm."""
-        size = 1e-4 if self.per_leg else 0.1
+        """One coefficient per function and leg or axis, in the drive's unit or mm."""
         total = 3 * self.count
-        return Coordinates(np.full(total, size), np.zeros(total, dtype=int), np.zeros(total, dtype=bool), lambda values, _: values)
+        return Coordinates(np.full(total, self.typical), np.zeros(total, dtype=int), np.zeros(total, dtype=bool), lambda values, _: values)
 
     def contribute(self, motion, values):
         """Changes under coefficients (3 k,)."""
         coefficients = np.reshape(values, (3, self.count))
         if self.per_leg:
-            functions = np.stack([self.basis(motion.theta_rad[:, leg]) for leg in range(3)], axis=1)
-            return Contribution(drive_rad=np.einsum("nlk,lk->nl", functions, coefficients))
+            functions = np.stack([self.basis(motion.drive[:, leg]) for leg in range(3)], axis=1)
+            return Contribution(drive=np.einsum("nlk,lk->nl", functions, coefficients))
         shift = self.basis(motion) @ coefficients.T
         return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
 
@@ -49,7 +52,7 @@ def _unit(values):
 
 
 def _of_angle(angle):
-    """Chebyshev functions (n, k) of one drive's angle."""
+    """Chebyshev functions (n, k) of one drive's values."""
     return chebyshev.chebvander(_unit(angle), max(_DRIVE_ORDERS))[:, _DRIVE_ORDERS]
 
 
@@ -78,10 +81,19 @@ def _of_load(motion):
 UNKNOWN = {
     function.name: function
     for function in (
-        Unknown("unknown_drive", "the drive angles", _of_angle, len(_DRIVE_ORDERS), (), True),
+        Unknown("unknown_drive", "the drives", _of_angle, len(_DRIVE_ORDERS), (), True, 1e-4),
         Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
         Unknown("unknown_affine", "the place as a rigid motion or a change of scale does", _of_place_linearly, 4, ()),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
         Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
     )
 }
+# what an error of a drive may typically be, and so the function of a slider's position
+_SLIDER_TYPICAL_MM = 0.01
+
+
+def unknown_functions(drive_unit):
+    """UNKNOWN for a robot with drives in "rad" or "mm"."""
+    if drive_unit == "rad":
+        return UNKNOWN
+    return {name: replace(function, typical=_SLIDER_TYPICAL_MM) if function.per_leg else function for name, function in UNKNOWN.items()}

@@ -1,17 +1,19 @@
-"""Rates of the drives and loads on the legs of the 3-RRRU along a motion of its platform.
+"""Rates of the drives and loads on the legs along a motion of the platform.
 
 Rates. With the inverse kinematics q(x) along x(h) = x + v h + a h^2 / 2 (central differences: Abramowitz and Stegun, Handbook of Mathematical
 Functions, 1964, 25.3)
 
     q' = (q(x(h)) - q(x(-h))) / 2h,    q'' = (q(x(h)) - 2 q(x) + q(x(-h))) / h^2
 
-Loads. Half of each forearm is lumped at the platform, half at the elbow (end of the drive arm); the arm is a uniform rod of mass m_a. The
-platform carries W = (m_p + payload + 3/2 m_f)(g - a), and the legs push it along g_i with f_i so that sum_i f_i g_i = -W. By virtual work
-(Tsai, Robot Analysis, 1999, chapter 10) the loads turn drive arm i, in the sense of theta, with
+Loads. Half of each forearm is lumped at the platform, half at the driven end (elbow or carriage); a drive arm is a uniform rod of mass m_a, a
+carriage a point. The platform carries W = (m_p + payload + 3/2 m_f)(g - a), and the legs push it along g_i with f_i so that
+sum_i f_i g_i = -W. By virtual work (Tsai, Robot Analysis, 1999, chapter 10) the loads turn drive arm i, in the sense of theta > 0 which lowers
+it, with the torque, or push carriage i along its rail d_i with the force
 
     tau_i = W . dx/dtheta_i + (m_a / 2 + m_f / 2) g L1 cos(theta_i) - (m_a / 3 + m_f / 2) L1^2 theta_i''
+    F_i = W . dx/db_i + (m_a + m_f / 2) (g . d_i - b_i'')
 
-z points down, so that gravity is +z and theta > 0 lowers the arm. The platform's translation is the only motion of the loads at the
+Gravity points along +z in the 3-RRRU's frame and along -z in the others'. The platform's translation is the only motion of the loads at the
 platform; a forearm's own rotation is left out. Lengths mm, angles rad, forces N, torques N mm, masses kg, times s.
 """
 
@@ -20,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.mechanisms import singularity
+from rrru.mechanisms.rrru3 import Rrru3
 
 GRAVITY_MM_S2 = 9806.65
 # kg mm / s^2 in a newton
@@ -30,7 +33,7 @@ _STEP_MM = 0.2
 
 @dataclass(frozen=True)
 class Masses:
-    """Masses in kg: platform without payload, one forearm, one drive arm."""
+    """Masses in kg: platform without payload, one forearm, one drive arm or carriage."""
 
     platform_kg: float = 3.0
     forearm_kg: float = 1.2
@@ -38,7 +41,7 @@ class Masses:
 
 
 def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
-    """Rates (n, 3) in rad/s and accelerations (n, 3) in rad/s^2 of the drive angles from the platform's (n, 3).
+    """Rates (n, 3) and accelerations (n, 3) of the actuator values, per s and per s^2, from the platform's (n, 3).
 
     Both are NaN where the position or the velocity is; where only the platform's acceleration is NaN, only the drives' is.
     """
@@ -56,27 +59,34 @@ def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
     return (after - before) / (2.0 * h), np.where(known, second, np.nan)
 
 
-def loads(mechanism, masses, position_mm, theta_rad, theta_acceleration, acceleration_mm_s2, payload_kg):
-    """Forces (n, 3) in N with which the legs push the platform, their directions (n, 3 legs, 3), torques (n, 3) in N mm on the drive arms.
+def gravity(mechanism):
+    """Acceleration of gravity (3,) in mm/s^2 in the robot's frame."""
+    return np.array([0.0, 0.0, GRAVITY_MM_S2 if isinstance(mechanism, Rrru3) else -GRAVITY_MM_S2])
 
-    Compression is positive; a torque is positive in the sense of theta. position_mm and theta_rad (n, 3) fit each other; payload_kg (n,).
+
+def loads(mechanism, masses, position_mm, actuators, drive_acceleration, acceleration_mm_s2, payload_kg):
+    """Forces (n, 3) in N with which the legs push the platform, their directions (n, 3 legs, 3), loads (n, 3) in N mm or N on the drives.
+
+    Compression is positive; a load is positive in the drive's sense. position_mm and actuators (n, 3) fit each other; payload_kg (n,).
     NaN where a pose cannot be reached.
     """
-    theta = np.asarray(theta_rad, dtype=float)
-    direction = singularity.leg_forces(mechanism, position_mm, theta)
-    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 1.5 * masses.forearm_kg
-    load = mass[:, None] * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration_mm_s2) / _PER_NEWTON
+    actuators = np.asarray(actuators, dtype=float)
+    direction = singularity.leg_forces(mechanism, position_mm, actuators)
+    load = _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg)
     force = -np.linalg.solve(direction.transpose(0, 2, 1), load[..., None])[..., 0]
-    per_drive = mechanism.actuator_jacobian(position_mm, theta)
-    arm = mechanism.L1_mm
-    weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * GRAVITY_MM_S2 * arm * np.cos(theta)
-    inertia = (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm**2
-    torque = np.einsum("nak,na->nk", per_drive, load) + (weight - inertia * theta_acceleration) / _PER_NEWTON
-    return force, direction, torque
+    per_drive = mechanism.actuator_jacobian(position_mm, actuators)
+    if mechanism.drive_unit == "mm":
+        along = mechanism.rails() @ gravity(mechanism)
+        own = (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - drive_acceleration)
+    else:
+        arm = mechanism.lengths_mm[1]
+        weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * GRAVITY_MM_S2 * arm * np.cos(actuators)
+        own = weight - (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm**2 * drive_acceleration
+    return force, direction, np.einsum("nak,na->nk", per_drive, load) + own / _PER_NEWTON
 
 
 def held_force(mechanism, masses, position_mm, theta_rad, acceleration_mm_s2, payload_kg):
-    """Forces (n, 3) in N with which the legs push the platform if friction holds joint 3, compression positive; arguments as for `loads`.
+    """Forces (n, 3) in N with which the 3-RRRU's legs push if friction holds joint 3, compression positive; arguments as for `loads`.
 
     A free joint 3 lets the leg push along its forearm only. Held, it makes one two-force member of L2 and L3, which pushes along the line from
     the elbow (joint 2) to the U-joint. A real leg lies between the two.
@@ -89,6 +99,11 @@ def held_force(mechanism, masses, position_mm, theta_rad, acceleration_mm_s2, pa
     )
     line = position[:, None, :] + mechanism.r_mm * radial - elbow
     line /= np.linalg.norm(line, axis=-1, keepdims=True)
-    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 1.5 * masses.forearm_kg
-    load = mass[:, None] * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration_mm_s2) / _PER_NEWTON
+    load = _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg)
     return -np.linalg.solve(line.transpose(0, 2, 1), load[..., None])[..., 0]
+
+
+def _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg):
+    """Weight and inertia force (n, 3) in N of platform, payload and the platform's half of the forearms."""
+    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 1.5 * masses.forearm_kg
+    return mass[:, None] * (gravity(mechanism) - acceleration_mm_s2) / _PER_NEWTON

@@ -17,6 +17,14 @@ from functools import cached_property
 import numpy as np
 
 from rrru.mechanisms import singularity
+from rrru.mechanisms.first_order_tripod import TripodFirstOrder
+from rrru.mechanisms.rrru3 import Rrru3
+
+
+def first_order(mechanism, position_mm, actuators, errors=None):
+    """The map from leg errors to the platform of any mechanism at n poses (n, 3), (n, 3) that fit its errors (p,)."""
+    kind = FirstOrder if isinstance(mechanism, Rrru3) else TripodFirstOrder
+    return kind(mechanism, position_mm, actuators, errors)
 
 
 class FirstOrder:
@@ -34,7 +42,7 @@ class FirstOrder:
         zero, down = np.zeros(3), np.array([0.0, 0.0, 1.0])
         radial, tangent = np.stack([cx, cy, zero], axis=-1), np.stack([-cy, cx, zero], axis=-1)
         self.forearm = singularity.leg_forces(mechanism, position_mm, theta_rad, errors)
-        self.couple = singularity.leg_couples(mechanism, position_mm, theta_rad, errors)
+        self.couple = mechanism.couples(position_mm, theta_rad, errors)
         self.position_mm = np.asarray(position_mm, dtype=float)
         # local axes (n, 3 legs, 3 axes, 3) at the six places of the chain, and the lever (n, 3 legs, 3) from each to C
         leg_axes = np.stack([radial, tangent, np.broadcast_to(down, (3, 3))], axis=-2)
@@ -82,7 +90,7 @@ class FirstOrder:
 
     def leg_errors(self, contribution):
         """Leg errors (n, 3, 2) of what an effect contributes, its frame apart."""
-        first = self.drive * contribution.drive_rad
+        first = self.drive * contribution.drive
         if np.ndim(contribution.length_mm):
             first = first + (self.length * contribution.length_mm).sum(axis=-1)
         if np.ndim(contribution.joint_mm):

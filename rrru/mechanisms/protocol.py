@@ -6,15 +6,24 @@ from typing import Protocol
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.mechanisms.delta import Delta
+from rrru.mechanisms.ptt3 import Ptt3
 from rrru.mechanisms.rrru3 import Rrru3
 from rrru.parameters import ParameterSet
 
 
 class Mechanism(Protocol):
-    """A parallel robot as its controller believes it to be, with small errors of its numbers."""
+    """A parallel robot as its controller believes it to be, with small errors of its numbers.
+
+    drive_unit: "rad" or "mm", unit of an actuator value; angle_arm_mm: the length that makes an angle error comparable with a length error;
+    lengths_mm (5,): nominal R, L1, L2, L3, r as effects count them, 0 for what a robot does not have.
+    """
 
     name: str
     parameters: ParameterSet
+    drive_unit: str
+    angle_arm_mm: float
+    lengths_mm: np.ndarray
 
     def inverse(self, position_mm: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
         """Actuator values (n, k) for positions (n, 3); NaN where out of reach."""
@@ -22,21 +31,34 @@ class Mechanism(Protocol):
     def forward(self, actuators: np.ndarray, errors: np.ndarray | None = None, guess_mm: np.ndarray | None = None) -> np.ndarray:
         """Positions (n, 3) for actuator values (n, k); NaN where there is none near the guess."""
 
+    def forward_batch(self, actuators: np.ndarray, errors: np.ndarray, guess_mm: np.ndarray | None = None) -> np.ndarray:
+        """Positions (m, n, 3) for n actuator triples under m error vectors (m, p)."""
+
     def actuator_jacobian(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
         """Derivative (n, 3, k) of the position by the actuator values."""
 
     def error_jacobian(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
         """Derivative (n, 3, p) of the position by the errors."""
 
+    def closure_jacobians(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> tuple:
+        """Derivatives of the legs' closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
 
-MECHANISMS = {"rrru3": Rrru3}
+    def couples(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
+
+
+MECHANISMS = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
 
 
 def make_mechanism(name, section, **options):
-    """The mechanism of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key."""
+    """The mechanism of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key.
+
+    Angles of the entry are in degrees, with keys that end in _deg.
+    """
     if name not in MECHANISMS:
         raise ConfigError(f"unknown robot {name!r}; known: {', '.join(MECHANISMS)}")
     kind = MECHANISMS[name]
+    section = {key.replace("_deg", "_rad"): float(np.radians(value)) if key.endswith("_deg") else value for key, value in section.items()}
     known = {f.name for f in fields(kind) if f.init}
     for key in section:
         if key not in known:

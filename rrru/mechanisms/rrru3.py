@@ -87,12 +87,25 @@ class Rrru3:
     length_limit_mm: float = LENGTH_LIMIT_MM
     name: str = field(default="rrru3", init=False)
 
+    # unit of an actuator value
+    drive_unit = "rad"
+
     def __post_init__(self):
         for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
             if not getattr(self, key) > 0.0:
                 raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive number")
         if self.errors not in ERROR_NAMES:
             raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
+
+    @property
+    def angle_arm_mm(self):
+        """Length that makes an angle error comparable with a length error."""
+        return self.L1_mm
+
+    @property
+    def lengths_mm(self):
+        """Nominal R, L1, L2, L3, r (5,)."""
+        return np.array([self.R_mm, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm])
 
     @cached_property
     def parameters(self):
@@ -243,6 +256,16 @@ class Rrru3:
         second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
         third = np.arcsin(v / legs[:, 3])
         return np.stack([second, third, -third, -(angle + second)], axis=-1)
+
+    def couples(self, position_mm, theta_rad, errors=None):
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
+
+        b_i = t_i x a_3i, where t_i is the direction of joints 1, 2 and 5 and a_3i that of joints 3 and 4; it points from joint 2 along L2.
+        """
+        passive = self.passive_angles(position_mm, theta_rad, errors)
+        plane = np.asarray(theta_rad, dtype=float) + self.legs(errors)[:, 0] + passive[..., 0]
+        cx, cy = self.turn
+        return np.stack([np.cos(plane) * cx, np.cos(plane) * cy, np.sin(plane)], axis=-1)
 
     def _radial_tangential(self, position):
         """Coordinates u and v (n, 3) of the points in the three legs."""

@@ -24,6 +24,11 @@ _MOST_STEPS = 40
 _compiled = numba.njit(cache=True, error_model="numpy")
 
 
+def into_frame(position_mm, frame):
+    """Positions (n, 3) carried by a frame (6,): rotation vector in rad, then shift in mm."""
+    return position_mm @ Rotation.from_rotvec(frame[3:]).as_matrix().T + frame[:3]
+
+
 @dataclass(frozen=True)
 class SpatialSolution:
     """Solved points: platform centre (n, 3), platform rotation vector (n, 3), closure residual (n,) in mm, converged (n,)."""
@@ -71,11 +76,8 @@ class SpatialGeometry:
         Displacements of effects and the geometry's own at one place are added, which holds to first order in their angles.
         """
         changed = replace(self, lengths_mm=self.lengths_mm + change.length_mm, deviations=self.deviations + change.displacement)
-        solution = changed.solve(theta_rad + change.drive_rad, passive_guess_rad, change.joint_mm)
-        if not np.any(change.frame):
-            return solution
-        turn = Rotation.from_rotvec(change.frame[3:]).as_matrix()
-        return replace(solution, position_mm=solution.position_mm @ turn.T + change.frame[:3])
+        solution = changed.solve(theta_rad + change.drive, passive_guess_rad, change.joint_mm)
+        return solution if not np.ndim(change.frame) else replace(solution, position_mm=into_frame(solution.position_mm, change.frame))
 
     def closure_determinant(self, theta_rad, passive_rad):
         """Determinant (n,) of the 12 x 12 closure Jacobian at drive angles (n, 3) and passive angles (n, 3, 4), lengths in units of 500 mm."""

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from rrru.campaign.measurements import actuator_columns
 from rrru.effects.motion import make_motion
 from rrru.effects.protocol import PLACES, Contribution
 from rrru.effects.registry import active_effects
@@ -14,9 +15,57 @@ from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
 
 
+class DrivenRobot:
+    """What virtual robots share: they drive plans and are measured. They add mechanism, wobble_mm, the three masses and `positions`."""
+
+    def run(self, plan, noise_mm, generator, controller=None):
+        """Drive a plan; returns (measurements, truth) as frames.
+
+        controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse kinematics. `measurements`
+        fits the schema of that name with the commanded positions of the plan and the values that the controller sent; `truth` holds the
+        exact position in the tracker's frame and the platform's rotation. Noise is drawn for every row, solved or not, so that one lost
+        point does not change the others.
+        """
+        controller = controller or self.mechanism.inverse
+        commands = plan.commands(self.mechanism)
+        target = plan.targets()
+        motion = self.motion(plan, controller)
+        position, turned = self.positions(motion, target)
+        solved = np.isfinite(position).all(axis=1)
+        position = position + self.wobble_mm * wobble(generator, len(target))
+        measured = measure(position, noise_mm, generator)
+        measurements = commands.assign(
+            **dict(zip(actuator_columns(self.mechanism.drive_unit), motion.drive.T, strict=True)),
+            **{f"measured_{axis}_mm": measured[:, k] for k, axis in enumerate("xyz")},
+            status=np.where(solved, "ok", "unsolved"),
+        )
+        truth = commands[["run", "trajectory", "point"]].assign(
+            **{f"true_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")},
+            platform_rotation_rad=turned,
+        )
+        return measurements, truth
+
+    def motion(self, plan, controller):
+        """What the effects may know about a plan driven through a controller; the loads are those of the nominal mechanism."""
+        path, index = plan.path()
+        along = controller(path)
+        return make_motion(
+            self.mechanism,
+            Masses(self.platform_mass_kg, self.forearm_mass_kg, self.arm_mass_kg),
+            plan.targets(),
+            along[index],
+            along,
+            index,
+            plan.time_s(),
+            np.concatenate([run.velocity_mm_s for run in plan.runs]),
+            np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
+            np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
+        )
+
+
 @dataclass(frozen=True)
-class VirtualRobot:
-    """A robot whose truth is known.
+class VirtualRobot(DrivenRobot):
+    """A 3-RRRU whose truth is known.
 
     errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6): displacements of every axis;
     effects: active effects; wobble_mm: radius of the ball in which the platform lies at random, see `wobble`; masses in kg;
@@ -51,33 +100,6 @@ class VirtualRobot:
             lengths[leg, 4] += self.errors.get("dr", 0.0)
         return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.deviations)
 
-    def run(self, plan, noise_mm, generator, controller=None):
-        """Drive a plan; returns (measurements, truth) as frames.
-
-        controller: positions (n, 3) to drive angles (n, 3), by default the nominal inverse kinematics. `measurements` fits the schema of
-        that name with the commanded positions of the plan and the angles that the controller sent; `truth` holds the exact position in
-        the tracker's frame and the platform's rotation. Noise is drawn for every row, solved or not, so that one lost point does not change
-        the others.
-        """
-        controller = controller or self.mechanism.inverse
-        commands = plan.commands(self.mechanism)
-        target = plan.targets()
-        motion = self.motion(plan, controller)
-        position, turned = self.positions(motion, target)
-        solved = np.isfinite(position).all(axis=1)
-        position = position + self.wobble_mm * wobble(generator, len(target))
-        measured = measure(position, noise_mm, generator)
-        measurements = commands.assign(
-            **{f"theta{k + 1}_rad": motion.theta_rad[:, k] for k in range(3)},
-            **{f"measured_{axis}_mm": measured[:, k] for k, axis in enumerate("xyz")},
-            status=np.where(solved, "ok", "unsolved"),
-        )
-        truth = commands[["run", "trajectory", "point"]].assign(
-            **{f"true_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")},
-            platform_rotation_rad=turned,
-        )
-        return measurements, truth
-
     def positions(self, motion, target):
         """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
 
@@ -85,27 +107,10 @@ class VirtualRobot:
         """
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
         passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
-        solution = self.geometry.solve_under(motion.theta_rad + self.drive_errors_rad, passive, change)
+        solution = self.geometry.solve_under(motion.drive + self.drive_errors_rad, passive, change)
         turned = np.linalg.norm(solution.rotation_rad, axis=1)
         solved = solution.converged & (turned <= self.rotation_limit_rad)
         return np.where(solved[:, None], solution.position_mm, np.nan), turned
-
-    def motion(self, plan, controller):
-        """What the effects may know about a plan driven through a controller; the loads are those of the nominal mechanism."""
-        path, index = plan.path()
-        target = plan.targets()
-        return make_motion(
-            self.mechanism,
-            Masses(self.platform_mass_kg, self.forearm_mass_kg, self.arm_mass_kg),
-            target,
-            controller(target),
-            controller(path),
-            index,
-            plan.time_s(),
-            np.concatenate([run.velocity_mm_s for run in plan.runs]),
-            np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
-            np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
-        )
 
 
 def wobble(generator, count):

@@ -39,7 +39,7 @@ class TranslationalRobot(VirtualRobot):
     def positions(self, motion, target):
         """Platform centres (n, 3); clearance to first order."""
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
-        drive = motion.theta_rad + change.drive_rad
+        drive = motion.drive + change.drive
         errors = self.mechanism.parameters.vector({k: v for k, v in self.errors.items() if k != "dr"} | {"da": self.errors["dr"]})
         solved = self.mechanism.forward(drive, errors, target)
         along = np.einsum("nlk,nlk->nl", motion.force_direction, np.broadcast_to(change.joint_mm, motion.force_direction.shape))

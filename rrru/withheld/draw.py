@@ -154,7 +154,7 @@ def _to_strength(robot, acting, mechanism):
 def _first_order_gap_mm(robot, acting, mechanism):
     """Rms distance that the calibration would leave of a cause, to first order."""
     motion = VirtualRobot(mechanism=mechanism).motion(robot.plan, mechanism.inverse)
-    moved = FirstOrder(mechanism, motion.position_mm, motion.theta_rad).move(acting.law.contribute(motion, acting.values)).ravel()
-    base = mechanism.error_jacobian(motion.position_mm, motion.theta_rad).reshape(moved.size, -1)
+    moved = FirstOrder(mechanism, motion.position_mm, motion.drive).move(acting.law.contribute(motion, acting.values)).ravel()
+    base = mechanism.error_jacobian(motion.position_mm, motion.drive).reshape(moved.size, -1)
     basis, _ = np.linalg.qr(base)
     return float(np.sqrt(((moved - basis @ (basis.T @ moved)) ** 2).sum() / len(motion)))

@@ -45,7 +45,7 @@ def _rehoming(motion, values):
     """Drives that find their zero anew before every run, off by up to the repeatability (rad) of their reference switch."""
     run = np.cumsum(np.diff(motion.time_s, prepend=motion.time_s[0]) > _REST_S)
     offset = np.random.default_rng(int(values[3])).uniform(-1.0, 1.0, (run[-1] + 1, 3))
-    return Contribution(drive_rad=values[:3] * offset[run])
+    return Contribution(drive=values[:3] * offset[run])
 
 
 def _tripod_sway(motion, values):
@@ -75,7 +75,7 @@ def _floor_tilt(motion, values):
 def _pulley_ripple(motion, values):
     """A belt pulley off centre that turns five times per turn of the drive arm: sine and cosine (rad) per drive."""
     sine, cosine = np.reshape(values, (3, 2)).T
-    return Contribution(drive_rad=sine * np.sin(5.0 * motion.theta_rad) + cosine * np.cos(5.0 * motion.theta_rad))
+    return Contribution(drive=sine * np.sin(5.0 * motion.drive) + cosine * np.cos(5.0 * motion.drive))
 
 
 def _make(law, free, typical, fixed=(), shapes=({},)):

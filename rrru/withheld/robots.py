@@ -155,7 +155,7 @@ def true_gap_mm(robot, mechanism):
     if driven is None:
         return None
     measurements, _ = driven
-    residuals = Residuals(mechanism, rows.theta(measurements), rows.measured(measurements), rows.command(measurements))
+    residuals = Residuals(mechanism, rows.actuators(measurements), rows.measured(measurements), rows.command(measurements))
     try:
         return least_squares(residuals).rms_mm
     except FitError:

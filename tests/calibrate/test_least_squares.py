@@ -61,7 +61,7 @@ def test_a_robust_loss_survives_a_broken_beam(rich_poses, loss):
     residuals = _campaign(*rich_poses, noise_mm=0.02)
     measured = residuals.measured_mm.copy()
     measured[::20] += 30.0
-    spoilt = Residuals(residuals.mechanism, residuals.theta_rad, measured, residuals.start_mm)
+    spoilt = Residuals(residuals.mechanism, residuals.actuators, measured, residuals.start_mm)
     plain, robust = least_squares(spoilt), least_squares(spoilt, loss=loss, loss_scale_mm=0.05)
     scale = 6.0 * least_squares(residuals, 0.02).standard_errors
     assert (np.abs(robust.errors - _TRUTH) < scale).all()

@@ -32,7 +32,7 @@ def drive(effects, plan, **options):
 
 def drive_error(motion, position):
     """Drive-angle errors (n, 3) that explain the positions of a robot whose platform does not turn."""
-    return ROBOT.inverse(position) - motion.theta_rad
+    return ROBOT.inverse(position) - motion.drive
 
 
 def per_leg(name, values):

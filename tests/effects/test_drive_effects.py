@@ -12,8 +12,8 @@ from tests.effects.robots import FORWARD, LINE, LOADED, REVERSE, ROBOT, SPIRAL, 
 
 def _steady(motion, margin_rad):
     """Flags (n, 3): drives that have moved by more than the margin since they last turned, within the last points' steps."""
-    moved = np.diff(motion.theta_rad, axis=0)
-    result = np.zeros(motion.theta_rad.shape, dtype=bool)
+    moved = np.diff(motion.drive, axis=0)
+    result = np.zeros(motion.drive.shape, dtype=bool)
     result[2:] = (np.abs(moved[1:]) > margin_rad) & (np.sign(moved[1:]) == np.sign(moved[:-1]))
     return result
 
@@ -31,7 +31,7 @@ def test_backlash_parts_forward_and_reverse_by_its_width():
     gap = np.where(both, np.abs(there - back), np.nan)
     np.testing.assert_allclose(gap[both], np.broadcast_to(widths, gap.shape)[both], rtol=1e-6)
     # half the play behind the direction of motion
-    direction = np.sign(np.diff(motion.theta_rad, axis=0, prepend=np.nan))
+    direction = np.sign(np.diff(motion.drive, axis=0, prepend=np.nan))
     np.testing.assert_allclose(error[steady], (-0.5 * widths * direction)[steady], rtol=1e-6)
 
 
@@ -40,7 +40,7 @@ def test_backlash_moves_the_platform_through_the_jacobian():
     plan = plan_of(FORWARD, REVERSE)
     motion, position, _ = drive({"backlash": per_leg("width", 5e-4)}, plan)
     half = len(motion) // 2
-    theta = motion.theta_rad[:half]
+    theta = motion.drive[:half]
     steady = _steady(motion, 0.002)
     both = (steady[:half] & steady[half:][::-1]).all(axis=1)
     direction = np.sign(np.diff(theta, axis=0, prepend=np.nan))
@@ -70,7 +70,7 @@ def test_drive_compliance_lets_the_platform_sink_in_proportion_to_the_payload():
     empty, five, ten = np.split(position - plan.targets(), 3)
     assert (empty[:, 2] > 0.0).all() and (five[:, 2] > empty[:, 2]).all()
     np.testing.assert_allclose(ten - empty, 2.0 * (five - empty), rtol=0.02, atol=1e-4)
-    np.testing.assert_allclose(drive_error(motion, position), 1e-8 * motion.torque_nmm, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(drive_error(motion, position), 1e-8 * motion.drive_load, rtol=1e-6, atol=1e-12)
 
 
 def test_drive_compliance_acts_on_the_leg_that_has_it():
@@ -86,9 +86,9 @@ def test_periodic_errors_follow_the_drive_angle_alone(name, periods, shape):
     plan = plan_of(FORWARD, REVERSE, LOADED, trajectories=(LINE, SPIRAL))
     motion, position, _ = drive({name: per_leg("amplitude", amplitude) | per_leg("phase", phase) | shape}, plan)
     error = drive_error(motion, position)
-    np.testing.assert_allclose(error, amplitude * np.sin(periods * motion.theta_rad + phase), atol=1e-10)
+    np.testing.assert_allclose(error, amplitude * np.sin(periods * motion.drive + phase), atol=1e-10)
     for leg in range(3):
-        waves = np.stack([np.sin(periods * motion.theta_rad[:, leg]), np.cos(periods * motion.theta_rad[:, leg])], axis=1)
+        waves = np.stack([np.sin(periods * motion.drive[:, leg]), np.cos(periods * motion.drive[:, leg])], axis=1)
         part = np.linalg.lstsq(waves, error[:, leg], rcond=None)[0]
         assert np.hypot(*part) == pytest.approx(amplitude[leg], rel=1e-6)
         assert np.arctan2(part[1], part[0]) == pytest.approx(phase[leg], abs=1e-6)
@@ -112,7 +112,7 @@ def test_servo_lag_shows_where_the_command_was_a_moment_ago():
 
     for leg, delay in enumerate(delays):
         late = np.add(LINE.start_mm, passed(np.maximum(motion.time_s - delay, 0.0))[:, None] * direction)
-        expected = ROBOT.inverse(late)[:, leg] - motion.theta_rad[:, leg]
+        expected = ROBOT.inverse(late)[:, leg] - motion.drive[:, leg]
         np.testing.assert_allclose(drive_error(motion, position)[1:, leg], expected[1:], atol=5e-8)
 
 

@@ -29,7 +29,7 @@ _NAMES = (
 )
 _MOTION = VirtualRobot().motion(plan_of(FORWARD, REVERSE, LOADED, trajectories=(LINE, SPIRAL)), Rrru3().inverse)
 _SHAPES = {
-    "drive_rad": (len(_MOTION), 3),
+    "drive": (len(_MOTION), 3),
     "length_mm": (len(_MOTION), 3, 5),
     "joint_mm": (len(_MOTION), 3, 3),
     "displacement": (3, 6, 6),
@@ -120,7 +120,7 @@ def test_a_legs_coordinate_leaves_the_other_legs_alone(name):
     for k, leg in enumerate(effect.coordinates.legs):
         values = effect.coordinates.to_values(np.eye(len(effect.coordinates))[k] * effect.coordinates.typical, effect.coordinates.shapes[0])
         result = effect.contribute(_MOTION, values)
-        by_leg = {"drive_rad": 1, "length_mm": 1, "joint_mm": 1, "displacement": 0}
+        by_leg = {"drive": 1, "length_mm": 1, "joint_mm": 1, "displacement": 0}
         for key, axis in by_leg.items():
             if leg and np.ndim(getattr(result, key)):
                 touched = np.moveaxis(getattr(result, key), axis, 0).reshape(3, -1)
@@ -135,9 +135,9 @@ def test_sine_and_cosine_parts_give_back_amplitude_and_phase(parts):
         values = effect.coordinates.to_values(np.array(parts), effect.coordinates.shapes[0])
         assert effect.parameters.hold(values)
         sine, cosine = np.reshape(parts, (3, 2)).T
-        angle = periods * _MOTION.theta_rad
+        angle = periods * _MOTION.drive
         expected = sine * np.sin(angle) + cosine * np.cos(angle)
-        np.testing.assert_allclose(effect.contribute(_MOTION, values).drive_rad, expected, atol=1e-15)
+        np.testing.assert_allclose(effect.contribute(_MOTION, values).drive, expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["backlash", "joint_clearance", "transmission_error", "thermal_growth", "servo_lag", "base_placement"])
@@ -169,8 +169,8 @@ def test_contributions_add_up_place_by_place():
 def test_active_effects_keep_their_order_and_nominal_values():
     first, second = active_effects({"servo_lag": {"lag2": 0.01}, "backlash": {}})
     assert (first.effect.name, second.effect.name) == ("servo_lag", "backlash")
-    assert np.flatnonzero(first.contribute(_MOTION).drive_rad.any(axis=0)).tolist() == [1]
-    assert not second.contribute(_MOTION).drive_rad.any()
+    assert np.flatnonzero(first.contribute(_MOTION).drive.any(axis=0)).tolist() == [1]
+    assert not second.contribute(_MOTION).drive.any()
 
 
 def test_play_equals_its_definition_step_by_step():
@@ -227,5 +227,5 @@ def test_flexure_follows_the_force_of_a_held_joint_to_the_share_asked_for():
 def test_periodic_errors_repeat_after_their_period(name, periods):
     effect = EFFECTS[name]
     values = effect.coordinates.to_values(np.linspace(-3e-4, 3e-4, 6), effect.coordinates.shapes[0])
-    later = Motion(**{**_MOTION.__dict__, "theta_rad": _MOTION.theta_rad + 2.0 * np.pi / periods})
-    np.testing.assert_allclose(effect.contribute(later, values).drive_rad, effect.contribute(_MOTION, values).drive_rad, atol=1e-15)
+    later = Motion(**{**_MOTION.__dict__, "drive": _MOTION.drive + 2.0 * np.pi / periods})
+    np.testing.assert_allclose(effect.contribute(later, values).drive, effect.contribute(_MOTION, values).drive, atol=1e-15)

@@ -49,7 +49,7 @@ def test_leg_asymmetry_is_the_papers_robot_with_fourteen_errors():
     paper = Rrru3(errors="published")
     named = {f"dL{leg}{link}": values[leg - 1, link - 1] for leg in (1, 2, 3) for link in (1, 2, 3)}
     assert set(named) < set(ERROR_NAMES["published"])
-    exact = paper.forward(motion.theta_rad, paper.parameters.vector(named), plan.targets())
+    exact = paper.forward(motion.drive, paper.parameters.vector(named), plan.targets())
     np.testing.assert_allclose(position, exact, atol=1e-8)
     assert turned.max() < 1e-12
 

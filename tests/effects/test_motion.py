@@ -20,8 +20,8 @@ def _given(**changes):
         "mechanism": ROBOT,
         "masses": Masses(),
         "position_mm": target,
-        "theta_rad": ROBOT.inverse(target),
-        "path_theta_rad": ROBOT.inverse(target),
+        "drive": ROBOT.inverse(target),
+        "path_drive": ROBOT.inverse(target),
         "path_index": np.arange(n),
         "time_s": np.arange(n, dtype=float),
         "velocity_mm_s": np.zeros((n, 3)),
@@ -37,8 +37,8 @@ def test_the_virtual_robots_motion_is_the_plans():
     np.testing.assert_array_equal(motion.time_s, commands["time_s"])
     np.testing.assert_array_equal(motion.payload_kg, commands["payload_kg"])
     np.testing.assert_array_equal(motion.position_mm, commands[[f"command_{a}_mm" for a in "xyz"]])
-    np.testing.assert_array_equal(motion.theta_rad, commands[[f"theta{k}_rad" for k in (1, 2, 3)]])
-    np.testing.assert_allclose(motion.path_theta_rad[motion.path_index], motion.theta_rad, atol=1e-12)
+    np.testing.assert_array_equal(motion.drive, commands[[f"theta{k}_rad" for k in (1, 2, 3)]])
+    np.testing.assert_allclose(motion.path_drive[motion.path_index], motion.drive, atol=1e-12)
     assert motion.lengths_mm.tolist() == [400.0, 400.0, 100.0, 800.0, 400.0] and len(motion) == len(commands)
 
 
@@ -48,25 +48,25 @@ def test_rates_are_the_slopes_of_the_angles_in_time():
     run = _PLAN.commands(ROBOT)["run"].to_numpy()
     inside = run[1:] == run[:-1]
     step = np.diff(motion.time_s)[:, None]
-    mean = 0.5 * (motion.theta_rate_rad_s[1:] + motion.theta_rate_rad_s[:-1])
-    bend = step**2 / 12.0 * np.diff(motion.theta_acceleration_rad_s2, axis=0)
-    away = (mean * step - bend - np.diff(motion.theta_rad, axis=0))[inside]
-    assert np.median(np.abs(away)) < 1e-5 and np.abs(motion.theta_rate_rad_s).max() > 0.1
+    mean = 0.5 * (motion.drive_rate[1:] + motion.drive_rate[:-1])
+    bend = step**2 / 12.0 * np.diff(motion.drive_acceleration, axis=0)
+    away = (mean * step - bend - np.diff(motion.drive, axis=0))[inside]
+    assert np.median(np.abs(away)) < 1e-5 and np.abs(motion.drive_rate).max() > 0.1
 
 
 def test_an_unknown_speed_leaves_static_loads_and_no_rates():
     unknown = np.full((len(_PLAN.targets()), 3), np.nan)
     still, blind = _given(), _given(velocity_mm_s=unknown, acceleration_mm_s2=unknown)
-    assert np.isnan(blind.theta_rate_rad_s).all() and np.isnan(blind.theta_acceleration_rad_s2).all()
-    for key in ("force_n", "force_direction", "torque_nmm"):
+    assert np.isnan(blind.drive_rate).all() and np.isnan(blind.drive_acceleration).all()
+    for key in ("force_n", "force_direction", "drive_load"):
         np.testing.assert_array_equal(getattr(blind, key), getattr(still, key))
-    assert not EFFECTS["servo_lag"].contribute(blind, np.full(3, 0.01)).drive_rad.any()
+    assert not EFFECTS["servo_lag"].contribute(blind, np.full(3, 0.01)).drive.any()
 
 
 def test_an_unknown_payload_counts_as_none():
     blind = _given(payload_kg=np.full(len(_PLAN.targets()), np.nan))
     assert np.isnan(blind.payload_kg).all()
-    np.testing.assert_array_equal(blind.torque_nmm, _given().torque_nmm)
+    np.testing.assert_array_equal(blind.drive_load, _given().drive_load)
 
 
 def test_an_unknown_time_leaves_the_robot_cold():
@@ -75,6 +75,6 @@ def test_an_unknown_time_leaves_the_robot_cold():
 
 
 def test_loads_are_those_of_the_commanded_pose_whatever_the_controller_adds():
-    shifted = _given(theta_rad=ROBOT.inverse(_PLAN.targets()) + 0.002)
-    np.testing.assert_array_equal(shifted.torque_nmm, _given().torque_nmm)
-    assert shifted.theta_rad[0, 0] == pytest.approx(_given().theta_rad[0, 0] + 0.002)
+    shifted = _given(drive=ROBOT.inverse(_PLAN.targets()) + 0.002)
+    np.testing.assert_array_equal(shifted.drive_load, _given().drive_load)
+    assert shifted.drive[0, 0] == pytest.approx(_given().drive[0, 0] + 0.002)

@@ -69,7 +69,7 @@ def test_a_common_azimuth_turns_the_whole_robot_about_the_vertical():
 def test_a_common_radius_is_the_papers_error_of_the_base():
     motion, position, _ = drive({"base_placement": per_leg("radius", -1.4)}, _PLAN)
     paper = Rrru3(errors="published")
-    exact = paper.forward(motion.theta_rad, paper.parameters.vector({"dR": -1.4}), _PLAN.targets())
+    exact = paper.forward(motion.drive, paper.parameters.vector({"dR": -1.4}), _PLAN.targets())
     np.testing.assert_allclose(position, exact, atol=1e-8)
 
 

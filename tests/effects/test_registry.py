@@ -21,7 +21,7 @@ class Creep:
     parameters = ParameterSet((Parameter("rate2", "rad/s", 0.0, 0.0, 1e-4, "seen once"),))
 
     def contribute(self, motion, values):
-        return Contribution(drive_rad=values[0] * motion.time_s[:, None] * np.array([0.0, 1.0, 0.0]))
+        return Contribution(drive=values[0] * motion.time_s[:, None] * np.array([0.0, 1.0, 0.0]))
 
 class Full(Creep):
     name = "full"
@@ -31,7 +31,7 @@ class Full(Creep):
 class Everywhere(Creep):
     name = "everywhere"
     def contribute(self, motion, values):
-        return Contribution(drive_rad=values[0], frame=[values[0], 0.0, 0.0, 0.0, 0.0, 0.0])
+        return Contribution(drive=values[0], frame=[values[0], 0.0, 0.0, 0.0, 0.0, 0.0])
 
 class Crooked(Creep):
     def contribute(self, motion, values):
@@ -94,7 +94,7 @@ def test_what_a_users_effect_leaves_out_is_filled_in():
 def test_a_users_contribution_gets_its_full_shape():
     motion = VirtualRobot().motion(plan_of(FORWARD), Rrru3().inverse)
     result = find("own_effects:Everywhere").contribute(motion, np.array([1e-5]))
-    assert result.drive_rad.shape == (len(motion), 3) and result.frame.shape == (6,) and result.joint_mm == 0.0
+    assert result.drive.shape == (len(motion), 3) and result.frame.shape == (6,) and result.joint_mm == 0.0
     for name, message in (("Crooked", r"length_mm has the shape \(3, 4\); allowed: \(60, 3, 5\)"), ("Silent", "gave a float")):
         with pytest.raises(ConfigError, match=message):
             find(f"own_effects:{name}").contribute(motion, np.array([1e-5]))
@@ -103,7 +103,7 @@ def test_a_users_contribution_gets_its_full_shape():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("slack", "unknown effect 'slack'; known: backlash, .*servo_lag, or module:object"),
+        ("slack", "unknown effect 'slack'; known: backlash, .*rail_tilt, or module:object"),
         ("own_effects:", "unknown effect"),
         (":Creep", "unknown effect"),
         ("./own_effects.py:Creep", "unknown effect"),

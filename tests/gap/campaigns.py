@@ -62,7 +62,7 @@ def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, errors=None):
 def gap_mm(effects, plan=None):
     """Rms distance that a calibration leaves without noise."""
     frame = measure(effects, 0.0, plan=plan)
-    return least_squares(Residuals(SIM, rows.theta(frame), rows.measured(frame), rows.command(frame))).rms_mm
+    return least_squares(Residuals(SIM, rows.actuators(frame), rows.measured(frame), rows.command(frame))).rms_mm
 
 
 def drawn(name, seed, leg=0):

@@ -27,7 +27,7 @@ def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     run = case.measurements["run"].to_numpy()
     starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
-    np.testing.assert_array_equal(case.used, ~starts & ~at_turn_back(case.motion))
+    np.testing.assert_array_equal(case.used, ~starts & ~at_turn_back(case.motion, "rad"))
     assert len(case) == case.used.sum() == len(case.measured_mm) == len(case.run)
 
 
@@ -40,7 +40,8 @@ def test_points_that_are_lost_or_marked_are_not_used():
     frame.loc[60:70, "status"] = "near_singularity"
     near = slice(60, 71)
     kept = case_of(frame).used[near]
-    assert kept.any() and kept.sum() == (~starts_of_runs(frame["run"].to_numpy()) & ~at_turn_back(case_of(frame).motion))[near].sum()
+    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_turn_back(case_of(frame).motion, "rad")
+    assert kept.any() and kept.sum() == (~doubtful)[near].sum()
 
 
 def test_points_dropped_later_stay_dropped(case):
@@ -55,15 +56,15 @@ def test_the_motion_read_from_the_columns_is_the_one_that_was_driven(case):
     """Rates, loads and drive path of the table against those of the plan, which knows them in closed form; away from a run's ends."""
     driven = robot_of().motion(plan_of(), ROBOT.inverse)
     inner = case.used & np.append(~starts_of_runs(case.measurements["run"].to_numpy())[1:], False)
-    for name, share in (("theta_rate_rad_s", 0.04), ("torque_nmm", 0.01), ("force_n", 0.01), ("held_force_n", 0.01)):
+    for name, share in (("drive_rate", 0.04), ("drive_load", 0.01), ("force_n", 0.01), ("held_force_n", 0.01)):
         found, true = getattr(case.motion, name)[inner], getattr(driven, name)[inner]
         assert np.sqrt(((found - true) ** 2).mean()) < share * np.sqrt((true**2).mean()), name
-    np.testing.assert_allclose(case.motion.path_theta_rad[case.motion.path_index], case.motion.theta_rad)
-    assert np.isfinite(case.motion.path_theta_rad).all()
+    np.testing.assert_allclose(case.motion.path_drive[case.motion.path_index], case.motion.drive)
+    assert np.isfinite(case.motion.path_drive).all()
     for leg in range(3):
-        low, high = driven.path_theta_rad[:, leg].min(), driven.path_theta_rad[:, leg].max()
-        assert case.motion.path_theta_rad[:, leg].min() == pytest.approx(low, abs=2e-3)
-        assert case.motion.path_theta_rad[:, leg].max() == pytest.approx(high, abs=2e-3)
+        low, high = driven.path_drive[:, leg].min(), driven.path_drive[:, leg].max()
+        assert case.motion.path_drive[:, leg].min() == pytest.approx(low, abs=2e-3)
+        assert case.motion.path_drive[:, leg].max() == pytest.approx(high, abs=2e-3)
 
 
 def _state(name, shape, seed=3, size=1.0):
@@ -112,7 +113,7 @@ def test_the_calibrations_columns_are_derivatives_of_the_sim(case):
 
 def test_the_derivative_by_the_drives_is_the_mechanisms(case):
     linear = case.linearise(State(STATE_ERRORS, {}))
-    theta, position = rows.theta(case.measurements), case.sim(STATE_ERRORS)
+    theta, position = rows.actuators(case.measurements), case.sim(STATE_ERRORS)
     np.testing.assert_allclose(linear.drive, SIM.actuator_jacobian(position, theta, STATE_ERRORS)[case.used], rtol=1e-8)
 
 
@@ -136,8 +137,8 @@ def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_tw
         path[:, 1] = 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0)
         path[:, 0] = path[:, 2] = 0.001 * steps
         index = np.arange(0, 97, 8)
-        motion = SimpleNamespace(path_theta_rad=path, path_index=index, theta_rad=path[index])
-        assert np.flatnonzero(at_turn_back(motion)).tolist() == doubtful
+        motion = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
+        assert np.flatnonzero(at_turn_back(motion, "rad")).tolist() == doubtful
 
 
 def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):

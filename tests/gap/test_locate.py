@@ -110,7 +110,7 @@ def test_a_gap_with_payload_speed_or_time_is_found_there(case, linear):
         ("payload", "5 kg", frame["payload_kg"].to_numpy() == 5.0),
         ("speed", "300 mm/s", frame["speed_mm_s"].to_numpy() == 300.0),
         ("time", "quarter 1", frame["time_s"].to_numpy() < frame["time_s"].quantile(0.25)),
-        ("motion_direction", "leg 2 up", case.motion.theta_rate_rad_s[case.used][:, 1] < -1e-6),
+        ("motion_direction", "leg 2 up", case.motion.drive_rate[case.used][:, 1] < -1e-6),
     ):
         found = _located(case, _noise(case, 6) + 0.2 * here[:, None], linear).set_index(["factor", "level"])["share"]
         assert found[factor, level] > 0.95, factor

@@ -106,7 +106,7 @@ class FakeCompliance:
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""
-        return Contribution(drive_rad=np.asarray(values) * motion.torque_nmm / (1.0 + np.nan_to_num(motion.payload_kg))[:, None])
+        return Contribution(drive=np.asarray(values) * motion.drive_load / (1.0 + np.nan_to_num(motion.payload_kg))[:, None])
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,7 @@ def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are
 
     def made(values):
         result = function.contribute(case.motion, values)
-        return result.drive_rad if function.per_leg else result.joint_mm
+        return result.drive if function.per_leg else result.joint_mm
 
     np.testing.assert_allclose(made(2.0 * first - second), 2.0 * made(first) - made(second), atol=1e-12)
     for k in range(len(first)):

@@ -31,7 +31,7 @@ def _closed(setting, contribution):
         np.array(ROBOT.azimuth_rad), lengths + contribution.length_mm, np.zeros((3, 6, 6)) + contribution.displacement
     )
     guess = ROBOT.passive_angles(position, theta, errors)
-    solution = geometry.solve(theta + legs[:, 0] + contribution.drive_rad, guess, contribution.joint_mm)
+    solution = geometry.solve(theta + legs[:, 0] + contribution.drive, guess, contribution.joint_mm)
     assert solution.converged.all()
     return solution.position_mm
 
@@ -57,7 +57,7 @@ def _agree(setting, part, shape, at, step):
 
 @pytest.mark.parametrize("leg", range(3))
 def test_drive_errors_move_the_platform_as_the_closure_says(setting, leg):
-    _agree(setting, "drive_rad", (COUNT, 3), (slice(None), leg), ANGLE)
+    _agree(setting, "drive", (COUNT, 3), (slice(None), leg), ANGLE)
 
 
 @pytest.mark.parametrize("leg", range(3))
@@ -93,7 +93,7 @@ def test_random_contributions_add_up_to_first_order(setting):
     generator = np.random.default_rng(3)
     size = np.repeat([1.0, 1e-3], 3)
     draws = {
-        "drive_rad": 1e-3 * generator.normal(size=(COUNT, 3)),
+        "drive": 1e-3 * generator.normal(size=(COUNT, 3)),
         "length_mm": generator.normal(size=(COUNT, 3, 5)),
         "joint_mm": generator.normal(size=(COUNT, 3, 3)),
         "displacement": size * generator.normal(size=(3, len(PLACES), 6)),
@@ -139,4 +139,4 @@ def test_a_leg_turned_about_its_drive_axis_is_a_drive_error(setting):
     drive = np.zeros((COUNT, 3))
     drive[:, 2] = 1.0
     moved = setting[3].move(Contribution(displacement=displacement))
-    np.testing.assert_allclose(moved, setting[3].move(Contribution(drive_rad=drive)), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(moved, setting[3].move(Contribution(drive=drive)), rtol=1e-9, atol=1e-9)

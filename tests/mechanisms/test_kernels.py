@@ -23,7 +23,7 @@ def test_mean_distance_equals_the_slow_loop_within_1e_9_mm(rich_poses):
         slow = []
         for legs in robot.legs(errors):
             positions = [
-                rrru3_slow.forward(theta, legs, start) for theta, start in zip(residuals.theta_rad, residuals.start_mm, strict=True)
+                rrru3_slow.forward(theta, legs, start) for theta, start in zip(residuals.actuators, residuals.start_mm, strict=True)
             ]
             slow.append(np.linalg.norm(np.array(positions) - residuals.measured_mm, axis=1).mean())
         np.testing.assert_allclose(residuals.mean_distance(errors), slow, rtol=0.0, atol=1e-9)

@@ -57,16 +57,16 @@ def test_leg_forces_do_the_work_of_the_load():
     mass = robot.platform_mass_kg + 1.5 * robot.forearm_mass_kg
     acceleration = np.concatenate([run.acceleration_mm_s2 for run in plan.runs])
     load = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
-    drive = robot.mechanism.actuator_jacobian(target, motion.theta_rad)
+    drive = robot.mechanism.actuator_jacobian(target, motion.drive)
     torque = -np.einsum("nak,na->nk", drive, load)
-    gradient, by_leg = robot.mechanism.closure_jacobians(target, motion.theta_rad)
+    gradient, by_leg = robot.mechanism.closure_jacobians(target, motion.drive)
     moment = -motion.force_n * by_leg[..., 0] / np.linalg.norm(gradient, axis=-1)
     np.testing.assert_allclose(torque, moment, rtol=1e-9, atol=1e-9 * np.abs(moment).max())
     np.testing.assert_allclose(np.einsum("nl,nla->na", motion.force_n, motion.force_direction), -load, atol=1e-9)
 
 
 def _constraint(measurements):
-    return singularity.constraint_measure(Rrru3(), rows.command(measurements), rows.theta(measurements))
+    return singularity.constraint_measure(Rrru3(), rows.command(measurements), rows.actuators(measurements))
 
 
 def test_commands_near_the_constraint_singularity_are_reported():
@@ -144,7 +144,7 @@ def test_every_part_of_a_contribution_reaches_the_loop_closure():
     target = plan.targets()
     n = len(target)
     change = Contribution(
-        drive_rad=generator.normal(0.0, 1e-3, (n, 3)),
+        drive=generator.normal(0.0, 1e-3, (n, 3)),
         length_mm=generator.normal(0.0, 0.3, (n, 3, 5)),
         joint_mm=generator.normal(0.0, 0.1, (n, 3, 3)),
         displacement=generator.normal(size=(3, 6, 6)) * np.repeat([0.3, 0.001], 3),
@@ -158,7 +158,7 @@ def test_every_part_of_a_contribution_reaches_the_loop_closure():
     lengths[0, 3] += 0.7
     for k in range(0, n, 9):
         guess = np.concatenate([passive[k].ravel(), np.zeros(3), target[k]])
-        angles = theta[k] + [0.0, 0.002, 0.0] + change.drive_rad[k]
+        angles = theta[k] + [0.0, 0.002, 0.0] + change.drive[k]
         pose = rrru3_slow.close(angles, lengths + change.length_mm[k], change.displacement, guess, change.joint_mm[k])
         seen = rrru3_slow.transform(change.frame[3:], change.frame[:3]) @ pose
         np.testing.assert_allclose(position[k], seen[:3, 3], atol=1e-7)
@@ -168,8 +168,8 @@ def test_a_heavier_arm_loads_its_drive_only():
     plan = _plan()
     light, heavy = (virtual_robot.from_config(Rrru3(), _section(arm_mass_kg=mass)).motion(plan, Rrru3().inverse) for mass in (2.0, 5.0))
     np.testing.assert_array_equal(light.force_n, heavy.force_n)
-    more = 3.0 * (GRAVITY_MM_S2 * 200.0 * np.cos(light.theta_rad) - light.theta_acceleration_rad_s2 * 400.0**2 / 3.0) / 1000.0
-    np.testing.assert_allclose(heavy.torque_nmm - light.torque_nmm, more, rtol=1e-9)
+    more = 3.0 * (GRAVITY_MM_S2 * 200.0 * np.cos(light.drive) - light.drive_acceleration * 400.0**2 / 3.0) / 1000.0
+    np.testing.assert_allclose(heavy.drive_load - light.drive_load, more, rtol=1e-9)
 
 
 def test_unknown_names_in_the_configuration_are_named():

@@ -24,7 +24,7 @@ _MECHANISM = nominal({})
 
 def _calibrated(measurements):
     """Errors (7,) and rms distance in mm of a calibration by repeated linear least squares."""
-    theta, measured = rows.theta(measurements), rows.measured(measurements)
+    theta, measured = rows.actuators(measurements), rows.measured(measurements)
     errors = np.zeros(7)
     for _ in range(6):
         model = _MECHANISM.forward(theta, errors, rows.command(measurements))
@@ -131,7 +131,7 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     motion = virtual.motion(robot.plan, _MECHANISM.inverse)
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
-    first = FirstOrder(_MECHANISM, motion.position_mm, motion.theta_rad).move(acting.law.contribute(motion, acting.values))
+    first = FirstOrder(_MECHANISM, motion.position_mm, motion.drive).move(acting.law.contribute(motion, acting.values))
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements = measure(robot, 1, _MECHANISM)
     errors, _ = _calibrated(measurements)
@@ -144,7 +144,7 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
 def test_the_laws_from_outside_do_as_they_say():
     motion = VirtualRobot(mechanism=_MECHANISM).motion(_bare(0).plan, _MECHANISM.inverse)
     run = np.cumsum(np.diff(motion.time_s, prepend=0.0) > 30.0)
-    jumps = OUTSIDE["rehoming"].contribute(motion, np.array([1e-3, 2e-3, 0.0, 1.0])).drive_rad
+    jumps = OUTSIDE["rehoming"].contribute(motion, np.array([1e-3, 2e-3, 0.0, 1.0])).drive
     for number in range(8):
         assert (np.ptp(jumps[run == number], axis=0) == 0.0).all()
     assert np.unique(jumps[:, 0]).size == 8 and np.abs(jumps).max(axis=0)[0] <= 1e-3 and not jumps[:, 2].any()

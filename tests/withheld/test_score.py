@@ -33,7 +33,7 @@ def robots():
     result = {}
     for robot in (replace(bare, name="sound"), faulty):
         measurements = measure(robot, _SEED, _MECHANISM)
-        residuals = Residuals(_MECHANISM, rows.theta(measurements), rows.measured(measurements), rows.command(measurements))
+        residuals = Residuals(_MECHANISM, rows.actuators(measurements), rows.measured(measurements), rows.command(measurements))
         result[robot.name] = (robot, measurements, least_squares(residuals).errors)
     return result
 

@@ -70,6 +70,7 @@ TABLES = (
             Column("share_of_noise", NUMBER, "share that noise alone would give this level"),
             Column("noise_could", "bool", "true where noise alone could give this share"),
             Column("drive_rms_rad", NUMBER, "the residual as equivalent error of the drive angle; null for every factor but leg", True),
+            Column("drive_rms_mm", NUMBER, "the same of a slider's position, for robots with sliders", True),
             *(Column(f"{axis}_mm", NUMBER, f"centre of the region, {axis}, robot frame; null for other factors", True) for axis in "xyz"),
         ),
         ("campaign", "factor", "level"),

@@ -1,0 +1,41 @@
+"""Rail tilt: a slider's rail does not point where the drawing says.
+
+In the frame of leg k (x radial, y tangential, z up) the rail runs through its zero mark, turned there by the rotation vector
+
+    w_k = (0, -rise_k, swing_k)
+
+rise lifts a horizontal rail's outer end, swing turns it about the vertical. The carriage at the distance b_k from the zero mark is off by
+w_k x b_k d_k, which grows along the rail: what tells it from the zero error of a slider. It enters as a displacement at the place `base`, six
+numbers, and is linear in them.
+
+Assumptions: straight rail, true at its zero mark; joints that keep the platform upright all the same; constant over the campaign.
+
+Source: geometry; squareness and parallelism of guides as in Slocum, Precision Machine Design, 1992. Typical size assumed: 0.3 mm over 300 mm.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.effects.protocol import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
+from rrru.parameters import Parameter, ParameterSet
+
+_PARAMETERS = ParameterSet(
+    tuple(Parameter(f"{kind}{k}", "rad", 0.0, -0.05, 0.05, "seat of the rail, size assumed") for k in LEGS for kind in ("rise", "swing"))
+)
+_COORDINATES = plain_coordinates(_PARAMETERS, 1e-3)
+
+
+@dataclass(frozen=True)
+class RailTilt:
+    """Rails turned about their zero marks: rise and swing of every leg."""
+
+    name: str = "rail_tilt"
+    parameters: ParameterSet = _PARAMETERS
+    coordinates: Coordinates = _COORDINATES
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Displacement of the rails' seats under rise and swing of leg 1, then of legs 2 and 3, (6,) in rad."""
+        rise, swing = np.reshape(values, (3, 2)).T
+        return Contribution(displacement=base_displacement(np.zeros((3, 3)), np.stack([np.zeros(3), -rise, swing], axis=-1)))

@@ -1,0 +1,43 @@
+"""The virtual 3-PTT or Delta: nominal controller in front, exact closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rrru.effects.protocol import Contribution
+from rrru.plant.closure import TripodGeometry
+from rrru.plant.virtual_robot import DrivenRobot
+
+# the set of error parameters in which a robot's truth is given
+_TRUTH = {"ptt3": "rails", "delta": "legs"}
+
+
+@dataclass(frozen=True)
+class VirtualTripod(DrivenRobot):
+    """A tripod whose truth is known.
+
+    mechanism: the nominal robot; errors: names of its richest error set ("rails" of the 3-PTT, "legs" of the Delta) to values; effects: active
+    effects; wobble_mm: radius of the ball in which the platform lies at random; masses in kg, the arm's being the 3-PTT's carriage.
+    """
+
+    mechanism: object
+    errors: dict = field(default_factory=dict)
+    effects: tuple = ()
+    wobble_mm: float = 0.0
+    platform_mass_kg: float = 3.0
+    forearm_mass_kg: float = 1.2
+    arm_mass_kg: float = 2.0
+
+    @property
+    def geometry(self):
+        """The real legs; raises ConfigError for an unknown error."""
+        rich = replace(self.mechanism, errors=_TRUTH[self.mechanism.name])
+        return TripodGeometry(rich, rich.legs(rich.parameters.vector(self.errors)))
+
+    def positions(self, motion, target=None):
+        """Platform centres (n, 3) in the tracker's frame and its rotations (n,), zero, at the points of a motion; NaN where links do not meet.
+
+        target is not needed: of the two assemblies the platform is in the lower one.
+        """
+        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        return self.geometry.solve_under(motion.drive, change), np.zeros(len(motion))
