@@ -147,7 +147,10 @@ def _point_rows(case, before, after, drive):
     position = rows.command(case.measurements)
     result = frame.assign(**{f"command_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")})
     result = result.assign(**{f"before_{axis}_mm": before[:, k] for k, axis in enumerate("xyz")})
-    for stem, values, suffix in (("after_{}_mm", after, "xyz"), ("drive_error{}_rad", drive, "123")):
+    unit = case.mechanism.drive_unit
+    other = "mm" if unit == "rad" else "rad"
+    drives = (("drive_error{}_" + unit, drive, "123"), ("drive_error{}_" + other, np.nan, "123"))
+    for stem, values, suffix in (("after_{}_mm", after, "xyz"), *drives):
         full = np.full(position.shape, np.nan)
         full[case.used] = values
         result = result.assign(**{stem.format(end): full[:, k] for k, end in enumerate(suffix)})

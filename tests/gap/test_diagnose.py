@@ -147,7 +147,9 @@ def test_angles_recomputed_from_the_commands_give_the_same_answer(lagging):
     verdict = diagnosed(lagging).verdict
     numbers = [key for key, value in verdict.items() if isinstance(value, float)]
     assert {key: again.verdict[key] for key in numbers} == pytest.approx({key: verdict[key] for key in numbers}, rel=1e-6, nan_ok=True)
-    assert {key: again.verdict[key] for key in verdict if key not in numbers} == {key: verdict[key] for key in verdict if key not in numbers}
+    assert {key: again.verdict[key] for key in verdict if key not in numbers} == {
+        key: verdict[key] for key in verdict if key not in numbers
+    }
 
 
 def test_missing_points_and_runs_of_unequal_length_change_nothing(lagging):

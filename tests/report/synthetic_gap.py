@@ -60,7 +60,9 @@ def gap_points(ground):
     used[[4, len(ground) // 2]] = False
     before[~used] += 3.0
     after = np.where(used[:, None], noise * 1.1, np.nan)
-    frame = ground.assign(used=used, **{f"drive_error{k}_rad": 1e-4 * k for k in (1, 2, 3)})
+    frame = ground.assign(
+        used=used, **{f"drive_error{k}_rad": 1e-4 * k for k in (1, 2, 3)}, **{f"drive_error{k}_mm": np.nan for k in (1, 2, 3)}
+    )
     vectors = {f"{name}_{axis}_mm": part[:, k] for name, part in (("before", before), ("after", after)) for k, axis in enumerate("xyz")}
     return check("gap_points", frame.assign(**vectors))
 

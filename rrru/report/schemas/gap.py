@@ -213,6 +213,7 @@ TABLES = (
                 Column(f"drive_error{k}_rad", NUMBER, f"before, as equivalent error of drive angle {k}; null near singularities", True)
                 for k in (1, 2, 3)
             ),
+            *(Column(f"drive_error{k}_mm", NUMBER, f"the same of slider {k}, for robots with sliders", True) for k in (1, 2, 3)),
             Column("used", "bool", "false where the diagnosis left the point out"),
         ),
         ("run", "point"),
