@@ -13,8 +13,9 @@ from rrru.campaign.ingest import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.errors import ConfigError
 from rrru.mechanisms import singularity, workspace
-from rrru.mechanisms.protocol import make_mechanism
-from rrru.plant import virtual_robot
+from rrru.mechanisms.protocol import MECHANISMS, identifiable_truth, make_mechanism
+from rrru.mechanisms.rrru3 import Rrru3
+from rrru.plant import virtual_robot, virtual_tripod
 from rrru.seeds import stream
 
 # grid lines over the longest reach of a robot's legs
@@ -47,14 +48,14 @@ def check(config):
             raise ConfigError(f"sweep.populations.{kind} is {sizes}; allowed: one size for one, several for islands")
 
 
-def mechanism(config, campaign, errors="identifiable"):
-    """The nominal robot of a campaign with the chosen error parameters and the configuration's bounds."""
+def mechanism(config, campaign, errors=None):
+    """The nominal robot of a campaign with the configuration's bounds and the chosen error parameters, by default the identifiable ones."""
     name = config["campaigns"][campaign]["robot"]
     bounds = config["calibration"]["bounds"]
     return make_mechanism(
         name,
         config["robots"].get(name, {}),
-        errors=errors,
+        errors=errors or MECHANISMS[name].TRACKED,
         angle_limit_rad=bounds["angle_rad"],
         length_limit_mm=bounds["length_mm"],
     )
@@ -64,7 +65,7 @@ def mechanism(config, campaign, errors="identifiable"):
 class VirtualCampaign:
     """A campaign of a virtual robot: the robot, what it is told to do, the tracker's noise and a generator per purpose."""
 
-    robot: virtual_robot.VirtualRobot
+    robot: virtual_robot.DrivenRobot
     plan: object
     noise_mm: float
     seed: int
@@ -96,9 +97,8 @@ def virtual_campaign(config, campaign):
         motion["acceleration_mm_s2"],
         motion["dwell_s"],
     )
-    return VirtualCampaign(
-        virtual_robot.from_config(mechanism(config, campaign), robot), plan, section["noise_mm"], config["seed"], campaign
-    )
+    kind = virtual_robot if section["robot"] == "rrru3" else virtual_tripod
+    return VirtualCampaign(kind.from_config(mechanism(config, campaign), robot), plan, section["noise_mm"], config["seed"], campaign)
 
 
 def ingest_campaign(config, campaign):
@@ -111,10 +111,11 @@ def ingest_campaign(config, campaign):
 
 
 def true_errors(config, campaign):
-    """The virtual robot's true errors by name, or None for an ingested campaign."""
+    """The virtual robot's true errors by the names of the mechanism's parameters, or None for an ingested campaign."""
     if not is_virtual(config, campaign):
         return None
-    return _entry(config, "virtual_robots", config["campaigns"][campaign]["virtual"], campaign)["errors"]
+    section = _entry(config, "virtual_robots", config["campaigns"][campaign]["virtual"], campaign)
+    return identifiable_truth(mechanism(config, campaign), section["errors"])
 
 
 def noise(config, campaign, measurements):
@@ -146,8 +147,9 @@ def workspace_table(config, campaign, measurements):
     """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commanded points."""
     robot = mechanism(config, campaign)
     height = float(rows.command(measurements)[:, 2].mean().round(-1))
-    reach = robot.L1_mm + robot.L2_mm + robot.L3_mm
-    across, down = (-reach, reach), (0.0, reach)
+    reach = float(robot.lengths_mm[1:4].sum())
+    # the 3-RRRU's z points down from its base
+    across, down = (-reach, reach), (0.0 if isinstance(robot, Rrru3) else -reach, reach)
     frames = []
     for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
         points = workspace.slice_points(plane, at, across, vertical, reach / _WORKSPACE_LINES)

@@ -8,7 +8,6 @@ from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.residuals import Residuals
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError, FitError
-from rrru.mechanisms.rrru3 import to_identifiable
 
 
 def select(measurements, mechanism, patterns, use_near_singularity=True):
@@ -42,9 +41,9 @@ def fit_sets(measurements, mechanism, settings, noise_mm=None):
 def tables(campaign, fits, true_errors=None):
     """Frames by table name: calibrations, parameters, correlations, observability.
 
-    true_errors: mapping of published or tied names to the virtual robot's true errors, or None where nobody knows them.
+    true_errors: the virtual robot's true errors by the mechanism's names, or None where nobody knows them.
     """
-    truth = to_identifiable(true_errors) if true_errors is not None else {}
+    truth = true_errors or {}
     calibrations, parameters, correlations, observability = [], [], [], []
     for (name, method), fit in fits.items():
         label = {"campaign": campaign, "calibration": name, "method": method}

@@ -10,7 +10,7 @@ from rrru.calibrate.genetic import GeneticSettings, minimise
 from rrru.calibrate.least_squares import least_squares
 from rrru.calibrate.mean_distance import least_mean_distance
 from rrru.calibrate.sweep import kept_generations
-from rrru.mechanisms.rrru3 import to_identifiable
+from rrru.mechanisms.protocol import identifiable_truth
 from rrru.seeds import run_seed
 
 SETTING_KEYS = tuple(GeneticSettings.__dataclass_fields__)
@@ -25,9 +25,9 @@ def settings_from_config(section, **changes):
 def study_set(measurements, tied, identifiable, calibration, patterns, settings, seeds, study_seed, labels=(), use_near_singularity=True):
     """Runs of the genetic algorithm on one calibration set.
 
-    tied, identifiable: the mechanism with 8 and with 7 error parameters; seeds: number of runs, seeded by the study's
-    seed and the labels. Returns (runs, history, timings) as frames
-    without the campaign's name, or None where the campaign has too few points for the set.
+    tied, identifiable: the mechanism with the searched and with the identifiable error parameters, 8 and 7 of the 3-RRRU; seeds: number of
+    runs, seeded by the study's seed and the labels. Returns (runs, history, timings) as frames without the campaign's name, or None where
+    the campaign has too few points for the set.
     """
     residuals = select(measurements, tied, patterns, use_near_singularity)
     if residuals is None:
@@ -46,7 +46,7 @@ def study_set(measurements, tied, identifiable, calibration, patterns, settings,
         result = minimise(residuals.mean_distance, *bounds, settings, seed)
         seconds.append(perf_counter() - start)
         values = dict(zip(names, result.errors.tolist(), strict=True))
-        shared = to_identifiable(values)
+        shared = identifiable_truth(identifiable, values)
         polish = least_mean_distance(reduced, identifiable.parameters.vector(shared))
         runs.append(
             {"calibration": calibration, "seed": number, "objective_mm": result.objective, "generations": result.generations}
@@ -54,7 +54,7 @@ def study_set(measurements, tied, identifiable, calibration, patterns, settings,
             | {"polish_evaluations": polish.evaluations, "excess": _excess(result.objective, optimum)}
             | {"polished_excess": _excess(polish.mean_mm, optimum)}
             | values
-            | {"da": shared["da"]}
+            | shared
         )
         kept = kept_generations(result.generations)
         columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}

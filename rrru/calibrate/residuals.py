@@ -53,6 +53,11 @@ class Residuals:
             np.ascontiguousarray(self.measured_mm.T),
         )
 
+    @cached_property
+    def _measured(self):
+        """Measured positions (n, 3) as the compiled objective needs them."""
+        return np.ascontiguousarray(self.measured_mm, dtype=float)
+
     def model(self, errors):
         """Model positions (n, 3) in mm under errors (p,)."""
         return self.mechanism.forward(self.actuators, errors, self.nominal_mm)
@@ -69,6 +74,7 @@ class Residuals:
         """Objective of paper A, eq. (11): mean distance (m,) in mm for errors (m, p); inf where the model leaves the reach."""
         errors = np.ascontiguousarray(errors, dtype=float)
         if not isinstance(self.mechanism, Rrru3):
-            distance = np.linalg.norm(self.measured_mm - self.mechanism.forward_batch(self.actuators, errors), axis=-1).mean(axis=-1)
-            return np.where(np.isfinite(distance), distance, np.inf)
+            legs = self.mechanism.legs(errors)
+            ends = np.ascontiguousarray(self.mechanism.ends(self.actuators, legs[:, None]))
+            return kernels.tripod_mean_distance(ends, np.ascontiguousarray(legs[..., self.mechanism.LINK]), self._measured)
         return kernels.mean_distance(errors, self.mechanism.legs(errors), *self._kernel_arguments)

@@ -11,7 +11,7 @@ import pyarrow
 import pyarrow.parquet as parquet
 
 from rrru.campaign.ingest_checks import check_runs, check_speed, number_runs, path_length, resolution
-from rrru.campaign.ingest_columns import COMMAND, KNOWN, MEASURED, MM, RAD, REQUIRED, THETA, convert, resolve
+from rrru.campaign.ingest_columns import COMMAND, DRIVES, KNOWN, MEASURED, MM, RAD, REQUIRED, convert, drive_name, resolve
 from rrru.campaign.ingest_geometry import check_commands, check_measured, check_sizes, doubts, frame_limit
 from rrru.campaign.ingest_text import looks_like, text_cells
 from rrru.campaign.outliers import flag_outliers, reproduced
@@ -19,7 +19,6 @@ from rrru.campaign.problems import Problems
 from rrru.campaign.registration import Registration, register
 from rrru.errors import ConfigError, FitError
 
-_COLUMNS = ("run", "trajectory", "point", "time_s", *COMMAND, *THETA, *MEASURED, "speed_mm_s", "payload_kg", "status")
 _CHOICES = {
     "unit": tuple(MM),
     "angle_unit": tuple(RAD),
@@ -80,7 +79,8 @@ def ingest(spec, mechanism):
     """
     problems, notes = Problems(spec.path), []
     names, rows, cells = _read(Path(spec.path), problems)
-    found, extra = resolve(spec, names, problems)
+    drives = DRIVES[mechanism.drive_unit]
+    found, extra = resolve(spec, names, drives, problems)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
     frame = convert(spec, found, cells, rows, problems)
@@ -151,9 +151,11 @@ def _notes_on_columns(frame, found, spec, mechanism):
     for name in ("time_s", "speed_mm_s", "payload_kg"):
         if name not in frame:
             notes.append(f"column {found[name]} is blank: {name} is unknown" if name in found else f"no column {name}: it is unknown")
-    if not set(THETA) <= set(frame):
+    drives = DRIVES[mechanism.drive_unit]
+    if not set(drives) <= set(frame):
         notes.append(
-            f"no drive angles: theta1_rad to theta3_rad computed from the commanded positions ({mechanism.name}, nominal, elbow {spec.elbow})"
+            f"no {drive_name(drives)}: {drives[0]} to {drives[2]} computed from the commanded positions "
+            f"({mechanism.name}, nominal, elbow {spec.elbow})"
         )
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")
@@ -211,9 +213,10 @@ def _outliers(frame, digit_mm):
 
 
 def _table(frame, spec, mechanism, digit_mm, notes):
-    """Frame in the form of the schema `measurements`; adds doubts and how many outliers were marked to the notes."""
-    if not set(THETA) <= set(frame):
-        frame[[*THETA]] = mechanism.inverse(frame[[*COMMAND]].to_numpy(), elbow=spec.elbow)
+    """Frame in the form of the schema of measurements; adds doubts and how many outliers were marked to the notes."""
+    drives = DRIVES[mechanism.drive_unit]
+    if not set(drives) <= set(frame):
+        frame[[*drives]] = mechanism.inverse(frame[[*COMMAND]].to_numpy(), elbow=spec.elbow)
     notes += doubts(frame, mechanism)
     outlier = _outliers(frame, digit_mm)
     frame["status"] = np.where(outlier, "outlier", "ok")
@@ -222,5 +225,6 @@ def _table(frame, spec, mechanism, digit_mm, notes):
         notes.append(
             f"{outlier.sum()} points marked as outliers, kept and left out of fits: {where}{', ...' if outlier.sum() > 10 else ''}"
         )
-    frame = frame.reindex(columns=_COLUMNS).reset_index(drop=True)
+    columns = ("run", "trajectory", "point", "time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg", "status")
+    frame = frame.reindex(columns=columns).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"})

@@ -9,12 +9,15 @@ import pandas as pd
 import pandera.pandas as pa
 from pandera.errors import SchemaErrors
 
+from rrru.campaign.measurements import actuator_columns
+
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
-THETA = tuple(f"theta{k}_rad" for k in (1, 2, 3))
+# columns of the commanded actuator values by their unit: drive angles or slider positions
+DRIVES = {unit: tuple(actuator_columns(unit)) for unit in ("rad", "mm")}
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
-OPTIONAL = ("run", "point", "time_s", *THETA, "speed_mm_s", "payload_kg")
+OPTIONAL = ("run", "point", "time_s", *DRIVES["rad"], *DRIVES["mm"], "speed_mm_s", "payload_kg")
 KNOWN = (*REQUIRED, *OPTIONAL)
 MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
 RAD = {"rad": 1.0, "deg": np.pi / 180.0}
@@ -38,30 +41,39 @@ _SCHEMA = pa.DataFrameSchema(
 )
 
 
-def resolve(spec, names, problems):
+def resolve(spec, names, drives, problems):
     """Which of the file's columns stands for which of ours: {our name: the file's name}, and the file's columns that nobody declared.
 
-    Missing columns, repeated ones and, unless `extra_columns` is "ignore", undeclared ones are noted.
+    drives: names of the three columns of actuator values that the robot has. Missing columns, repeated ones and, unless `extra_columns` is
+    "ignore", undeclared ones are noted.
     """
+    known = [name for name in KNOWN if name in drives or name not in (*DRIVES["rad"], *DRIVES["mm"])]
     for name in sorted({name for name in names if names.count(name) > 1}):
         problems.add("repeated column", column=name, value=f"{names.count(name)} columns of this name", allowed="each name once")
-    found = {ours: spec.columns.get(ours, ours) for ours in KNOWN if spec.columns.get(ours, ours) in names}
+    found = {ours: spec.columns.get(ours, ours) for ours in known if spec.columns.get(ours, ours) in names}
     extra = [name for name in names if name not in found.values()]
-    for ours in KNOWN:
+    for ours in known:
         theirs = spec.columns.get(ours, ours)
         if ours not in found and (ours in REQUIRED or ours in spec.columns):
             allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
-    given = [found[name] for name in THETA if name in found]
+    given = [found[name] for name in drives if name in found]
     if len(given) in (1, 2):
-        problems.add("missing column", column=", ".join(given), value="some drive angles", allowed=f"all of {', '.join(THETA)}, or none")
+        problems.add(
+            "missing column", column=", ".join(given), value=f"some {drive_name(drives)}", allowed=f"all of {', '.join(drives)}, or none"
+        )
     if spec.extra_columns == "refuse":
-        unused = [ours for ours in KNOWN if ours not in found]
+        unused = [ours for ours in known if ours not in found]
         for name in dict.fromkeys(extra):
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
-            allowed = f"{', '.join(KNOWN)}{_advice(_nearest(name, unused), name)}; extra_columns: ignore leaves the others out"
+            allowed = f"{', '.join(known)}{_advice(_nearest(name, unused), name)}; extra_columns: ignore leaves the others out"
             problems.add("unknown column", column=shown, value="a column that nobody declared", allowed=allowed)
     return found, extra
+
+
+def drive_name(drives):
+    """What the columns of actuator values hold."""
+    return "drive angles" if drives == DRIVES["rad"] else "slider positions"
 
 
 def convert(spec, found, cells, rows, problems):
@@ -76,15 +88,16 @@ def convert(spec, found, cells, rows, problems):
             "missed point", row=row, column=", ".join(found[name] for name in MEASURED if name in found), value="blank", allowed=_MISSED
         )
     filled = {ours for ours, theirs in found.items() if ours in REQUIRED or not all(map(_blank, cells[theirs]))}
-    if filled & set(THETA):
-        filled |= set(THETA)
+    for drives in DRIVES.values():
+        if filled & set(drives):
+            filled |= set(drives)
     frame = pd.DataFrame(index=pd.Index(rows))
     for ours, theirs in found.items():
         if ours == "trajectory":
             frame[ours] = pd.Series(_names(cells[theirs], rows, theirs, problems), index=frame.index, dtype=object)
         elif ours in filled:
             skip = missed if ours in MEASURED else np.zeros(len(rows), dtype=bool)
-            factor = MM[spec.unit] if ours in COMMAND + MEASURED else RAD[spec.angle_unit] if ours in THETA else 1.0
+            factor = MM[spec.unit] if ours in COMMAND + MEASURED + DRIVES["mm"] else RAD[spec.angle_unit] if ours in DRIVES["rad"] else 1.0
             frame[ours] = factor * _numbers(cells[theirs], rows, theirs, skip, problems)
     try:
         _SCHEMA.validate(frame, lazy=True)

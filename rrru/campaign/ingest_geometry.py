@@ -5,10 +5,11 @@ from itertools import permutations, product
 
 import numpy as np
 
-from rrru.campaign.ingest_columns import AXES, COMMAND, MEASURED, MM, THETA
+from rrru.campaign.ingest_columns import AXES, COMMAND, DRIVES, MEASURED, MM, drive_name
+from rrru.mechanisms.rrru3 import Rrru3
 
-# Files print drive angles with six decimals and positions with three or more.
-ANGLE_TOLERANCE_RAD = 1e-4
+# Files print drive angles with six decimals and positions with three or more, sometimes two.
+DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
 # ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ.
 _FRAME_SHARE = 0.05
 # A hundredth of it is strange enough for a note.
@@ -36,7 +37,7 @@ def check_commands(frame, found, spec, mechanism, problems):
         column, allowed = _columns(COMMAND, found), f"a position that every leg reaches; leg {legs} does not"
         problems.add("reach", row=known.index[i], column=column, value=_position(command[i]), allowed=allowed)
     flipped = _upside_down(command[reached], theta[reached], found, mechanism, problems)
-    if set(THETA) <= set(known) and not flipped:
+    if set(DRIVES[mechanism.drive_unit]) <= set(known) and not flipped:
         _check_angles(known[reached], theta[reached], found, spec, mechanism, problems)
     return True
 
@@ -164,39 +165,48 @@ def _upside_down(command, theta, found, mechanism, problems):
     flipped = np.abs(back[:, 2] + command[:, 2]) < np.abs(back[:, 2] - command[:, 2])
     if not len(command) or flipped.mean() < _MANY:
         return False
-    value = f"{command[flipped][0, 2]:.6g} mm, where the drive angles of that position bring the robot to {back[flipped][0, 2]:.6g} mm"
+    way = "DOWN" if isinstance(mechanism, Rrru3) else "UP"
+    drives, at, turned = drive_name(DRIVES[mechanism.drive_unit]), command[flipped][0, 2], back[flipped][0, 2]
+    value = f"{at:.6g} mm, where the {drives} of that position bring the robot to {turned:.6g} mm"
     problems.add(
-        "upside down", column=found["command_z_mm"], value=value, allowed="positions in the robot frame, whose z points DOWN from the base"
+        "upside down",
+        column=found["command_z_mm"],
+        value=value,
+        allowed=f"positions in the robot frame, whose z points {way} from the base",
     )
     return True
 
 
 def _check_angles(known, theta, found, spec, mechanism, problems):
-    """Note drive angles that are not those of the commanded positions."""
-    given, command = known[[*THETA]].to_numpy(), known[[*COMMAND]].to_numpy()
+    """Note drive angles or slider positions that are not those of the commanded positions."""
+    unit = mechanism.drive_unit
+    drives = DRIVES[unit]
+    given, command = known[[*drives]].to_numpy(), known[[*COMMAND]].to_numpy()
     off = np.abs(given - theta)
-    bad = off > ANGLE_TOLERANCE_RAD
-    tolerance = f"within {ANGLE_TOLERANCE_RAD:g} rad of the angle that the commanded position needs"
+    bad = off > DRIVE_TOLERANCE[unit]
+    tolerance = f"within {DRIVE_TOLERANCE[unit]:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
     if bad.any(axis=1).mean() > _MANY and (advice := _angle_advice(given, theta, command, spec, mechanism)):
-        read = f"drive angles up to {np.nanmax(np.abs(given)):.6g} rad when read in {spec.angle_unit}"
-        value = f"{read}, up to {np.nanmax(off):.6g} rad from those that the commanded positions need"
-        problems.add("angles", column=_columns(THETA, found), value=value, allowed=f"{tolerance}; {advice}")
+        read = f"{drive_name(drives)} up to {np.nanmax(np.abs(given)):.6g} {unit}"
+        read += f" when read in {spec.angle_unit}" if unit == "rad" else ""
+        value = f"{read}, up to {np.nanmax(off):.6g} {unit} from those that the commanded positions need"
+        problems.add("angles", column=_columns(drives, found), value=value, allowed=f"{tolerance}; {advice}")
         return
     for i, k in np.argwhere(bad):
-        value = f"{given[i, k]:.6f} rad, while the commanded position {_position(command[i])} needs {theta[i, k]:.6f} rad"
-        problems.add("angles", row=known.index[i], column=found[THETA[k]], value=value, allowed=tolerance)
+        value = f"{given[i, k]:.6f} {unit}, while the commanded position {_position(command[i])} needs {theta[i, k]:.6f} {unit}"
+        problems.add("angles", row=known.index[i], column=found[drives[k]], value=value, allowed=tolerance)
 
 
 def _angle_advice(given, theta, command, spec, mechanism):
-    """Which setting makes the drive angles fit the commanded positions, or None."""
+    """Which setting makes the drive angles or slider positions fit the commanded positions, or None."""
+    tolerance = DRIVE_TOLERANCE[mechanism.drive_unit]
     other = {"rad": ("deg", np.pi / 180.0), "deg": ("rad", 180.0 / np.pi)}[spec.angle_unit]
     elbow = {"out": "in", "in": "out"}[spec.elbow]
     for candidate, wanted, advice in (
-        (given * other[1], theta, f"angle_unit: {other[0]} makes them fit"),
+        *(((given * other[1], theta, f"angle_unit: {other[0]} makes them fit"),) if mechanism.drive_unit == "rad" else ()),
         (given, mechanism.inverse(command, elbow=elbow), f"elbow: {elbow} makes them fit"),
         (given[:, ::-1], theta, "the legs seem to be numbered the other way round"),
     ):
-        if (np.abs(candidate - wanted) < ANGLE_TOLERANCE_RAD).all(axis=1).mean() > _MOST:
+        if (np.abs(candidate - wanted) < tolerance).all(axis=1).mean() > _MOST:
             return advice
     return None
 

@@ -2,11 +2,11 @@
 
 In the frame of leg k (x radial, y tangential, z up) the rail runs through its zero mark, turned there by the rotation vector
 
-    w_k = (0, -rise_k, swing_k)
+    w_k = (lean_k, -rise_k, swing_k)
 
-rise lifts a horizontal rail's outer end, swing turns it about the vertical. The carriage at the distance b_k from the zero mark is off by
-w_k x b_k d_k, which grows along the rail: what tells it from the zero error of a slider. It enters as a displacement at the place `base`, six
-numbers, and is linear in them.
+rise lifts a horizontal rail's outer end or leans an upright one inwards, swing turns a horizontal rail about the vertical, lean an upright one to
+the side. The carriage at the distance b_k from the zero mark is off by w_k x b_k d_k, which grows along the rail: what tells it from the
+zero error of a slider. It enters as a displacement at the place `base`, nine numbers of which six do something, and is linear in them.
 
 Assumptions: straight rail, true at its zero mark; joints that keep the platform upright all the same; constant over the campaign.
 
@@ -21,14 +21,18 @@ from rrru.effects.protocol import LEGS, Contribution, Coordinates, base_displace
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
-    tuple(Parameter(f"{kind}{k}", "rad", 0.0, -0.05, 0.05, "seat of the rail, size assumed") for k in LEGS for kind in ("rise", "swing"))
+    tuple(
+        Parameter(f"{kind}{k}", "rad", 0.0, -0.05, 0.05, "seat of the rail, size assumed")
+        for k in LEGS
+        for kind in ("lean", "rise", "swing")
+    )
 )
 _COORDINATES = plain_coordinates(_PARAMETERS, 1e-3)
 
 
 @dataclass(frozen=True)
 class RailTilt:
-    """Rails turned about their zero marks: rise and swing of every leg."""
+    """Rails turned about their zero marks: lean, rise and swing of every leg."""
 
     name: str = "rail_tilt"
     parameters: ParameterSet = _PARAMETERS
@@ -36,6 +40,5 @@ class RailTilt:
     needs: tuple = ()
 
     def contribute(self, motion, values):
-        """Displacement of the rails' seats under rise and swing of leg 1, then of legs 2 and 3, (6,) in rad."""
-        rise, swing = np.reshape(values, (3, 2)).T
-        return Contribution(displacement=base_displacement(np.zeros((3, 3)), np.stack([np.zeros(3), -rise, swing], axis=-1)))
+        """Displacement of the rails' seats under lean, rise and swing of leg 1, then of legs 2 and 3, (9,) in rad."""
+        return Contribution(displacement=base_displacement(np.zeros((3, 3)), np.reshape(values, (3, 3)) * [1.0, -1.0, 1.0]))

@@ -50,7 +50,7 @@ class Delta(Tripod):
     name: str = field(default="delta", init=False)
 
     ARM, LINK, OFFSET = 1, 2, 3
-    drive_unit = "rad"
+    TRACKED = "tied"
 
     def __post_init__(self):
         for key in ("l1_mm", "l2_mm", "a_mm", "angle_limit_rad", "length_limit_mm"):
@@ -104,8 +104,8 @@ class Delta(Tripod):
         """Numbers of the legs (3, 4) without errors."""
         return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
 
-    def inverse_of_legs(self, position_mm, legs):
-        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards; NaN where a leg cannot reach."""
+    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where a leg cannot reach."""
         position = points(position_mm)
         cx, cy = self.turn
         u, v = position[:, :1] * cx + position[:, 1:2] * cy, position[:, 1:2] * cx - position[:, :1] * cy
@@ -115,7 +115,7 @@ class Delta(Tripod):
         with np.errstate(invalid="ignore", divide="ignore"):
             cosine = (legs[:, 1] ** 2 + d**2 + v**2 - legs[:, 2] ** 2) / (2.0 * legs[:, 1] * d)
             # beyond the reach arccos gives NaN, which is the mask the callers rely on
-            return np.arctan2(depth, inward) - np.arccos(cosine) - legs[:, 0]
+            return np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0]
 
     def ends(self, theta_rad, legs):
         """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm in the calibration frame, for drive angles (n, 3)."""

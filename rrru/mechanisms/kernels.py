@@ -1,6 +1,6 @@
-"""Compiled inner loops of the 3-RRRU forward kinematics: a population of error vectors times the points of a campaign.
+"""Compiled inner loops of the forward kinematics: a population of error vectors times the points of a campaign.
 
-Arrays are stored component first, shape (3, n), so that the loop over points is the innermost one and vectorises. `legs` has the columns
+Those of the 3-RRRU come first; their arrays are stored component first, shape (3, n), so that the loop over points is the innermost one and vectorises. `legs` has the columns
 of `rrru.mechanisms.rrru3.LEG_COLUMNS`. Lengths in mm, angles in rad.
 """
 
@@ -129,4 +129,48 @@ def mean_distance(errors, legs, turn, cosine, sine, start, slope, measured):
         for j in range(n):
             total += work[j]
         result[k] = total / n if np.isfinite(total) else np.inf
+    return result
+
+
+@_compiled
+def tripod_mean_distance(ends, radii, measured):
+    """Mean distance (m,) in mm between measured points (n, 3) and the lower intersections of three spheres; inf where there are none.
+
+    ends: (m, n, 3 spheres, 3) centres, radii: (m, 3), both in mm; as `rrru.mechanisms.spheres.lower_intersection`.
+    """
+    m, n = ends.shape[0], ends.shape[1]
+    result = np.empty(m)
+    along, rest, normal = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(m):
+        total = 0.0
+        first, second, third = radii[i, 0] ** 2, radii[i, 1] ** 2, radii[i, 2] ** 2
+        for j in range(n):
+            d = u = h = 0.0
+            for k in range(3):
+                along[k] = ends[i, j, 1, k] - ends[i, j, 0, k]
+                d += along[k] * along[k]
+            d = np.sqrt(d)
+            for k in range(3):
+                along[k] /= d
+                u += (ends[i, j, 2, k] - ends[i, j, 0, k]) * along[k]
+            for k in range(3):
+                rest[k] = ends[i, j, 2, k] - ends[i, j, 0, k] - u * along[k]
+                h += rest[k] * rest[k]
+            h = np.sqrt(h)
+            x = (d * d + first - second) / (2.0 * d)
+            y = (u * u + h * h + first - third - 2.0 * u * x) / (2.0 * h)
+            height = np.sqrt(first - x * x - y * y)
+            for k in range(3):
+                rest[k] /= h
+            normal[0] = along[1] * rest[2] - along[2] * rest[1]
+            normal[1] = along[2] * rest[0] - along[0] * rest[2]
+            normal[2] = along[0] * rest[1] - along[1] * rest[0]
+            if normal[2] > 0.0:
+                height = -height
+            square = 0.0
+            for k in range(3):
+                off = ends[i, j, 0, k] + x * along[k] + y * rest[k] + height * normal[k] - measured[j, k]
+                square += off * off
+            total += np.sqrt(square)
+        result[i] = total / n if np.isfinite(total) else np.inf
     return result

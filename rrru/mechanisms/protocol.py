@@ -8,20 +8,22 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.mechanisms.delta import Delta
 from rrru.mechanisms.ptt3 import Ptt3
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.mechanisms.rrru3 import Rrru3, to_identifiable
 from rrru.parameters import ParameterSet
 
 
 class Mechanism(Protocol):
     """A parallel robot as its controller believes it to be, with small errors of its numbers.
 
-    drive_unit: "rad" or "mm", unit of an actuator value; angle_arm_mm: the length that makes an angle error comparable with a length error;
-    lengths_mm (5,): nominal R, L1, L2, L3, r as effects count them, 0 for what a robot does not have.
+    drive_unit: "rad" or "mm", unit of an actuator value; TRACKED: the set of error parameters that measured positions identify; angle_arm_mm:
+    the length that makes an angle error comparable with a length error; lengths_mm (5,): nominal R, L1, L2, L3, r as effects count them,
+    0 for what a robot does not have.
     """
 
     name: str
     parameters: ParameterSet
     drive_unit: str
+    TRACKED: str
     angle_arm_mm: float
     lengths_mm: np.ndarray
 
@@ -47,7 +49,23 @@ class Mechanism(Protocol):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
 
 
+# errors that stand for all legs, and the names of the legs' own
+_COMMON = {"dL": ("dL1", "dL2", "dL3")} | {name: tuple(f"{name}_{leg}" for leg in (1, 2, 3)) for name in ("dl1", "dl2", "da")}
 MECHANISMS = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
+
+
+def identifiable_truth(mechanism, values):
+    """Mapping of the mechanism's error parameters from a mapping of true errors in its richest set; what is absent is zero.
+
+    NaN for a number that stands for all legs where theirs differ.
+    """
+    if isinstance(mechanism, Rrru3):
+        return to_identifiable(values)
+    result = {}
+    for name in mechanism.parameters.names:
+        legs = {float(values.get(own, values.get(name, 0.0))) for own in _COMMON.get(name, (name,))}
+        result[name] = legs.pop() if len(legs) == 1 else float("nan")
+    return result
 
 
 def make_mechanism(name, section, **options):

@@ -63,6 +63,7 @@ class Ptt3(Tripod):
 
     LINK, OFFSET = 1, 2
     drive_unit = "mm"
+    TRACKED = "tied"
 
     def __post_init__(self):
         for key in ("L_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
@@ -109,14 +110,14 @@ class Ptt3(Tripod):
         """Numbers of the legs (3, 6) without errors."""
         return np.tile([0.0, self.L_mm, self.R_mm - self.r_mm, 0.0, 0.0, 0.0], (3, 1))
 
-    def inverse_of_legs(self, position_mm, legs):
-        """Slider positions (n, 3) in mm under leg numbers (3, 6); NaN where a leg cannot reach (eq. 2)."""
+    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+        """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign; NaN where a leg cannot reach (eq. 2)."""
         outward, _, rail = self._directions(legs)
         w = legs[:, 2, None] * outward - points(position_mm)[:, None, :]
         along = (w * rail).sum(axis=-1)
         with np.errstate(invalid="ignore"):
             # beyond the reach the root gives NaN, which is the mask the callers rely on
-            return -along + np.sqrt(along**2 - (w**2).sum(axis=-1) + legs[:, self.LINK] ** 2) - legs[:, 0]
+            return -along + sign * np.sqrt(along**2 - (w**2).sum(axis=-1) + legs[:, self.LINK] ** 2) - legs[:, 0]
 
     def ends(self, slider_mm, legs):
         """Links' driven ends less the platform's radius, (..., n, 3 legs, 3) in mm, for slider positions (n, 3)."""
@@ -128,16 +129,15 @@ class Ptt3(Tripod):
         outward, sideways, rail = self._directions(legs)
         along = (slider_mm + legs[:, 0])[..., None]
         rise, swing = self.rail_inclination_rad + legs[:, 4, None], legs[:, 5, None]
-        heading, across = np.cos(swing) * outward + np.sin(swing) * sideways, np.cos(swing) * sideways - np.sin(swing) * outward
         up = np.array([0.0, 0.0, 1.0])
         shape = np.broadcast_shapes(along.shape, rail.shape)
         columns = [
             rail,
             np.zeros(3),
             outward,
-            legs[:, 2, None] * sideways + along * np.cos(rise) * across,
-            along * (np.cos(rise) * up - np.sin(rise) * heading),
-            along * np.cos(rise) * across,
+            legs[:, 2, None] * sideways + along * (np.cos(swing) * np.cos(rise) * sideways - np.sin(swing) * outward),
+            along * np.cos(swing) * (np.cos(rise) * up - np.sin(rise) * outward),
+            along * (np.cos(swing) * sideways - np.sin(swing) * (np.cos(rise) * outward + np.sin(rise) * up)),
         ]
         return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
 
@@ -187,5 +187,5 @@ class Ptt3(Tripod):
         zero = np.zeros_like(azimuth)
         outward = np.stack([np.cos(azimuth), np.sin(azimuth), zero], axis=-1)
         sideways = np.stack([-np.sin(azimuth), np.cos(azimuth), zero], axis=-1)
-        heading = np.cos(swing) * outward + np.sin(swing) * sideways
-        return outward, sideways, np.cos(rise) * heading + np.sin(rise) * np.array([0.0, 0.0, 1.0])
+        upright = np.cos(rise) * outward + np.sin(rise) * np.array([0.0, 0.0, 1.0])
+        return outward, sideways, np.cos(swing) * upright + np.sin(swing) * sideways

@@ -87,8 +87,9 @@ class Rrru3:
     length_limit_mm: float = LENGTH_LIMIT_MM
     name: str = field(default="rrru3", init=False)
 
-    # unit of an actuator value
+    # unit of an actuator value; the set of error parameters that measured positions identify
     drive_unit = "rad"
+    TRACKED = "identifiable"
 
     def __post_init__(self):
         for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):

@@ -14,6 +14,8 @@ import numpy as np
 from rrru.errors import UnreachableError
 from rrru.mechanisms.spheres import lower_intersection
 
+ELBOW_SIGN = {"out": 1.0, "in": -1.0}
+
 
 class Tripod:
     """Base of these mechanisms: they add `inverse_of_legs`, `ends`, `end_rates`, `levers`, `nominal_legs`, `leg_map`, and the columns of the
@@ -53,9 +55,12 @@ class Tripod:
             return self.nominal_legs
         return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(errors, dtype=float))
 
-    def inverse(self, position_mm, errors=None):
-        """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach."""
-        return self.inverse_of_legs(points(position_mm), self.legs(errors))
+    def inverse(self, position_mm, errors=None, elbow="out"):
+        """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach.
+
+        `elbow` is "out" (carriages outside of the platform or above it, knees outwards: the robots' assembly) or "in".
+        """
+        return self.inverse_of_legs(points(position_mm), self.legs(errors), ELBOW_SIGN[elbow])
 
     def require_reachable(self, position_mm, errors=None):
         """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""

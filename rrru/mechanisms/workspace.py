@@ -23,7 +23,8 @@ def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
 def measures(mechanism, points_mm):
     """Reachable (n,), translational and constraint measure (n,) and constraint determinant (n,), NaN where out of reach."""
     theta = mechanism.inverse(points_mm)
-    reachable = np.isfinite(theta).all(axis=1)
+    # of the poses that these actuator values allow, the robot takes the one of its own assembly
+    reachable = np.linalg.norm(mechanism.forward(theta, guess_mm=points_mm) - points_mm, axis=1) < 1e-6
     result = np.full((3, len(points_mm)), np.nan)
     inside = points_mm[reachable]
     result[0, reachable] = singularity.translational_measure(mechanism, inside, theta[reachable])

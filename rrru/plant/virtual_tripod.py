@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrru.effects.protocol import Contribution
+from rrru.effects.registry import active_effects
+from rrru.errors import ConfigError
 from rrru.plant.closure import TripodGeometry
 from rrru.plant.virtual_robot import DrivenRobot
 
@@ -41,3 +43,20 @@ class VirtualTripod(DrivenRobot):
         """
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
         return self.geometry.solve_under(motion.drive, change), np.zeros(len(motion))
+
+
+def from_config(mechanism, section):
+    """The virtual robot of one `virtual_robots:` entry; raises ConfigError for an unknown error and for axis errors, which these do not have."""
+    if section["axis_errors"]["position_mm"] or section["axis_errors"]["angle_rad"]:
+        raise ConfigError(
+            f"virtual robot: axis_errors on a {mechanism.name}; allowed: none, its platform does not turn; see errors and effects"
+        )
+    return VirtualTripod(
+        mechanism,
+        {name: float(value) for name, value in section["errors"].items()},
+        active_effects(section["effects"], mechanism.drive_unit),
+        section["wobble_mm"],
+        section["platform_mass_kg"],
+        section["forearm_mass_kg"],
+        section["arm_mass_kg"],
+    )

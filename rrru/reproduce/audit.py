@@ -1,4 +1,4 @@
-"""Misprints and contradictions of paper A, each recomputed: what the printed form gives, and what an independent check gives."""
+"""Misprints and contradictions of the papers, each recomputed: what the printed form gives, and what an independent check gives."""
 
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ from rrru.calibrate.residuals import Residuals
 from rrru.mechanisms import singularity
 from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.reproduce import audit_paper_b, audit_paper_c
 from rrru.reproduce.audit_equations import misprinted_equations
 from rrru.reproduce.paper_a import ERRORS_MM, MIGRATION, TABLE_5, TABLE_6
 
@@ -18,9 +19,14 @@ _LINE_X = np.linspace(-800.0, -300.0, 26)
 
 def audit_table():
     """Rows of `audit`."""
-    computed = [*misprinted_equations(), *_table_6(), *_trajectories(), *_gauge(), *_migration()]
-    rows = [(*row[:3], "computed", *row[3:]) for row in computed] + [(*row[:3], "as printed", *row[3:]) for row in _contradictions()]
-    names = ("where", "printed", "right", "kind", "check", "unit", "value_printed", "value_right", "shown")
+    found = {
+        ("A", "computed"): [*misprinted_equations(), *_table_6(), *_trajectories(), *_gauge(), *_migration()],
+        ("A", "as printed"): _contradictions(),
+    }
+    for paper, room in (("B", audit_paper_b), ("C", audit_paper_c)):
+        found |= {(paper, "computed"): room.computed(), (paper, "as printed"): room.as_printed(), (paper, "lost"): room.lost()}
+    rows = [(paper, *row[:3], kind, *row[3:]) for (paper, kind), own in found.items() for row in own]
+    names = ("paper", "where", "printed", "right", "kind", "check", "unit", "value_printed", "value_right", "shown")
     return pd.DataFrame(rows, columns=names)
 
 

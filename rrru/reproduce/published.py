@@ -1,22 +1,24 @@
-"""Paper A's numbers beside this study's."""
+"""Published numbers beside this study's: paper A's from its tables, papers B's and C's as they are handed over."""
 
 import numpy as np
 import pandas as pd
 
 from rrru.mechanisms.rrru3 import ERROR_NAMES
 from rrru.reproduce import paper_a
+from rrru.reproduce.published_sisters import sister_rows
 from rrru.reproduce.study_numbers import TRAJECTORIES, group_orders, study_numbers
 
-_COLUMNS = ["item", "source", "unit", "published", "here", "ratio", "here_low", "here_high", "note"]
+_COLUMNS = ["paper", "item", "source", "unit", "published", "here", "ratio", "here_low", "here_high", "note"]
 _AXES = [f"error_{axis}_mm" for axis in "xyz"]
 
 
-def published_table(config, errors, calibrations, parameters, genetic, sweep_runs, spread=None):
+def published_table(config, errors, calibrations, parameters, genetic, sweep_runs, spread=None, sisters=None):
     """Rows of `published` from tables of the study.
 
     config: the whole configuration, whose `reproduce` section says which calibrations stand for the paper's; errors, calibrations, parameters
     (the genetic algorithm's median run included), genetic, sweep_runs: the tables of those names; spread: item to (low, high) over other
-    draws, see `rrru.reproduce.redraw`. Numbers that this study does not have are null.
+    draws, see `rrru.reproduce.redraw`; sisters: "B" and "C" to {item: number of this study}, see `rrru.reproduce.published_sisters`. Numbers
+    that this study does not have are null.
     """
     reproduce = config["reproduce"]
     before, lines, spiral = (_study_errors(errors, reproduce, key) for key in ("none", "line_calibration", "spiral_calibration"))
@@ -33,6 +35,7 @@ def published_table(config, errors, calibrations, parameters, genetic, sweep_run
         value = here.get(number.item, np.nan)
         rows.append(
             {
+                "paper": "A",
                 "item": number.item,
                 "source": number.source,
                 "unit": number.unit,
@@ -44,7 +47,7 @@ def published_table(config, errors, calibrations, parameters, genetic, sweep_run
                 "note": "; ".join(text for text in (number.note, notes.get(number.item, "")) if text),
             }
         )
-    return pd.concat([pd.DataFrame(rows), _orders(before, lines)], ignore_index=True)
+    return pd.concat([pd.DataFrame(rows), _orders(before, lines), pd.DataFrame(sister_rows(sisters))], ignore_index=True)
 
 
 def _study_errors(errors, reproduce, key):
@@ -138,6 +141,7 @@ def _orders(before, lines):
     }
     rows = [
         {
+            "paper": "A",
             "item": f"order_{name}",
             "source": "section 3.2, Fig. 10",
             "unit": "1",

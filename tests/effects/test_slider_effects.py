@@ -95,7 +95,7 @@ def test_the_loads_on_the_carriages_are_the_slopes_of_the_potential_energy(robot
 def test_a_leaning_rail_carries_its_slider_off_in_proportion_to_its_way():
     mechanism, motion = ROBOTS["level"][0], MOTIONS["level"]
     rise, swing = 2e-3, -1e-3
-    change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([rise, swing, 0.0, 0.0, 0.0, 0.0]))
+    change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([0.0, rise, swing, *np.zeros(6)]))
     moved = corrected_sim(mechanism, np.zeros(4), motion.drive, motion.position_mm, change)
     rich = Ptt3(errors="rails")
     expected = rich.forward(motion.drive, rich.parameters.vector({"rise1": rise, "swing1": swing}))
@@ -110,3 +110,14 @@ def test_a_screw_leads_and_lags_once_per_turn():
     turns = motion.drive[:, 1] / 7.0
     np.testing.assert_allclose(change[:, 1], 0.05 * np.sin(2.0 * np.pi * (turns - np.floor(turns)) + 0.3), atol=1e-12)
     assert not change[:, [0, 2]].any()
+
+
+def test_an_upright_rail_leans_to_the_side_where_a_level_one_swings():
+    mechanism, motion = ROBOTS["upright"][0], MOTIONS["upright"]
+    change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([1e-3, *np.zeros(8)]))
+    moved = corrected_sim(mechanism, np.zeros(4), motion.drive, motion.position_mm, change)
+    rich = Ptt3(rail_inclination_rad=np.pi / 2, errors="rails")
+    # lean turns about the outward axis: z goes to minus the tangent
+    expected = rich.forward(motion.drive, rich.parameters.vector({"swing1": -1e-3}))
+    np.testing.assert_allclose(moved, expected, atol=2e-4)
+    assert np.abs(expected - motion.position_mm).max() > 0.02

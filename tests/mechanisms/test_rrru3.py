@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
+from rrru.mechanisms import singularity
 from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3, to_identifiable
 from tests.reference import rrru3_slow
 
@@ -42,7 +43,8 @@ def test_elbow_out_is_the_smaller_drive_angle(rich_poses):
 def test_forward_undoes_inverse_under_any_errors(position, errors):
     robot = Rrru3()
     theta = robot.inverse([position], errors)
-    if np.isfinite(theta).all():
+    # at a singularity, as over the base's centre with upright arms, rounding is all that the closures leave of the position
+    if np.isfinite(theta).all() and singularity.translational_measure(robot, [position], theta, errors) > 1e-3:
         np.testing.assert_allclose(robot.forward(theta, errors, [position])[0], position, atol=1e-9)
 
 

@@ -218,6 +218,7 @@ def published():
     items = {f"P_c={k / 10:.1f}": value for k, value in enumerate(P_C, start=1)}
     items |= {f"P_m={k / 10:.1f}": value for k, value in enumerate(P_M, start=1)}
     labels = {
+        "paper": "A",
         "source": "Tables 3 and 4",
         "unit": "mm",
         "here": np.nan,

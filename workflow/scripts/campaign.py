@@ -19,8 +19,10 @@ def main(config, campaign, outputs):
         ingested = study.ingest_campaign(config, campaign)
         measurements, truth = ingested.measurements, pd.DataFrame(columns=tables.columns("truth"))
     margin = config["calibration"]["singularity_margin"]
-    measurements, singular = study.with_singularities(study.mechanism(config, campaign), measurements, margin)
-    tables.write("measurements", measurements, outputs["measurements"])
+    robot = study.mechanism(config, campaign)
+    measurements, singular = study.with_singularities(robot, measurements, margin)
+    kind = "measurements" if robot.drive_unit == "rad" else "slider_measurements"
+    tables.write(kind, measurements, outputs["measurements"])
     tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
     tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])
     tables.write("workspace", study.workspace_table(config, campaign, measurements), outputs["workspace"])

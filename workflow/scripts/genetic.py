@@ -5,7 +5,6 @@ from tqdm import tqdm
 
 from rrru import study
 from rrru.calibrate import genetic_study
-from rrru.mechanisms.rrru3 import to_identifiable
 from rrru.report import tables
 from rrru.report.job import job
 
@@ -13,7 +12,7 @@ from rrru.report.job import job
 def main(config, campaign, inputs, outputs):
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
     measurements = tables.read(inputs["measurements"])
-    tied, identifiable = (study.mechanism(config, campaign, errors) for errors in ("tied", "identifiable"))
+    tied, identifiable = study.mechanism(config, campaign, "tied"), study.mechanism(config, campaign)
     settings = genetic_study.settings_from_config(config["genetic"])
     results = []
     for name, patterns in tqdm(config["calibration"]["sets"].items(), desc=f"genetic {campaign}", unit="set"):
@@ -32,13 +31,14 @@ def main(config, campaign, inputs, outputs):
         if result is not None:
             results.append(result)
     runs, history, timings = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))
-    truth = study.true_errors(config, campaign)
     compared = genetic_study.against_least_squares(
         runs,
         tables.read(inputs["calibrations"]),
         tables.read(inputs["parameters"]),
-        None if truth is None else to_identifiable(truth),
+        study.true_errors(config, campaign),
     )
+    # robots have different parameters, the table has those of all
+    runs = runs.reindex(columns=[name for name in tables.columns("genetic") if name != "campaign"])
     for name, frame in (("genetic", runs), ("genetic_history", history), ("genetic_against_least_squares", compared), ("timings", timings)):
         tables.write(name, frame.assign(campaign=campaign), outputs[name])
 

@@ -2,18 +2,20 @@
 
 from rrru.report.schemas.base import CAMPAIGN, NUMBER, STATUS, Column, Table, xyz
 
-TABLES = (
-    Table(
-        "measurements",
+
+def _measurements(name, robots, drives):
+    """Schema of the measurement table of robots with certain columns of actuator values."""
+    return Table(
+        name,
         "campaigns/{campaign}/measurements.parquet",
-        "One row per commanded point: what was commanded and what the instrument saw.",
+        f"One row per commanded point, {robots}: what was commanded and what the instrument saw.",
         (
             Column("run", "int64", "number of the pass, from 1 in the order driven"),
             Column("trajectory", "str", "name of the trajectory"),
             Column("point", "int64", "number of the point in its run, from 1"),
             Column("time_s", "float64", "time since the campaign's start; null where the file has none", True),
             *xyz("command", "mm", "commanded position, robot frame"),
-            *(Column(f"theta{k}_rad", "float64", f"commanded drive angle of leg {k}") for k in (1, 2, 3)),
+            *drives,
             *xyz("measured", "mm", "measured position, robot frame; null where the point was not measured", True),
             Column("speed_mm_s", "float64", "speed of the run; null where the file has none", True),
             Column("payload_kg", "float64", "payload on the platform; null where the file has none", True),
@@ -25,6 +27,17 @@ TABLES = (
             ),
         ),
         ("run", "point"),
+    )
+
+
+TABLES = (
+    _measurements(
+        "measurements", "robots with drive arms", [Column(f"theta{k}_rad", NUMBER, f"commanded drive angle of leg {k}") for k in (1, 2, 3)]
+    ),
+    _measurements(
+        "slider_measurements",
+        "robots with sliders",
+        [Column(f"slider{k}_mm", NUMBER, f"commanded position of slider {k}") for k in (1, 2, 3)],
     ),
     Table(
         "truth",

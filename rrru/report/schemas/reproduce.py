@@ -2,12 +2,15 @@
 
 from rrru.report.schemas.base import NUMBER, Column, Table
 
+PAPER = Column("paper", "str", "A: 3-RRRU; B: 3-PTT; C: Delta", allowed=("A", "B", "C"))
+
 TABLES = (
     Table(
         "published",
         "tables/published.parquet",
-        "Every number that paper A prints, beside what this study gives.",
+        "Every number that the papers print, beside what this study gives.",
         (
+            PAPER,
             Column("item", "str", "what the number is"),
             Column("source", "str", "table, figure, section or sentence of the paper"),
             Column("unit", "str", "unit as printed"),
@@ -20,23 +23,29 @@ TABLES = (
             Column("here_high", NUMBER, "upper end", True),
             Column("note", "str", "what differs, and why"),
         ),
-        ("item", "source"),
+        ("paper", "item", "source"),
     ),
     Table(
         "audit",
         "tables/audit.parquet",
-        "Misprints and contradictions of paper A, each recomputed.",
+        "Misprints, contradictions and claims of the papers, each recomputed, and what the scans of papers B and C have lost.",
         (
+            PAPER,
             Column("where", "str", "place in the paper"),
             Column("printed", "str", "what stands there"),
             Column("right", "str", "what should"),
-            Column("kind", "str", "computed here, or compared as printed", allowed=("computed", "as printed")),
+            Column(
+                "kind",
+                "str",
+                "computed here, compared as printed, or lost in the scan",
+                allowed=("computed", "as printed", "lost"),
+            ),
             Column("check", "str", "what is computed to show it"),
             Column("unit", "str", "unit of the two values"),
             Column("value_printed", NUMBER, "what the printed form gives; null where it gives nothing", True),
             Column("value_right", NUMBER, "what the right form or the independent check gives; null where it gives nothing", True),
-            Column("shown", "bool", "true where the numbers show the misprint or contradiction"),
+            Column("shown", "bool", "true where the misprint or contradiction shows; false where a claim holds, and for what is lost"),
         ),
-        ("where", "check"),
+        ("paper", "where", "check"),
     ),
 )
