@@ -9,6 +9,7 @@ from rrru.report.tables import check
 CAMPAIGN = "made_up"
 OPTIONS = {
     "campaign": CAMPAIGN,
+    "z_down": True,
     "sweep_campaign": CAMPAIGN,
     "sweep_calibration": "lines",
     "calibration_lines": "lines",

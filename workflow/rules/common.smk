@@ -7,6 +7,10 @@ from rrru.report.figures import FIGURES
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
+# the experiments of paper B, and those that are diagnosed together
+PTT_EXPERIMENTS = sorted(config["ptt"]["experiments"])
+PTT_JOINT = sorted(config["ptt"]["joint"])
+DIAGNOSED = [*CAMPAIGNS, *PTT_EXPERIMENTS, *PTT_JOINT]
 # tables of the whole study that are the campaigns' parts, one below the other
 CAMPAIGN_TABLES = [
     "campaigns",
@@ -39,6 +43,9 @@ CAMPAIGN_FIGURES = ["workspace", "observability", "convergence", "cross"]
 
 # figures of the gap diagnosis and of its check, which have rules of their own
 GAP_FIGURES = ["gap", "withheld"]
+
+# figures of paper B's study, drawn in one job
+PTT_FIGURES = sorted(name for name in FIGURES if name.startswith("ptt_"))
 
 # rooms of the package that a stage's results depend on
 TABLE_ROOMS = ("report/tables", "report/schemas")
@@ -86,21 +93,26 @@ def campaign_settings(wildcards):
     return json.dumps(config["campaigns"][wildcards.campaign], sort_keys=True)
 
 
+def measured_campaign(name):
+    """What the configuration says of a campaign, or of an experiment of paper B, that is diagnosed."""
+    return config["campaigns"].get(name, {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"]})
+
+
 def campaign_robot(wildcards):
     """Name and dimensions of the robot that a campaign was measured on."""
-    name = config["campaigns"][wildcards.campaign]["robot"]
+    name = measured_campaign(wildcards.campaign)["robot"]
     return {"name": name, **config["robots"].get(name, {})}
 
 
 def campaign_noise(wildcards):
     """The campaign's stated noise per axis in mm, None where it is to be estimated."""
-    return config["campaigns"][wildcards.campaign].get("noise_mm") or None
+    return measured_campaign(wildcards.campaign).get("noise_mm") or None
 
 
 def campaign_masses(wildcards):
     """Masses in kg, the platform's own where the campaign states it."""
     loads = config["loads"]
-    platform = config["campaigns"][wildcards.campaign].get("platform_mass_kg", loads["platform_mass_kg"])
+    platform = measured_campaign(wildcards.campaign).get("platform_mass_kg", loads["platform_mass_kg"])
     return {"platform_kg": platform, "forearm_kg": loads["forearm_mass_kg"], "arm_kg": loads["arm_mass_kg"]}
 
 
@@ -122,11 +134,17 @@ def figure_tables(wildcards):
     return {name: own.get(name, table(name)) for name in FIGURES[wildcards.figure][1]}
 
 
+def z_down(campaign):
+    """Whether the frame of the campaign's robot has its z pointing down."""
+    return config["campaigns"].get(campaign, {}).get("robot") == "rrru3"
+
+
 def figure_options(wildcards):
     """What a figure shows."""
     reproduce = config["reproduce"]
     return {
         "campaign": figure_campaign(wildcards),
+        "z_down": z_down(figure_campaign(wildcards)),
         "calibration_lines": reproduce["line_calibration"],
         "calibration_spiral": reproduce["spiral_calibration"],
         "sweep_campaign": reproduce["campaign"],

@@ -27,7 +27,7 @@ rule diagnose:
 
 use rule gather as gather_gap with:
     input:
-        **{name: [part(name, campaign) for campaign in CAMPAIGNS] for name in GAP_TABLES},
+        **{name: [part(name, campaign) for campaign in DIAGNOSED] for name in GAP_TABLES},
     output:
         **{name: table(name) for name in GAP_TABLES},
     log:
@@ -44,7 +44,7 @@ rule gap_figure:
         f"{RESULTS}/logs/figures/{{campaign}}_gap.log",
     params:
         figures=["gap"],
-        options=lambda wildcards: {"campaign": wildcards.campaign},
+        options=lambda wildcards: {"campaign": wildcards.campaign, "z_down": z_down(wildcards.campaign)},
         code=code_digest("report"),
     script:
         "../scripts/figure.py"
@@ -53,4 +53,4 @@ rule gap_figure:
 rule gap:
     input:
         [table(name) for name in GAP_TABLES],
-        expand(f"{RESULTS}/figures/{{campaign}}/gap.png", campaign=CAMPAIGNS),
+        expand(f"{RESULTS}/figures/{{campaign}}/gap.png", campaign=DIAGNOSED),

@@ -16,7 +16,11 @@ _CALIBRATION_LABELS = {
 _PARAMETER_LABELS = {
     **{f"dtheta{leg}": rf"$\Delta\theta_{leg}$" for leg in (1, 2, 3)},
     **{f"dL{link}": rf"$\Delta L_{link}$" for link in (1, 2, 3)},
+    **{f"db{leg}": rf"$\Delta b_{leg}$" for leg in (1, 2, 3)},
     "da": r"$\Delta a$",
+    "dL": r"$\Delta L$",
+    "dl1": r"$\Delta l_1$",
+    "dl2": r"$\Delta l_2$",
 }
 
 

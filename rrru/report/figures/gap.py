@@ -39,7 +39,7 @@ def gap(tables, options):
     panels = _page(len(lines), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], _headline(verdict))
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-    arrows, beyond = gap_map.draw({"top view": panels["top"], "side view": panels["side"]}, used, worst)
+    arrows, beyond = gap_map.draw({"top view": panels["top"], "side view": panels["side"]}, used, worst, options["z_down"])
     bar = panels["top"].figure.colorbar(
         arrows, ax=panels["side"], location="bottom", aspect=40, fraction=0.08, extend="max" if beyond else "neither"
     )

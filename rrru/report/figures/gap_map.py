@@ -27,15 +27,18 @@ def height_ratio(points, view):
     return max((high[1] - low[1]) / (high[0] - low[0]), 0.3)
 
 
-def draw(views, points, worst):
-    """Draw both views into axes by name; points: rows of gap_points that are used, with `before_mm`; worst (3,). Returns the arrows."""
+def draw(views, points, worst, z_down=True):
+    """Draw both views into axes by name and return the arrows.
+
+    points: rows of gap_points that are used, with `before_mm`; worst (3,); z_down: the robot frame's z points down.
+    """
     size = points["before_mm"].to_numpy()
     scale = Normalize(0.0, max(np.percentile(size, _LARGEST_PERCENT), 1e-9) if len(size) else 1.0)
     span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz")
     factor = style.magnification(np.array([scale.vmax]), span, _ARROW_SHARE)
     shown = _thinned(points)
     for name, axes in views.items():
-        arrows = _view(axes, points, shown, _VIEWS[name], scale, factor)
+        arrows = _view(axes, points, shown, _VIEWS[name], scale, factor, z_down)
         place = ["xyz".index(axis) for axis in _VIEWS[name]]
         axes.plot(*worst[place], linestyle="none", zorder=6, **_RING)
     views["top view"].tick_params(labelbottom=False)
@@ -44,7 +47,7 @@ def draw(views, points, worst):
     return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any())
 
 
-def _view(axes, points, shown, plane, scale, factor):
+def _view(axes, points, shown, plane, scale, factor, z_down):
     """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space."""
     across, up = (f"command_{axis}_mm" for axis in plane)
     for _, run in points.groupby("run", sort=False):
@@ -69,9 +72,10 @@ def _view(axes, points, shown, plane, scale, factor):
     # the views share x, so that what is left of a panel's height widens y
     axes.update_datalim([low, high])
     axes.set(xlim=(low[0], high[0]), aspect="equal", adjustable="datalim")
-    axes.set_ylabel(f"{plane[1]} (mm)" + (", down" if plane[1] == "z" else ""))
     if plane[1] == "z":
-        axes.invert_yaxis()
+        style.height_axis(axes, z_down)
+    else:
+        axes.set_ylabel(f"{plane[1]} (mm)")
     axes.grid(True)
     return arrows
 

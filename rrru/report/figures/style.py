@@ -161,3 +161,10 @@ def save(figure, pdf, png):
     finally:
         for path in partial.values():
             path.unlink(missing_ok=True)
+
+
+def height_axis(axes, z_down):
+    """Label the vertical axis as the robot frame's z and turn it round where z points down."""
+    axes.set_ylabel("z (mm), down" if z_down else "z (mm)")
+    if z_down:
+        axes.invert_yaxis()

@@ -34,7 +34,7 @@ def workspace(tables, options):
             image = _panel(axes, shape, measure)
             _trajectories(axes, points, name)
             axes.set_title(f"({next(marks)}) {_MEASURES[measure]}, {shape[3]}")
-        _axis_labels(row, name)
+        _axis_labels(row, name, options["z_down"])
     bar = figure.colorbar(image, ax=list(panels.ravel()), location="bottom", aspect=60, fraction=0.03, spacing="uniform")
     bar.set_label("singularity measure: 0 at a singularity, 1 at best")
     figure.legend(handles=_legend(points), loc="outside upper center", ncols=3, columnspacing=1.4)
@@ -100,14 +100,15 @@ def _trajectories(axes, points, name):
     axes.plot(near[columns[0]], near[columns[1]], **_NEAR, zorder=5)
 
 
-def _axis_labels(row, name):
-    """Labels of a row of panels; z points down, as in the robot's frame."""
+def _axis_labels(row, name, z_down):
+    """Labels of a row of panels."""
     across, up, _ = _SLICES[name]
     for axes in row:
         axes.set_xlabel(f"{across} (mm)")
-    row[0].set_ylabel(f"{up} (mm)" + (", down" if up == "z" else ""))
     if up == "z":
-        row[0].invert_yaxis()
+        style.height_axis(row[0], z_down)
+    else:
+        row[0].set_ylabel(f"{up} (mm)")
 
 
 def _legend(points):
