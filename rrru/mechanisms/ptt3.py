@@ -33,6 +33,7 @@ _LINKS = tuple(f"dL{leg}" for leg in _LEGS)
 # The gauges: "tied" leaves out a = R - r, which horizontal rails cannot tell from the sliders' zeros; "heights" and "distances" fix the third
 # azimuth, the base's free rotation, which neither kind of measurement sees.
 ERROR_NAMES = {
+    "zero": _SLIDERS,
     "tied": (*_SLIDERS, "dL"),
     "legs": (*_SLIDERS, *_LINKS),
     "rails": (*_SLIDERS, *_LINKS, *(f"{kind}{leg}" for leg in _LEGS for kind in ("dphi", "rise", "swing"))),
@@ -48,7 +49,8 @@ _ANGLES = ("dphi", "rise", "swing")
 class Ptt3(Tripod):
     """The robot with its nominal dimensions in mm and the choice of error parameters, a key of ERROR_NAMES.
 
-    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. errors: "tied" (4), "legs" (6), "rails" (15), "heights" (6), "distances" (9).
+    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. errors: "zero" (3), "tied" (4), "legs" (6), "rails" (15), "heights" (6),
+    "distances" (9).
     """
 
     L_mm: float = 350.0  # ASSUME this and the next two: Table 1 is lost

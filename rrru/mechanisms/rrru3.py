@@ -30,6 +30,7 @@ ERROR_NAMES = {
     "published": (*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr"),
     "tied": (*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr"),
     "identifiable": (*_ANGLES, "dL1", "dL2", "dL3", "da"),
+    "zero": _ANGLES,
 }
 
 
@@ -73,7 +74,7 @@ def to_identifiable(values):
 class Rrru3:
     """The robot with its nominal dimensions and the choice of error parameters.
 
-    Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8) or "identifiable" (7).
+    Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8), "identifiable" (7) or "zero" (3).
     """
 
     L1_mm: float = 400.0

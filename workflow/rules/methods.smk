@@ -1,0 +1,54 @@
+METHOD_TABLES = ["methods", "method_points"]
+METHOD_ROBOTS = ["rrru3", "ptt3", "delta"]
+
+
+def method_part(name, robot="{robot}"):
+    """Path of one robot's part of a table of the comparison."""
+    return f"{RESULTS}/methods/{robot}/{name}.parquet"
+
+
+# the Delta is also given what its images have shown
+rule compare_methods:
+    input:
+        calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],
+    output:
+        **{name: method_part(name) for name in METHOD_TABLES},
+        method_timings=f"{RESULTS}/timings/methods_{{robot}}.parquet",
+    log:
+        f"{RESULTS}/logs/methods/{{robot}}.log",
+    wildcard_constraints:
+        robot="|".join(METHOD_ROBOTS),
+    params:
+        settings=settings(
+            "seed",
+            "robots",
+            "motion",
+            "trajectories",
+            "virtual_robots",
+            "campaigns",
+            "calibration",
+            "genetic",
+            "reproduce",
+            "loads",
+            "ptt",
+            "delta",
+            "methods",
+        ),
+        code=code_digest(*STUDY_ROOMS, "compensate", "ptt_study", "delta_study", "method_study"),
+    script:
+        "../scripts/methods.py"
+
+
+use rule gather as gather_methods with:
+    input:
+        **{name: [method_part(name, robot) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
+    output:
+        **{name: table(name) for name in METHOD_TABLES},
+    log:
+        f"{RESULTS}/logs/gather_methods.log",
+
+
+rule methods:
+    input:
+        [table(name) for name in METHOD_TABLES],
+        f"{RESULTS}/figures/methods.png",
