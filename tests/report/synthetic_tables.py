@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.report.schemas import TABLES
-from rrru.report.tables import check
+from rrru.report.tables import check, columns
 
 CAMPAIGN = "made_up"
 OPTIONS = {
@@ -176,7 +176,9 @@ def genetic(seeds=5):
             numbers["polish_evaluations"] = 20
             excess = {"polished_mm": OPTIMUM_MM, "optimum_mm": OPTIMUM_MM, "excess": best[-1] / OPTIMUM_MM - 1.0, "polished_excess": 0.0}
             runs.append(label | numbers | excess | _found() | {"da": 0.0})
-    return check("genetic", pd.DataFrame(runs)), check("genetic_history", pd.concat(history, ignore_index=True))
+    return check("genetic", pd.DataFrame(runs).reindex(columns=columns("genetic"))), check(
+        "genetic_history", pd.concat(history, ignore_index=True)
+    )
 
 
 def sweeps(scatter_mm=0.3, seeds=6):

@@ -2,9 +2,15 @@
 
 import subprocess
 
+import numpy as np
 import pandas as pd
 import pytest
 
+from rrru.campaign.plan import make_plan
+from rrru.campaign.trajectories import Spiral
+from rrru.effects.registry import active_effects
+from rrru.mechanisms.ptt3 import Ptt3
+from rrru.plant.virtual_tripod import VirtualTripod
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 _DRIFT = """
@@ -89,3 +95,23 @@ def test_the_check_on_withheld_effects_runs_from_robots_to_figure(tmp_path):
     assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
     summary = pd.read_parquet(folder / "withheld_summary.parquet")
     assert set(summary["check"]) == {"label", "effect", "field"} and (tmp_path / "results/figures/withheld.png").stat().st_size > 10_000
+
+
+def test_a_file_of_a_3_ptt_goes_the_whole_way(tmp_path):
+    """Driven by a virtual robot with play, handed over as a file: calibrated, compensated and diagnosed."""
+    robot = VirtualTripod(Ptt3(), {"db1": 0.3}, active_effects({"backlash": {f"width{k}": 0.05 for k in (1, 2, 3)}}, "mm"))
+    curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (-270.0, -230.0), 2.0, 80)
+    plan = make_plan([curve], [{"payload_kg": 0.0, "reverse": reverse} for reverse in (False, True)], 80.0, 400.0, 5.0)
+    measurements, _ = robot.run(plan, 0.005, np.random.default_rng(0))
+    measurements.drop(columns="status").to_csv(tmp_path / "sliders.csv", index=False)
+    folder = tmp_path / "results/campaigns/mine"
+    overlay = "campaigns: {mine: {robot: ptt3, ingest: sliders.csv, noise_mm: 0.005}}\ngenetic: {seeds: 1, generations: 20}\n"
+    code, output = _run(tmp_path, overlay, *(f"results/campaigns/mine/{name}.parquet" for name in ("gap_verdicts", "error_summary")))
+    assert code == 0, output
+    assert pd.read_parquet(folder / "gap_verdicts.parquet")["effects"].iloc[0] == "backlash"
+    found = pd.read_parquet(folder / "parameters.parquet").query(
+        "calibration == 'both' and method == 'least_squares' and parameter == 'db1'"
+    )
+    assert found["value"].iloc[0] == pytest.approx(0.3, abs=0.05)
+    summary = pd.read_parquet(folder / "error_summary.parquet").set_index(["calibration", "method", "mode", "trajectory"])["mean_mm"]
+    assert summary["both", "least_squares", "model", "curve"] < 0.3 * summary["none", "none", "before", "curve"]

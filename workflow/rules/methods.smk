@@ -2,9 +2,8 @@ METHOD_TABLES = ["methods", "method_points"]
 METHOD_ROBOTS = ["rrru3", "ptt3", "delta"]
 
 
-def method_part(name, robot="{robot}"):
-    """Path of one robot's part of a table of the comparison."""
-    return f"{RESULTS}/methods/{robot}/{name}.parquet"
+# path of one robot's part of a table of the comparison
+METHOD_PART = f"{RESULTS}/methods/{{robot}}/{{name}}.parquet"
 
 
 # the Delta is also given what its images have shown
@@ -12,7 +11,7 @@ rule compare_methods:
     input:
         calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],
     output:
-        **{name: method_part(name) for name in METHOD_TABLES},
+        **{name: METHOD_PART.format(robot="{robot}", name=name) for name in METHOD_TABLES},
         method_timings=f"{RESULTS}/timings/methods_{{robot}}.parquet",
     log:
         f"{RESULTS}/logs/methods/{{robot}}.log",
@@ -41,7 +40,7 @@ rule compare_methods:
 
 use rule gather as gather_methods with:
     input:
-        **{name: [method_part(name, robot) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
+        **{name: [METHOD_PART.format(robot=robot, name=name) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
     output:
         **{name: table(name) for name in METHOD_TABLES},
     log:

@@ -21,7 +21,12 @@ TABLES = (
             Column("excess", NUMBER, "objective_mm / optimum_mm - 1; null where the optimum is zero", True),
             Column("polished_excess", NUMBER, "polished_mm / optimum_mm - 1; null where the optimum is zero", True),
             *(
-                Column(name, NUMBER, f"error that the run found, {'rad' if name.startswith('dtheta') else 'mm'}; null for a robot without it", True)
+                Column(
+                    name,
+                    NUMBER,
+                    f"error that the run found, {'rad' if name.startswith('dtheta') else 'mm'}; null for a robot without it",
+                    True,
+                )
                 for name in ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dR", "dr", "db1", "db2", "db3", "dL", "dl1", "dl2")
             ),
             Column("da", NUMBER, "dr - dR, the part of both that can be identified, mm; null for a robot without it", True),

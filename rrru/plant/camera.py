@@ -1,0 +1,115 @@
+"""The real camera of paper C, 2.1: a dot target seen by a pinhole camera with lens distortion, blur, pixel noise and 8 bits.
+
+Camera frame: x along the rows of pixels, y down the columns, z along the optical axis; the first pixel's centre is (0, 0). A point (X, Y, Z) of
+it has the normalised coordinates x = X / Z, y = Y / Z, which the lens moves (Brown, "Close-range camera calibration", 1971) to
+
+    x_d = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2),   y_d = y (1 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y
+
+and the chip turns into pixels. The target's dots lie in the plane z = 0 of its own frame. Lengths in mm, greys 0 to 255.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import cv2
+import numpy as np
+
+# ASSUME the paper does not show its grey values: dark dots on a bright plate, which is larger than the dots' field
+_PLATE, _DOT = 215.0, 40.0
+# samples per pixel and axis
+_FINE = 2
+# the inverse of the distortion ends after so many steps or below this many pixels
+_CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-7)
+
+
+@dataclass(frozen=True)
+class Target:
+    """A plate with columns x rows of dots; the first dot is the origin of its frame, x along the columns' numbers, y along the rows'.
+
+    offsets_mm (rows, columns, 2): how far each dot lies off its place in the lattice.
+    """
+
+    columns: int
+    rows: int
+    pitch_mm: float
+    diameter_mm: float
+    offsets_mm: np.ndarray
+
+    @property
+    def middle_mm(self):
+        """Middle (3,) of the dots' field."""
+        return self.pitch_mm * np.array([self.columns - 1.0, self.rows - 1.0, 0.0]) / 2.0
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera as it really is: nobody but the renderer may know it.
+
+    distortion: k1, k2, p1, p2; centre_offset_px: optical axis off the chip's middle; blur_px: 1 sigma of the lens's point spread;
+    noise_grey: 1 sigma per pixel.
+    """
+
+    focal_mm: float
+    pixel_mm: float
+    width_px: int
+    height_px: int
+    centre_offset_px: tuple[float, float] = (0.0, 0.0)
+    distortion: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    blur_px: float = 0.7
+    noise_grey: float = 1.5
+
+    @property
+    def focal_px(self):
+        """Focal length in pixels."""
+        return self.focal_mm / self.pixel_mm
+
+    @property
+    def centre_px(self):
+        """Where the optical axis meets the chip, (2,)."""
+        return (np.array([self.width_px, self.height_px]) - 1.0) / 2.0 + self.centre_offset_px
+
+    def project(self, points_mm):
+        """Pixels (n, 2) of points (n, 3) of the camera frame."""
+        x, y = np.asarray(points_mm, dtype=float)[:, :2].T / np.asarray(points_mm, dtype=float)[:, 2]
+        k1, k2, p1, p2 = self.distortion
+        square = x**2 + y**2
+        radial = 1.0 + k1 * square + k2 * square**2
+        moved = [
+            x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x**2),
+            y * radial + p1 * (square + 2.0 * y**2) + 2.0 * p2 * x * y,
+        ]
+        return self.centre_px + self.focal_px * np.stack(moved, axis=-1)
+
+    @cached_property
+    def rays(self):
+        """Normalised coordinates (2, fine rows, fine columns) of what falls on every sample of the chip."""
+        offset = (np.arange(_FINE) + 0.5) / _FINE - 0.5
+        across = (np.arange(self.width_px)[:, None] + offset).ravel()
+        down = (np.arange(self.height_px)[:, None] + offset).ravel()
+        pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 1, 2)
+        matrix = np.array([[self.focal_px, 0.0, self.centre_px[0]], [0.0, self.focal_px, self.centre_px[1]], [0.0, 0.0, 1.0]])
+        rays = cv2.undistortPoints(pixels, matrix, np.array(self.distortion), criteria=_CRITERIA)
+        return np.ascontiguousarray(rays.reshape(len(down), len(across), 2).transpose(2, 0, 1))
+
+
+def render(camera, target, rotation, translation_mm, generator):
+    """Image (height, width) of 8 bits that the camera takes of the target.
+
+    rotation (3, 3), translation_mm (3,): from the target's frame to the camera's. generator: numpy Generator of the pixel noise.
+    """
+    to_plane = np.linalg.inv(np.column_stack([rotation[:, 0], rotation[:, 1], translation_mm]))
+    x, y = camera.rays
+    across, up, scale = (row[0] * x + row[1] * y + row[2] for row in to_plane)
+    across, up = across / scale, up / scale
+    column = np.clip(np.rint(across / target.pitch_mm), 0, target.columns - 1).astype(int)
+    row = np.clip(np.rint(up / target.pitch_mm), 0, target.rows - 1).astype(int)
+    lattice = target.pitch_mm * np.stack([column, row]) + np.moveaxis(target.offsets_mm[row, column], -1, 0)
+    distance = np.hypot(across - lattice[0], up - lattice[1])
+    # the depth is 1 / scale; a sample on a dot's edge is covered by the share of it that lies inside
+    covered = np.clip((target.diameter_mm / 2.0 - distance) * scale * camera.focal_px * _FINE + 0.5, 0.0, 1.0)
+    fine = (_PLATE + (_DOT - _PLATE) * covered).astype(np.float32)
+    if camera.blur_px > 0.0:
+        fine = cv2.GaussianBlur(fine, (0, 0), camera.blur_px * _FINE, borderType=cv2.BORDER_REPLICATE)
+    image = fine.reshape(camera.height_px, _FINE, camera.width_px, _FINE).mean(axis=(1, 3), dtype=float)
+    noisy = image + camera.noise_grey * generator.standard_normal(image.shape)
+    return np.clip(np.rint(noisy), 0.0, 255.0).astype(np.uint8)

@@ -1,0 +1,29 @@
+"""Search for the Delta's twin: one virtual robot as near to paper C's numbers as it can be."""
+
+import logging
+from pathlib import Path
+
+import yaml
+
+from rrru.delta_study import robot, search
+from rrru.report import tables
+from rrru.report.job import job
+
+
+def main(config, inputs, output):
+    """Write the twin's errors as an overlay of the configuration."""
+    twin = robot.twin(config)
+    section = config["delta"]["search"]
+    found, misfit = search.search(
+        twin, tables.read(inputs["centres"]), tables.read(inputs["truth"]), section["generations"], section["share"]
+    )
+    logging.info("misfit %.4f", misfit)
+    errors = {name: round(value, 6) for name, value in twin.truth.parameters.mapping(found).items()}
+    partial = Path(f"{output}.partial")
+    partial.write_text(f"# misfit {misfit:.4f}\n" + yaml.safe_dump({"delta": {"errors": errors}}, sort_keys=False))
+    partial.replace(output)
+
+
+if __name__ == "__main__":
+    with job(snakemake.log[0]):
+        main(snakemake.config, snakemake.input, snakemake.output[0])
