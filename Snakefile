@@ -1,5 +1,6 @@
 from snakemake.utils import min_version, validate
 
+from rrru.ptt_study.robot import check as check_ptt
 from rrru.study import check
 
 min_version("9.0")
@@ -10,6 +11,7 @@ configfile: "config.yaml"
 
 validate(config, "workflow/schemas/config.schema.yaml")
 check(config)
+check_ptt(config)
 
 
 include: "workflow/rules/common.smk"
@@ -20,6 +22,10 @@ include: "workflow/rules/gap.smk"
 include: "workflow/rules/withheld_common.smk"
 include: "workflow/rules/withheld.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/printers.smk"
+include: "workflow/rules/ptt.smk"
+include: "workflow/rules/delta.smk"
+include: "workflow/rules/methods.smk"
 
 
 rule all:
@@ -28,3 +34,7 @@ rule all:
         [table(name) for name in STUDY_TABLES],
         rules.figures.input,
         rules.gap.input,
+        rules.printers.input,
+        rules.ptt.input,
+        rules.delta.input,
+        rules.methods.input,

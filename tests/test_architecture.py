@@ -18,14 +18,25 @@ _FLOORS = {
     "compensate": 6,
     "gap": 6,
     "withheld": 7,
+    "ptt_study": 7,
     "reproduce": 7,
     "study": 7,
+    "delta_study": 7,
+    "method_study": 8,
     "report": 0,
 }
-_SIBLINGS = {("effects", "campaign"), ("campaign", "effects"), ("calibrate", "plant"), ("plant", "calibrate"), ("reproduce", "study")}
+_SIBLINGS = {
+    ("effects", "campaign"),
+    ("campaign", "effects"),
+    ("calibrate", "plant"),
+    ("plant", "calibrate"),
+    ("reproduce", "study"),
+    ("delta_study", "study"),
+}
 _LIBRARIES = {
     "pygad": {"rrru/calibrate/genetic.py"},
     "matplotlib": {p.relative_to(_ROOT).as_posix() for p in (_ROOT / "rrru/report/figures").glob("*.py")},
+    "cv2": {"rrru/plant/camera.py", "rrru/calibrate/vision.py"},
     "snakemake": set(),
 }
 _FILES = sorted((_ROOT / "rrru").rglob("*.py"))

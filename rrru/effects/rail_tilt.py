@@ -4,8 +4,8 @@ In the frame of leg k (x radial, y tangential, z up) the rail runs through its z
 
     w_k = (lean_k, -rise_k, swing_k)
 
-rise lifts a horizontal rail's outer end or leans an upright one inwards, swing turns a horizontal rail about the vertical, lean an upright one to
-the side. The carriage at the distance b_k from the zero mark is off by w_k x b_k d_k, which grows along the rail: what tells it from the
+rise lifts a horizontal rail's outer end or leans an upright one inwards, swing turns a horizontal rail about the vertical, lean an upright
+one to the side. The carriage at the distance b_k from the zero mark is off by w_k x b_k d_k, which grows along the rail: what tells it from the
 zero error of a slider. It enters as a displacement at the place `base`, nine numbers of which six do something, and is linear in them.
 
 Assumptions: straight rail, true at its zero mark; joints that keep the platform upright all the same; constant over the campaign.

@@ -1,4 +1,4 @@
-"""This study's numbers for papers B and C, out of the tables of its 3-PTT and Delta. Lengths in mm, angles in rad."""
+"""Numbers of the sister studies for papers B and C, out of the tables of the 3-PTT and the Delta. Lengths in mm, angles in rad."""
 
 import numpy as np
 

@@ -9,6 +9,8 @@ rule campaign:
         workspace=part("workspace"),
     log:
         f"{RESULTS}/logs/campaign/{{campaign}}.log",
+    wildcard_constraints:
+        campaign="|".join(CAMPAIGNS),
     params:
         section=campaign_settings,
         settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),

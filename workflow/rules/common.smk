@@ -95,13 +95,15 @@ def campaign_settings(wildcards):
 
 def measured_campaign(name):
     """What the configuration says of a campaign, or of an experiment of paper B, that is diagnosed."""
-    return config["campaigns"].get(name, {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"]})
+    experiment = {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
+    return config["campaigns"].get(name, experiment)
 
 
 def campaign_robot(wildcards):
-    """Name and dimensions of the robot that a campaign was measured on."""
-    name = measured_campaign(wildcards.campaign)["robot"]
-    return {"name": name, **config["robots"].get(name, {})}
+    """Name and dimensions of the robot that a campaign was measured on, and the error parameters where a choice was made."""
+    section = measured_campaign(wildcards.campaign)
+    chosen = {key: section[key] for key in ("errors",) if key in section}
+    return {"name": section["robot"], **config["robots"].get(section["robot"], {}), **chosen}
 
 
 def campaign_noise(wildcards):

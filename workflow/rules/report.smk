@@ -1,5 +1,16 @@
 rule published:
     input:
+        **{
+            name: table(name)
+            for name in (
+                "ptt_benefit",
+                "ptt_spread",
+                "ptt_training",
+                "ptt_repeatability",
+                "delta_points",
+                "delta_camera",
+            )
+        },
         errors=table("errors"),
         calibrations=table("calibrations"),
         parameters=table("parameters"),
@@ -21,6 +32,8 @@ rule published:
             "calibration",
             "genetic",
             "reproduce",
+            "ptt",
+            "delta",
         ),
         code=code_digest(*STUDY_ROOMS, "reproduce"),
     script:
@@ -48,7 +61,7 @@ rule figure:
     log:
         f"{RESULTS}/logs/figures/{{figure}}.log",
     wildcard_constraints:
-        figure="|".join(set(FIGURES) - {"gap"}),
+        figure="|".join(set(FIGURES) - {"gap", *PTT_FIGURES}),
     params:
         figures=["{figure}"],
         options=figure_options,
@@ -80,7 +93,7 @@ rule campaign_figures:
 
 rule figures:
     input:
-        expand(f"{RESULTS}/figures/{{figure}}.png", figure=sorted(set(FIGURES) - set(GAP_FIGURES))),
+        expand(f"{RESULTS}/figures/{{figure}}.png", figure=sorted(set(FIGURES) - {*GAP_FIGURES, *PTT_FIGURES})),
         expand(
             f"{RESULTS}/figures/{{campaign}}/{{figure}}.png",
             campaign=[name for name in CAMPAIGNS if name != config["reproduce"]["campaign"]],

@@ -1,4 +1,4 @@
-"""Paper A's numbers beside this study's, and the audit of its misprints."""
+"""The papers' numbers beside this study's, and the audit of their misprints."""
 
 import pandas as pd
 
@@ -9,6 +9,7 @@ from rrru.report.job import job
 from rrru.reproduce.audit import audit_table
 from rrru.reproduce.published import published_table
 from rrru.reproduce.redraw import spread
+from rrru.reproduce.sisters import study_b, study_c
 
 
 def main(config, inputs, outputs):
@@ -25,7 +26,11 @@ def main(config, inputs, outputs):
     if study.is_virtual(config, campaign):
         others = spread(study.virtual_campaign(config, campaign), config["calibration"], reproduce, reproduce["redraws"])
     parameters = pd.concat([parameters[typical.columns], typical], ignore_index=True)
-    frame = published_table(config, errors, calibrations, parameters, genetic, runs, others)
+    sisters = {
+        "B": study_b(config, *(tables.read(inputs[name]) for name in ("ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"))),
+        "C": study_c(config, *(tables.read(inputs[name]) for name in ("delta_points", "delta_camera"))),
+    }
+    frame = published_table(config, errors, calibrations, parameters, genetic, runs, others, sisters)
     tables.write("published", frame, outputs["published"])
     tables.write("audit", audit_table(), outputs["audit"])
 

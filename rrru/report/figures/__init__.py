@@ -11,7 +11,21 @@ The tables `paths` (its measurements), `workspace` and `gap_points` are the camp
 A function raises ConfigError naming what is not there.
 """
 
-from rrru.report.figures import convergence, cross, gap, lines, observability, spiral, sweep, withheld, workspace
+from rrru.report.figures import (
+    convergence,
+    cross,
+    delta,
+    gap,
+    lines,
+    methods,
+    observability,
+    printers,
+    ptt,
+    spiral,
+    sweep,
+    withheld,
+    workspace,
+)
 
 _SWEEP_TABLES = ("sweep_runs", "sweep_effect", "sweep_pairs", "calibrations", "published")
 _SWEEP_CAPTION = (
@@ -89,4 +103,38 @@ FIGURES = {
         "right verdicts against the stated probability and against the gap over the noise, beside a test that knows the true law (1 % "
         "false alarms), with 95 % intervals, and the share of the gap closed as predicted and in truth.",
     ),
+    "methods": (
+        methods.methods,
+        ("methods", "method_points"),
+        "Every method on every robot where it makes sense, judged on true errors of the driven robot. (a) to (c) Mean error after it, with a "
+        "bar to the largest, at targets inside the region that it learned on and around it. (d) to (f) What fewer points cost.",
+    ),
+    "printers": (
+        printers.printers,
+        ("printers",),
+        "Linear-delta printers calibrated from what their owners measured. (a) Largest difference between the numbers that their firmware saved "
+        "and ours; diamonds: readings and saved answer do not belong together. (b) Rms residuals of probed heights and caliper distances "
+        "under our answer and the saved one. (c) Standard error of an arm's length with distances, and of the arms' common length if heights "
+        "alone had to give it.",
+    ),
+    "delta_images": (
+        delta.delta_images,
+        ("delta_picture", "delta_dots", "delta_poses", "delta_centres"),
+        "What the Delta's camera sees (paper C, Figs. 3 and 6). (a) The image of the first pose with the centres of the dots found. (b) Dots "
+        "that any image shows whole, those of (a) in colour, and the optical centres with their errors, magnified as stated.",
+    ),
+    "delta_errors": (
+        delta.delta_errors,
+        ("delta_points", "delta_calibrations"),
+        "Errors on the plane before and after the paper's calibration (paper C, Figs. 7 and 8): colour is the size of the error in the "
+        "calibration frame, arrows its part in the plane, magnified as stated. Below, mean and largest error under every variant, (c) in the "
+        "calibration frame, (d) in the frame of the robot's base.",
+    ),
+    "delta_observability": (
+        delta.delta_observability,
+        ("delta_observability",),
+        "What every variant sees of the three zero errors: all drives alike (common) and against each other (differential). (a) Singular value. "
+        "(b) Standard error. (c) Error per unknown length error of 1 mm.",
+    ),
+    **ptt.FIGURES,
 }

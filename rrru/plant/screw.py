@@ -1,0 +1,70 @@
+"""Bench of a screw: one slider turned forwards, back and forwards again, a linear encoder beside it (paper B, 3.1.1, Fig. 7). Lengths in mm."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from rrru.effects.motion import make_motion
+from rrru.effects.protocol import Contribution
+from rrru.errors import UnreachableError
+from rrru.mechanisms.dynamics import Masses
+
+PASSES = ("forward_1", "reverse", "forward_2")
+
+
+@dataclass(frozen=True)
+class Bench:
+    """turns of the motor per pass, lead of the screw in mm per turn, samples per turn, the encoder's noise (1 sigma) and resolution in mm."""
+
+    turns: int
+    lead_mm: float
+    samples_per_turn: int
+    noise_mm: float
+    resolution_mm: float
+
+    def path(self):
+        """Commanded travel (3 n + 1,) in mm from the start, and the pass (3 n + 1,) that each sample belongs to, 0 to 2.
+
+        All passes stop at the same places, so that readings can be compared one by one; the turning points belong to the pass that ends there.
+        """
+        count = self.turns * self.samples_per_turn
+        forward = np.arange(1, count + 1) * (self.lead_mm / self.samples_per_turn)
+        travel = np.concatenate([[0.0], forward, forward[-2::-1], [0.0], forward])
+        return travel, np.concatenate([[0], np.repeat([0, 1, 2], count)])
+
+
+def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
+    """Record of one slider: pass, commanded_mm and encoder_mm per sample, robot standing about `place_mm` (3,) under a payload.
+
+    The other two sliders stand still. The encoder sees the carriage, with all that the robot's effects do to its drive. leg: 1 to 3. Raises
+    UnreachableError where the travel leaves the reach.
+    """
+    mechanism, (travel, number) = robot.mechanism, bench.path()
+    sliders = np.repeat(mechanism.require_reachable(np.reshape(place_mm, (1, 3))), len(travel), axis=0)
+    sliders[:, leg - 1] += travel - 0.5 * travel.max()
+    position = mechanism.forward(sliders)
+    if not np.isfinite(position).all():
+        raise UnreachableError(f"screw {leg}: {travel.max():g} mm of travel about {tuple(place_mm)} leave the reach; allowed: less")
+    still = np.zeros_like(position)
+    motion = make_motion(
+        mechanism,
+        Masses(robot.platform_mass_kg, robot.forearm_mass_kg, robot.arm_mass_kg),
+        position,
+        sliders,
+        sliders,
+        np.arange(len(travel)),
+        np.full(len(travel), np.nan),
+        still,
+        still,
+        np.full(len(travel), float(payload_kg)),
+    )
+    change = np.zeros_like(sliders) + sum((effect.contribute(motion) for effect in robot.effects), Contribution()).drive
+    seen = (sliders + change)[:, leg - 1] + bench.noise_mm * generator.standard_normal(len(travel))
+    return pd.DataFrame(
+        {
+            "pass": np.array(PASSES)[number],
+            "commanded_mm": sliders[:, leg - 1],
+            "encoder_mm": np.round(seen / bench.resolution_mm) * bench.resolution_mm,
+        }
+    )

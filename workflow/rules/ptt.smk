@@ -1,0 +1,90 @@
+PTT_BENCH_TABLES = ["ptt_kinematics", "ptt_singularity", "ptt_encoder", "ptt_backlash", "ptt_repeatability"]
+PTT_PART_TABLES = ["ptt_points", "ptt_benefit", "ptt_training", "ptt_spread", "ptt_corrections", "ptt_extrapolation"]
+PTT_ROOMS = (
+    *TABLE_ROOMS,
+    "errors",
+    "parameters",
+    "seeds",
+    "mechanisms",
+    "effects",
+    "plant",
+    "campaign",
+    "calibrate",
+    "compensate",
+    "ptt_study",
+)
+
+
+rule ptt_bench:
+    output:
+        **{name: table(name) for name in PTT_BENCH_TABLES},
+    log:
+        f"{RESULTS}/logs/ptt_bench.log",
+    params:
+        settings=settings("seed", "robots", "loads", "ptt"),
+        code=code_digest(*PTT_ROOMS),
+    script:
+        "../scripts/ptt_bench.py"
+
+
+# measured and, where experiments are diagnosed together, also as one campaign
+rule ptt_measure:
+    input:
+        backlash=table("ptt_backlash"),
+    output:
+        **{name: part("measurements", name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)},
+    log:
+        f"{RESULTS}/logs/ptt_measure.log",
+    params:
+        settings=settings("seed", "robots", "loads", "ptt"),
+        code=code_digest(*PTT_ROOMS),
+    script:
+        "../scripts/ptt_measure.py"
+
+
+rule ptt_compensate:
+    input:
+        measurements=part("measurements", "{experiment}"),
+        backlash=table("ptt_backlash"),
+    output:
+        **{name: part(name, "{experiment}") for name in PTT_PART_TABLES},
+    log:
+        f"{RESULTS}/logs/ptt_compensate/{{experiment}}.log",
+    wildcard_constraints:
+        experiment="|".join(PTT_EXPERIMENTS),
+    params:
+        settings=settings("seed", "robots", "loads", "ptt"),
+        code=code_digest(*PTT_ROOMS),
+    script:
+        "../scripts/ptt_compensate.py"
+
+
+use rule gather as gather_ptt with:
+    input:
+        **{name: [part(name, experiment) for experiment in PTT_EXPERIMENTS] for name in PTT_PART_TABLES},
+    output:
+        **{name: table(name) for name in PTT_PART_TABLES},
+    log:
+        f"{RESULTS}/logs/gather_ptt.log",
+
+
+rule ptt_figures:
+    input:
+        **{name: table(name) for name in sorted({name for figure in PTT_FIGURES for name in FIGURES[figure][1]})},
+    output:
+        expand(f"{RESULTS}/figures/{{figure}}.{{kind}}", figure=PTT_FIGURES, kind=["pdf", "png"]),
+    log:
+        f"{RESULTS}/logs/figures/ptt.log",
+    params:
+        figures=PTT_FIGURES,
+        options={},
+        code=code_digest("report"),
+    script:
+        "../scripts/figure.py"
+
+
+rule ptt:
+    input:
+        [table(name) for name in (*PTT_BENCH_TABLES, *PTT_PART_TABLES)],
+        rules.ptt_figures.output,
+        expand(f"{RESULTS}/figures/{{campaign}}/gap.png", campaign=[*PTT_EXPERIMENTS, *PTT_JOINT]),
