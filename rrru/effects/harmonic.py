@@ -34,4 +34,5 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
         positive=np.zeros(6, dtype=bool),
         to_values=to_values,
         shapes=tuple(shapes),
+        most=np.full(6, parameters["amplitude1"].high),
     )

@@ -72,9 +72,9 @@ class Contribution:
 class Coordinates:
     """How the diagnosis fits a law: c coordinates in which its contribution is linear, or nearly so.
 
-    typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; legs (c,): 1 to 3, or 0 where the coordinate
-    acts on all; positive (c,): whether it cannot be negative; shapes: values of the parameters that are no coordinates, each a variant of
-    the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,).
+    typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest sizes that the law allows;
+    legs (c,): 1 to 3, or 0 where the coordinate acts on all; positive (c,): whether it cannot be negative; shapes: values of the parameters
+    that are no coordinates, each a variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,).
     """
 
     typical: np.ndarray
@@ -82,6 +82,7 @@ class Coordinates:
     positive: np.ndarray
     to_values: object
     shapes: tuple = ({},)
+    most: np.ndarray | float = np.inf
 
     def __len__(self):
         return len(self.typical)
@@ -113,6 +114,7 @@ def plain_coordinates(parameters, typical, shapes=({},)):
         positive=np.array([p.low >= 0.0 for p in free]),
         to_values=to_values,
         shapes=tuple(shapes),
+        most=np.array([max(abs(p.low), abs(p.high)) for p in free]),
     )
 
 

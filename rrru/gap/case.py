@@ -126,8 +126,9 @@ class Case:
         position = self.sim(state.errors)
         legs = first_order(self.mechanism, position, actuators, state.errors)
         model = self.model(state)
-        if not np.isfinite(model).all():
-            raise FitError(f"the corrected sim has no pose at {int((~np.isfinite(model).all(axis=1)).sum())} points")
+        lost = ~np.isfinite(model).all(axis=1) | ~np.isfinite(position[self.used]).all(axis=1)
+        if lost.any():
+            raise FitError(f"the sim has no pose at {int(lost.sum())} points")
         if shapes is None:
             shapes = [(name, shape) for name, effect in self.library.items() for shape in range(len(effect.coordinates.shapes))]
         columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*shapes, *state.effects))}

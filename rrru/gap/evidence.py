@@ -8,7 +8,7 @@ with the calibration's errors b (flat prior), the effects' coefficients c, and a
 diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not
 (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part of the
 gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of their prior. Strengths are
-averaged over a grid, even in their logarithm.
+averaged over a grid, even in their logarithm; none makes a coefficient's prior wider than the largest size that its law allows.
 
 The parameters of a law's shape, such as a time constant, may be off the grid on which they were tried: each has a coefficient N(0, 1) on
 `Linear.laws`.
@@ -103,16 +103,18 @@ class Evidence:
         return self._grams[1]
 
     def projected(self, terms):
-        """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), positive (k,), owner (k,)
+        """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), largest size (k,), positive (k,), owner (k,)
         of each coefficient; the coefficients of the terms come first, those of their shapes, owned by nobody, last.
         """
-        maps, index, sizes, positive, owner = [], [], [], [], []
+        maps, index, sizes, largest, positive, owner = [], [], [], [], [], []
         for number, term in enumerate(terms):
             coordinates = self.library[term.effect].coordinates
             matrix = spread(coordinates, term.legs)
             maps.append(matrix)
             index.append(self._offsets[term.effect, term.shape] + np.arange(len(coordinates)))
             sizes.append(matrix.T @ coordinates.typical / matrix.sum(axis=0))
+            each = np.broadcast_to(coordinates.most, len(coordinates))
+            largest.append(np.array([each[column > 0.0].max() for column in matrix.T]))
             positive.append(matrix.T @ coordinates.positive > 0)
             owner.append(np.full(matrix.shape[1], number))
         for term in terms:
@@ -121,6 +123,7 @@ class Evidence:
                 maps.append(np.eye(count))
                 index.append(self._offsets["law", term.effect] + np.arange(count))
                 sizes.append(np.ones(count))
+                largest.append(np.full(count, np.inf))
                 positive.append(np.zeros(count, dtype=bool))
                 owner.append(np.full(count, len(terms)))
         index = np.concatenate(index)
@@ -139,16 +142,16 @@ class Evidence:
             power, total = ((np.diag(g)[own] * size[own] ** 2).sum() / (3.0 * len(self)) for g in (gram[0], raw))
             # of what the calibration takes up, rounding is all that is left: it must not be blown up to the size of an effect
             size[own] /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
-        return gram, moment, size, np.concatenate(positive), owner
+        return gram, moment, size, np.concatenate(largest), np.concatenate(positive), owner
 
     def over_strengths(self, terms, strengths=None, levels=slice(None)):
         """Log evidence (levels, combinations) over every combination of the terms' strengths, and the combinations (m, terms).
 
         strengths: grids, one per term, by default STRENGTHS for each.
         """
-        gram, moment, size, positive, owner = self.projected(terms)
+        gram, moment, size, largest, positive, owner = self.projected(terms)
         combinations = np.array(list(product(*(strengths or (STRENGTHS,) * len(terms)))))
-        scale = _with_laws(combinations)[:, owner] * size
+        scale = np.minimum(_with_laws(combinations)[:, owner] * size, largest)
         gained = kernels.log_evidence(
             np.ascontiguousarray(gram[levels]), np.ascontiguousarray(moment[levels]), np.ascontiguousarray(scale), positive
         )
@@ -165,9 +168,9 @@ class Evidence:
         """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
         if not terms:
             return np.zeros(0)
-        _, _, size, _, owner = self.projected(terms)
+        _, _, size, largest, _, owner = self.projected(terms)
         own = owner < len(terms)
-        return np.asarray(strengths)[owner[own]] * size[own]
+        return np.minimum(np.asarray(strengths)[owner[own]] * size[own], largest[own])
 
     def explained(self, hypothesis):
         """Rms per axis, over sigma, of what a hypothesis explains at its best level and strengths, the calibration's share taken out."""
@@ -183,8 +186,8 @@ class Evidence:
 
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
-        gram, moment, size, positive, owner = self.projected(terms)
-        scale = _with_laws(np.asarray(strengths)[None])[0, owner] * size
+        gram, moment, size, largest, positive, owner = self.projected(terms)
+        scale = np.minimum(_with_laws(np.asarray(strengths)[None])[0, owner] * size, largest)
         precision = gram[level] + np.diag(scale**-2.0)
         covariance = np.linalg.inv(precision)
         mean = covariance @ moment[level]

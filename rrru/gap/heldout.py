@@ -54,7 +54,7 @@ def predict(case, evidence, terms, strengths, level, fold):
     gram = np.einsum("nak,nal,n->nkl", transformed, transformed, weights)
     moment = np.einsum("nak,na,n->nk", transformed, data, weights)
     total, total_moment = gram.sum(axis=0), moment.sum(axis=0)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
     residual, spread = np.empty_like(linear.data), np.empty((len(case), 3, columns.shape[-1]))
     for number in np.unique(fold):
         out = fold == number

@@ -4,7 +4,7 @@ import numpy as np
 
 
 def lower_intersection(centres_mm, radii_mm):
-    """Lower of the two points (..., 3) that three spheres share; z points up, NaN where they share none.
+    """Lower of the two points (..., 3) that three spheres share; z points up, NaN where they share none or neither is lower.
 
     centres_mm: (..., 3 spheres, 3); radii_mm: broadcast to (..., 3). The two points mirror each other in the centres' plane. With u along
     the line of the first two centres, at the distance d, and v across it in their plane, where the third centre lies at (i, j),
@@ -25,5 +25,6 @@ def lower_intersection(centres_mm, radii_mm):
         y = (i**2 + j**2 + squares[..., 0] - squares[..., 2] - 2.0 * i * x) / (2.0 * j)
         height = np.sqrt(squares[..., 0] - x**2 - y**2)
         normal = np.cross(along, across)
-        down = -np.sign(normal[..., 2:])
+        # centres in an upright plane have no lower side
+        down = np.where(normal[..., 2:] == 0.0, np.nan, -np.sign(normal[..., 2:]))
         return first + x[..., None] * along + y[..., None] * across + down * height[..., None] * normal

@@ -7,6 +7,7 @@ import numpy as np
 from rrru import study
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 from rrru.delta_study import robot as delta_robot
+from rrru.effects.registry import active_effects
 from rrru.errors import ConfigError
 from rrru.mechanisms.protocol import make_mechanism
 from rrru.plant import virtual_robot
@@ -88,5 +89,7 @@ def _robot(config, name):
         return replace(robot, mechanism=replace(robot.mechanism, **limits))
     twin = delta_robot.twin(config)
     return VirtualTripod(
-        make_mechanism("delta", config["robots"]["delta"], errors="tied", **limits), twin.truth.parameters.mapping(twin.errors)
+        make_mechanism("delta", config["robots"]["delta"], errors="tied", **limits),
+        twin.truth.parameters.mapping(twin.errors),
+        active_effects(config["methods"]["delta_effects"]),
     )

@@ -11,7 +11,7 @@ from rrru.method_study import learners
 from rrru.method_study.benches import TESTS
 from rrru.seeds import run_seed
 
-# a method has enough points where more improve its mean error by less than this share
+# a method has enough points where all that more of them bring is this share of its mean error, or the tracker's noise
 _ENOUGH = 0.1
 
 
@@ -45,7 +45,7 @@ def compare(bench, config, image_offsets=None):
             time, poses = image_offsets["measuring_time_s"], image_offsets["poses"]
             curve.append(_row("zero_offsets_images", test, poses, time, learned, before[test], after))
     curve = pd.DataFrame(curve)
-    return _methods(curve), curve, pd.DataFrame(timings).drop_duplicates(["method", "points"])
+    return _methods(curve, bench.noise_mm), curve, pd.DataFrame(timings).drop_duplicates(["method", "points"])
 
 
 def measuring_time_s(bench, points_mm):
@@ -95,13 +95,14 @@ def _row(method, test, count, time, learned, before, after):
     }
 
 
-def _methods(curve):
-    """Rows of `methods`: each method with all its points, and the fewest points that come within a tenth of that inside the region."""
+def _methods(curve, noise_mm):
+    """Rows of `methods`: each method with all its points, and the fewest points from which on more bring next to nothing inside the region."""
     result = []
     for method, part in curve.groupby("method", sort=False):
         inside = part[part["test"] == "inside"].sort_values("points")
-        last = inside.iloc[-1]
-        enough = inside[inside["after_mean_mm"] <= (1.0 + _ENOUGH) * last["after_mean_mm"]].iloc[0]
+        last = inside["after_mean_mm"].iloc[-1]
+        short = np.flatnonzero(inside["after_mean_mm"] > max((1.0 + _ENOUGH) * last, last + noise_mm))
+        enough = inside.iloc[short[-1] + 1 if short.size else 0]
         for test in TESTS:
             row = part[(part["test"] == test) & (part["points"] == part.loc[part["test"] == test, "points"].max())].iloc[0]
             result.append(

@@ -10,6 +10,7 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.compensate import evaluate
 from rrru.errors import ConfigError, FitError
+from rrru.mechanisms.protocol import identifiable_truth
 from rrru.plant.virtual_robot import VirtualRobot
 
 _ERRORS = {"dtheta1": 0.002, "dtheta2": -0.001, "dL1": 0.4, "dL3": -0.2, "dR": -1.2, "dr": 0.9}
@@ -37,7 +38,7 @@ def test_calibrated_commands_land_on_target(campaign):
     fits = fit_sets(measurements, robot.mechanism, _SETTINGS, noise_mm=0.01)
     assert {name for name, _ in fits} == {"lines", "spiral"}
     before = evaluate.before(measurements)["error_mm"]
-    frame = tables("c", fits, _ERRORS)["parameters"]
+    frame = tables("c", fits, identifiable_truth(robot.mechanism, _ERRORS))["parameters"]
     vector = errors_vector(frame, "lines", "least_squares", robot.mechanism)
     after = evaluate.closed_loop(robot, plan, vector, 0.0, np.random.default_rng(1), "lines", "least_squares")["error_mm"]
     model = evaluate.model_residual(measurements, robot.mechanism, vector, "lines", "least_squares")["error_mm"]

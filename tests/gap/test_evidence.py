@@ -1,5 +1,6 @@
 """The evidence against dense normal densities, numerical integration and scipy."""
 
+from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
@@ -228,3 +229,18 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     cost = 0.5 * np.einsum("ij,jk,ik->i", grid, precision, grid) - grid @ moment[0]
     assert (mean >= 0.0).all()
     assert 0.5 * mean @ precision @ mean - mean @ moment[0] <= cost.min() + 1e-6 * abs(cost.min())
+
+
+def test_no_strength_makes_a_prior_wider_than_its_law_allows():
+    """A coefficient that the calibration nearly takes up would else be believed to be metres."""
+    free = _evidence()
+    law = free.library["free"].coordinates
+    narrow = SimpleNamespace(coordinates=replace(law, most=np.array([1e-3, 2e-3])))
+    bounded = replace(free, library=free.library | {"free": narrow})
+    term = (Term("free"),)
+    assert (bounded.scales(term, [300.0]) <= [1e-3, 2e-3]).all() and (free.scales(term, [300.0]) > 1.0).all()
+    _, covariance = bounded.posterior(term, [300.0], 0)
+    assert (np.sqrt(np.diag(covariance)) <= [1e-3, 2e-3]).all()
+    # strengths beyond the bound are all the same hypothesis
+    value, _ = bounded.over_strengths(term, None, [0])
+    assert value[0, -1] == pytest.approx(value[0, -2]) and value[0, 0] != pytest.approx(value[0, -1])

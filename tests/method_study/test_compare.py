@@ -1,5 +1,6 @@
 """The comparison of methods: each against what it must do on a robot whose truth is known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,10 +42,10 @@ def test_every_method_is_there_for_both_tests(delta):
 
 
 def test_the_richer_the_model_the_less_is_left(delta):
-    """Zero offsets that are exactly right leave the lengths' part; all lengths leave little more than the tracker's noise."""
+    """Zero offsets that are exactly right leave the lengths' part; all lengths leave what play and compliance make."""
     inside = delta[1].query("test == 'inside'").set_index("method")["after_mean_mm"]
     noise = delta[0].noise_mm
-    assert inside["least_squares_full"] < noise < 0.2 * inside["zero_offsets"]
+    assert inside["least_squares_full"] < 3.0 * noise and inside["least_squares_full"] < 0.4 * inside["zero_offsets"]
     # the drives' own errors taken out, the lengths' stay: offsets fitted to positions also take up a part of these
     assert inside["zero_offsets"] < inside["zero_offsets_images"] < delta[1]["before_mean_mm"].iloc[0]
     # a step measures each target with noise, and leaves that and the second order of the error
@@ -52,6 +53,7 @@ def test_the_richer_the_model_the_less_is_left(delta):
 
 
 def test_before_is_the_distance_of_the_nominal_controllers_points(delta):
+    """The kinematic part of it: without play and compliance, which move the platform by some hundredths only."""
     bench, methods = delta[0], delta[1]
     for test in benches.TESTS:
         targets = bench.plan(bench.tests[test]).targets()
@@ -60,12 +62,14 @@ def test_before_is_the_distance_of_the_nominal_controllers_points(delta):
         )
         expected = np.linalg.norm(true - targets, axis=1)
         row = methods.query("test == @test").iloc[0]
-        assert row["before_mean_mm"] == pytest.approx(expected.mean(), rel=1e-9) and row["before_max_mm"] == pytest.approx(
-            expected.max(), rel=1e-9
-        )
+        assert abs(row["before_mean_mm"] - expected.mean()) < 0.1
+        errors = compare._errors(replace(bench, robot=replace(bench.robot, effects=())), bench.plan(bench.tests[test]), test)
+        np.testing.assert_allclose(errors, expected, atol=1e-9)
+        assert row["before_max_mm"] == pytest.approx(expected.max(), abs=0.1)
 
 
-def test_the_points_needed_are_the_fewest_within_a_tenth():
+@pytest.mark.parametrize(("noise_mm", "needed"), [(0.0, 80), (0.02, 20), (0.5, 10)])
+def test_the_points_needed_are_the_fewest_from_which_on_more_bring_next_to_nothing(noise_mm, needed):
     label = {"before_mean_mm": 1.0, "before_max_mm": 2.0, "after_max_mm": 1.0, "numbers": 3, "evaluations": 1, "method": "genetic"}
     curve = pd.DataFrame(
         [
@@ -74,8 +78,9 @@ def test_the_points_needed_are_the_fewest_within_a_tenth():
             for points, after in ((10, 0.5), (20, 0.109), (40, 0.111), (80, 0.1))
         ]
     )
-    found = compare._methods(curve)
-    assert (found["points"] == 80).all() and (found["points_needed"] == 20).all() and (found["needed_time_s"] == 20.0).all()
+    found = compare._methods(curve, noise_mm)
+    # 40 points are worse than a tenth above the last, so that 20 were lucky
+    assert (found["points"] == 80).all() and (found["points_needed"] == needed).all() and (found["needed_time_s"] == needed).all()
     assert found["removed_share"].to_numpy() == pytest.approx(0.9)
 
 

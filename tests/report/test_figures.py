@@ -24,7 +24,7 @@ WITHOUT_UNIT = (
     *("direction, best seen first", "error parameter", "singularity measure: 0 at a singularity, 1 at best"),
     *("probability", "run, in the order driven", "verdict", "truth", "stated probability", "share of robots", "gap over noise, rms"),
     *("column (pixel)", "row (pixel)", "variant", "singular value (mm/mm)", "standard error (mrad)", "error per length (mrad/mm)"),
-    *("true share closed", "predicted share closed", "effect", "trajectory", "printer", "points"),
+    *("true share closed", "predicted share closed", "effect", "trajectory", "printer", "points", "method"),
     *("neurons", "mean squared error (mm²)", "exact less Jacobian (µm)", "benefit (%)", "payload changed by (kg)", "experiment"),
     *("experiment, curve backwards", "payload (kg)", "slider", "scatter per travel (µm/mm)", "left over (µm)"),
     "size of the weight in the unit direction (angles as arcs at the end of the drive arm)",

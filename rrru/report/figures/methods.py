@@ -41,6 +41,7 @@ def methods(tables, options):
         panels[0, column].tick_params(labelleft=column == 0)
         _learning(panels[1, column], curves[(curves["robot"] == robot) & (curves["test"] == "inside")], own["before_mean_mm"].iloc[0])
         panels[1, column].set_title(f"({marks[1]}) {_ROBOTS[robot]}: fewer points")
+    panels[0, 0].set_ylabel("method")
     panels[1, 0].set_ylabel("mean error inside (mm)")
     style.legend_above(figure, list(panels[0]), columns=3)
     _legend_below(figure, panels[1])

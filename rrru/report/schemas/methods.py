@@ -25,7 +25,11 @@ TABLES = (
         (
             *_RESULT,
             Column("removed_share", NUMBER, "1 - after_mean_mm / before_mean_mm"),
-            Column("points_needed", "int64", "fewest points tried that come within a tenth of `after_mean_mm` inside"),
+            Column(
+                "points_needed",
+                "int64",
+                "fewest points tried from which on the mean error inside stays within a tenth, or the tracker's noise, of that with all points",
+            ),
             Column("needed_time_s", NUMBER, "measuring time of these"),
             Column("needs", "str", "what has to be measured"),
         ),
