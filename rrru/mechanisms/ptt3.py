@@ -23,7 +23,8 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.mechanisms.tripod import Tripod, points
+from rrru.mechanisms.three_legs import points
+from rrru.mechanisms.tripod import Tripod
 from rrru.parameters import Parameter, ParameterSet
 
 COLUMNS = ("db_mm", "L_mm", "a_mm", "azimuth_rad", "rise_rad", "swing_rad")

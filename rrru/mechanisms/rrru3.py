@@ -13,8 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.errors import ConfigError, UnreachableError
+from rrru.errors import ConfigError
 from rrru.mechanisms import kernels
+from rrru.mechanisms.three_legs import ThreeLegs, points
 from rrru.parameters import Parameter, ParameterSet
 
 LEG_COLUMNS = ("dtheta_rad", "L1_mm", "L2_mm", "L3_mm", "r_minus_R_mm")
@@ -71,7 +72,7 @@ def to_identifiable(values):
 
 
 @dataclass(frozen=True)
-class Rrru3:
+class Rrru3(ThreeLegs):
     """The robot with its nominal dimensions and the choice of error parameters.
 
     Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8), "identifiable" (7) or "zero" (3).
@@ -115,21 +116,14 @@ class Rrru3:
         return ParameterSet(tuple(_error_parameter(name, self.angle_limit_rad, self.length_limit_mm) for name in ERROR_NAMES[self.errors]))
 
     @cached_property
-    def turn(self):
-        """Cosines and sines of the legs' azimuths, shape (2, 3)."""
-        return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
-
-    @cached_property
     def leg_map(self):
         """Derivative of the legs' numbers with respect to the errors, shape (3, 5, p)."""
         return _leg_map(self.parameters.names)
 
-    def legs(self, errors=None):
-        """Numbers of the legs (LEG_COLUMNS), shape (..., 3, 5), under errors of shape (..., p)."""
-        nominal = np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
-        if errors is None:
-            return nominal
-        return nominal + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(errors, dtype=float))
+    @cached_property
+    def nominal_legs(self):
+        """Numbers of the legs (3, 5), LEG_COLUMNS, without errors."""
+        return np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
 
     def inverse(self, position_mm, errors=None, elbow="out"):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm; NaN where a leg cannot reach (eqs. 5, 6).
@@ -140,7 +134,7 @@ class Rrru3:
 
     def inverse_of_legs(self, position_mm, legs, elbow="out"):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
-        position = _points(position_mm)
+        position = points(position_mm)
         signs = np.array([ELBOW_SIGN[e] for e in ((elbow,) * 3 if isinstance(elbow, str) else elbow)])
         u, v = self._radial_tangential(position)
         reach = u + legs[:, 4]
@@ -150,19 +144,6 @@ class Rrru3:
             cosine = (legs[:, 1] ** 2 + d**2 - rho**2) / (2.0 * legs[:, 1] * d)
             # beyond the reach arccos gives NaN, which is the mask the callers rely on
             return np.arctan2(position[:, 2:], reach) + signs * np.arccos(cosine) - legs[:, 0]
-
-    def require_reachable(self, position_mm, errors=None):
-        """Drive angles as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
-        theta = self.inverse(position_mm, errors)
-        bad = np.flatnonzero(np.isnan(theta).any(axis=1))
-        if bad.size:
-            point = np.asarray(position_mm, dtype=float)[bad[0]]
-            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(theta[bad[0]])))
-            raise UnreachableError(
-                f"point {bad[0] + 1} at ({point[0]:.3f}, {point[1]:.3f}, {point[2]:.3f}) mm is out of reach of leg {legs}; "
-                f"{bad.size} of {len(theta)} points cannot be reached"
-            )
-        return theta
 
     def forward(self, theta_rad, errors=None, guess_mm=None):
         """Positions (n, 3) in mm of drive angles (n, 3); NaN where Newton does not converge (eq. 8).
@@ -182,7 +163,7 @@ class Rrru3:
         With rho = L2 + L3 on every leg each closure is a sphere about the elbow, shifted by r - R. Where the spheres do not meet, the point
         nearest to all three is taken.
         """
-        theta = _points(theta_rad)
+        theta = points(theta_rad)
         cx, cy = self.turn
         radial = self.L1_mm * np.cos(theta) - (self.r_mm - self.R_mm)
         centre = np.stack([radial * cx, radial * cy, self.L1_mm * np.sin(theta)], axis=-1)
@@ -198,8 +179,8 @@ class Rrru3:
 
     def forward_of_legs(self, theta_rad, legs, guess_mm=None):
         """Positions (m, n, 3) in mm of drive angles (n, 3) under m sets of leg numbers (m, 3, 5)."""
-        theta = _points(theta_rad)
-        start = self.first_guess(theta) if guess_mm is None else _points(guess_mm)
+        theta = points(theta_rad)
+        start = self.first_guess(theta) if guess_mm is None else points(guess_mm)
         solved = kernels.forward(
             np.ascontiguousarray(legs, dtype=float),
             self.turn,
@@ -233,19 +214,6 @@ class Rrru3:
         )
         return by_position, by_leg
 
-    def leg_jacobian(self, position_mm, theta_rad, errors=None):
-        """Derivative of the position with respect to the legs' numbers, shape (n, 3 axes, 3 legs, 5)."""
-        by_position, by_leg = self.closure_jacobians(position_mm, theta_rad, errors)
-        return -np.einsum("nal,nlc->nalc", np.linalg.inv(by_position), by_leg)
-
-    def actuator_jacobian(self, position_mm, theta_rad, errors=None):
-        """Derivative of the position with respect to the drive angles, shape (n, 3, 3), mm per rad."""
-        return self.leg_jacobian(position_mm, theta_rad, errors)[..., 0]
-
-    def error_jacobian(self, position_mm, theta_rad, errors=None):
-        """Derivative of the position with respect to the errors, shape (n, 3, p)."""
-        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, theta_rad, errors), self.leg_map)
-
     def passive_angles(self, position_mm, theta_rad, errors=None):
         """Angles (n, 3 legs, 4) of joints 2 to 5 in rad; theta3 = arcsin(v / L3) keeps the sign that eq. (6) loses.
 
@@ -253,7 +221,7 @@ class Rrru3:
         """
         legs = self.legs(errors)
         big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
-        _, v = self._radial_tangential(_points(position_mm))
+        _, v = self._radial_tangential(points(position_mm))
         plane = np.arctan2(big_z, big_x)
         second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
         third = np.arcsin(v / legs[:, 3])
@@ -277,8 +245,8 @@ class Rrru3:
 
     def _chain(self, position_mm, theta_rad, legs):
         """X, Z, rho v / s, rho, s and the true drive angle of every leg at every point, each (n, 3)."""
-        position = _points(position_mm)
-        angle = _points(theta_rad) + legs[:, 0]
+        position = points(position_mm)
+        angle = points(theta_rad) + legs[:, 0]
         u, v = self._radial_tangential(position)
         with np.errstate(invalid="ignore"):
             s = np.sqrt(legs[:, 3] ** 2 - v**2)
@@ -286,11 +254,3 @@ class Rrru3:
         big_x = u + legs[:, 4] - legs[:, 1] * np.cos(angle)
         big_z = position[:, 2:] - legs[:, 1] * np.sin(angle)
         return big_x, big_z, rho * v / s, rho, s, angle
-
-
-def _points(array):
-    """The argument as a float array of shape (n, 3); raises ValueError for another shape."""
-    array = np.asarray(array, dtype=float)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"expected shape (n, 3), got {array.shape}")
-    return array

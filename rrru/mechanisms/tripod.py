@@ -7,30 +7,23 @@ The driven end of link i, moved inwards by the platform's radius, is E_i(q_i); t
 which the 3-PTT and the rotary Delta have in common. z points up and the platform hangs below. Lengths in mm, angles in rad.
 """
 
-from functools import cached_property
-
 import numpy as np
 
-from rrru.errors import UnreachableError
 from rrru.mechanisms.spheres import lower_intersection
+from rrru.mechanisms.three_legs import ThreeLegs, points
 
 ELBOW_SIGN = {"out": 1.0, "in": -1.0}
 
 
-class Tripod:
-    """Base of these mechanisms: they add `inverse_of_legs`, `ends`, `end_rates`, `levers`, `nominal_legs`, `leg_map`, and the columns of the
-    legs' numbers that hold the link (LINK), the driven arm (ARM, None without one) and R - r (OFFSET).
+class Tripod(ThreeLegs):
+    """Base of these mechanisms: they add `inverse_of_legs`, `ends`, `end_rates`, `levers`, and the columns of the legs' numbers
+    that hold the link (LINK), the driven arm (ARM, None without one) and R - r (OFFSET).
     """
 
     LINK = OFFSET = 0
     ARM = None
     # unit of an actuator value
     drive_unit = "rad"
-
-    @cached_property
-    def turn(self):
-        """Cosines and sines of the legs' azimuths, shape (2, 3)."""
-        return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
 
     @property
     def radial(self):
@@ -49,31 +42,12 @@ class Tripod:
         """Frames of the legs, radial, tangential and up, as rows of (3 legs, 3 axes, 3)."""
         return np.stack([self.radial, self.tangent, np.broadcast_to([0.0, 0.0, 1.0], (3, 3))], axis=1)
 
-    def legs(self, errors=None):
-        """Numbers of the legs (COLUMNS), shape (..., 3, k), under errors of shape (..., p)."""
-        if errors is None:
-            return self.nominal_legs
-        return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(errors, dtype=float))
-
     def inverse(self, position_mm, errors=None, elbow="out"):
         """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach.
 
         `elbow` is "out" (carriages outside of the platform or above it, knees outwards: the robots' assembly) or "in".
         """
         return self.inverse_of_legs(points(position_mm), self.legs(errors), ELBOW_SIGN[elbow])
-
-    def require_reachable(self, position_mm, errors=None):
-        """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
-        values = self.inverse(position_mm, errors)
-        bad = np.flatnonzero(np.isnan(values).any(axis=1))
-        if bad.size:
-            point = np.asarray(position_mm, dtype=float)[bad[0]]
-            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(values[bad[0]])))
-            raise UnreachableError(
-                f"point {bad[0] + 1} at ({point[0]:.3f}, {point[1]:.3f}, {point[2]:.3f}) mm is out of reach of leg {legs}; "
-                f"{bad.size} of {len(values)} points cannot be reached"
-            )
-        return values
 
     def forward(self, actuators, errors=None, guess_mm=None):
         """Positions (n, 3) in mm of actuator values (n, 3), in closed form; NaN where the links do not meet.
@@ -122,28 +96,7 @@ class Tripod:
         by_leg[..., self.LINK] = -2.0 * legs[:, self.LINK]
         return by_position, by_leg
 
-    def leg_jacobian(self, position_mm, actuators, errors=None):
-        """Derivative of the position with respect to the legs' numbers, shape (n, 3 axes, 3 legs, k)."""
-        by_position, by_leg = self.closure_jacobians(position_mm, actuators, errors)
-        return -np.einsum("nal,nlc->nalc", np.linalg.inv(by_position), by_leg)
-
-    def actuator_jacobian(self, position_mm, actuators, errors=None):
-        """Derivative of the position with respect to the actuator values, shape (n, 3, 3)."""
-        return self.leg_jacobian(position_mm, actuators, errors)[..., 0]
-
-    def error_jacobian(self, position_mm, actuators, errors=None):
-        """Derivative of the position with respect to the errors, shape (n, 3, p)."""
-        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, actuators, errors), self.leg_map)
-
     def link_directions(self, position_mm, actuators, errors=None):
         """Unit vectors (n, 3 legs, 3) along the links, from the driven end to the platform."""
         gradient, _ = self.closure_jacobians(position_mm, actuators, errors)
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
-
-
-def points(array):
-    """The argument as a float array of shape (n, 3); raises ValueError for another shape."""
-    array = np.asarray(array, dtype=float)
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise ValueError(f"expected shape (n, 3), got {array.shape}")
-    return array
