@@ -50,11 +50,11 @@ def check(config):
 
 def mechanism(config, campaign, errors=None):
     """The nominal robot of a campaign with the configuration's bounds and the chosen error parameters, by default the identifiable ones."""
-    name = config["campaigns"][campaign]["robot"]
-    bounds = config["calibration"]["bounds"]
+    section, bounds = config["campaigns"][campaign], config["calibration"]["bounds"]
+    name = section["robot"]
     return make_mechanism(
         name,
-        config["robots"].get(name, {}),
+        {**config["robots"].get(name, {}), **section.get("dimensions", {})},
         errors=errors or MECHANISMS[name].TRACKED,
         angle_limit_rad=bounds["angle_rad"],
         length_limit_mm=bounds["length_mm"],

@@ -115,3 +115,20 @@ def test_a_file_of_a_3_ptt_goes_the_whole_way(tmp_path):
     assert found["value"].iloc[0] == pytest.approx(0.3, abs=0.05)
     summary = pd.read_parquet(folder / "error_summary.parquet").set_index(["calibration", "method", "mode", "trajectory"])["mean_mm"]
     assert summary["both", "least_squares", "model", "curve"] < 0.3 * summary["none", "none", "before", "curve"]
+
+
+def test_a_campaign_may_have_dimensions_of_its_own(tmp_path):
+    """A linear delta's file: with its own dimensions the commands are reached, with those of the level robot they are refused."""
+    own = {"L_mm": 290.0, "R_mm": 140.0, "r_mm": 33.0}
+    robot = VirtualTripod(Ptt3(**own, rail_inclination_rad=np.pi / 2), {"db2": 0.2})
+    curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (0.0, 30.0), 2.0, 60)
+    plan = make_plan([curve], [{"payload_kg": 0.0, "reverse": False}], 80.0, 400.0, 5.0)
+    robot.run(plan, 0.01, np.random.default_rng(0))[0].drop(columns="status").to_csv(tmp_path / "tall.csv", index=False)
+    target = "results/campaigns/mine/parameters.parquet"
+    dimensions = ", ".join(f"{key}: {value}" for key, value in (own | {"rail_inclination_deg": 90}).items())
+    code, output = _run(tmp_path, f"campaigns: {{mine: {{robot: ptt3, ingest: tall.csv, dimensions: {{{dimensions}}}}}}}\n", target)
+    assert code == 0, output
+    found = pd.read_parquet(tmp_path / target).query("calibration == 'both' and method == 'least_squares'").set_index("parameter")["value"]
+    assert found["db2"] - found["db1"] == pytest.approx(0.2, abs=0.03)
+    code, output = _run(tmp_path, "campaigns: {mine: {robot: ptt3, ingest: tall.csv, dimensions: {L9_mm: 3.0}}}\n", target)
+    assert code != 0 and "robot ptt3: unknown key 'L9_mm'; known: " in output

@@ -103,7 +103,12 @@ def campaign_robot(wildcards):
     """Name and dimensions of the robot that a campaign was measured on, and the error parameters where a choice was made."""
     section = measured_campaign(wildcards.campaign)
     chosen = {key: section[key] for key in ("errors",) if key in section}
-    return {"name": section["robot"], **config["robots"].get(section["robot"], {}), **chosen}
+    return {
+        "name": section["robot"],
+        **config["robots"].get(section["robot"], {}),
+        **section.get("dimensions", {}),
+        **chosen,
+    }
 
 
 def campaign_noise(wildcards):
