@@ -17,7 +17,7 @@ import numpy as np
 from scipy import optimize, stats
 
 from rrru.calibrate.heights import HeightResiduals
-from rrru.calibrate.identifiability import analyse, analyse_columns
+from rrru.calibrate.identifiability import analyse_columns, parameter_scale
 from rrru.calibrate.least_squares import Fit, least_squares
 from rrru.errors import FitError
 
@@ -29,6 +29,7 @@ _HEIGHTS_COUNT = 2.0
 # changes of the microstep setting that are tried
 _STEP_FACTORS = (0.0625, 0.125, 0.25, 0.5, 2.0, 4.0, 8.0, 16.0)
 _CONFIDENCE = 0.95
+_DENSE = 100
 _UNKNOWN = "unknown: no number is that of the readings, nor with other steps, arms or one other reading"
 
 
@@ -214,16 +215,31 @@ def _changed_reading(result):
 
 
 def common_arm_error(result):
-    """What heights alone tell of all nine numbers: their rank, and the standard error in mm of the arms' common length beside the six others.
+    """Standard error in mm of the arms' common length, beside the six other numbers, if its heights alone had to give it.
 
     Heights hardly see the scale: a robot with longer arms and a larger radius touches the same bed.
     """
-    heights = replace(result.printer, distance_mm=np.empty(0), distance_drop_mm=np.empty((0, 2, 3)))
-    nominal, errors = residuals_of(heights, "distances"), np.zeros(len(NAMES))
+    return _common_arm_error(result, -result.printer.height_drop_mm)
+
+
+def dense_arm_error(result):
+    """The same in mm for 100 heights with the noise of its own, spread evenly over the disc that these reach (a sunflower's seeds)."""
+    mechanism = result.residuals.mechanism
+    seeds = np.arange(_DENSE)
+    reach = np.linalg.norm(mechanism.forward(-result.printer.height_drop_mm)[:, :2], axis=1).max() * np.sqrt((seeds + 0.5) / _DENSE)
+    turn = seeds * np.pi * (3.0 - np.sqrt(5.0))
+    places = np.stack([reach * np.cos(turn), reach * np.sin(turn), np.full(_DENSE, result.printer.height_mm.mean())], axis=1)
+    return _common_arm_error(result, mechanism.inverse(places))
+
+
+def _common_arm_error(result, actuators):
+    """The same in mm for heights at actuators (n, 3)."""
+    errors = np.zeros(len(NAMES))
     errors[: len(result.fit.errors)] = result.fit.errors
-    jacobian = nominal.jacobian(errors)
+    nothing = np.empty((0, 2, 3))
+    heights = HeightResiduals(result.printer.mechanism("distances"), actuators, np.zeros(len(actuators)), nothing, nothing[:, 0, 0])
+    jacobian = heights.jacobian(errors)
     both = np.concatenate([jacobian[..., :6], jacobian[..., 6:].sum(axis=-1, keepdims=True)], axis=-1)
-    scale = analyse(nominal.mechanism, jacobian)
-    seven = analyse_columns((*scale.names[:6], "dL"), scale.scale[:7], both)
+    names, scale = heights.mechanism.parameters.names[:6], parameter_scale(heights.mechanism)
     noise = result.fit.noise_mm / np.sqrt(result.residuals.height_weight)
-    return scale.rank, float(seven.standard_errors(noise)[-1])
+    return float(analyse_columns((*names, "dL"), scale[:7], both).standard_errors(noise)[-1])

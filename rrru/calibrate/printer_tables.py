@@ -2,9 +2,11 @@
 
 import numpy as np
 import pandas as pd
+from scipy.sparse import csgraph
 
-from rrru.calibrate.printer_causes import FOUND, causes, diagnosis, left_out
-from rrru.calibrate.printer_fit import NAMES, UNITS, common_arm_error, fit_printer, reason
+from rrru.calibrate.printer_causes import FOUND, causes, diagnosis, left_out, limit_of
+from rrru.calibrate.printer_evidence import Evidence
+from rrru.calibrate.printer_fit import NAMES, UNITS, common_arm_error, dense_arm_error, fit_printer, reason
 from rrru.errors import FitError
 
 REPRODUCED, FOREIGN, FAILED = "reproduced", "does not belong", "not fitted"
@@ -13,7 +15,7 @@ _LITTLE_FREEDOM = 3
 _NUMBERS = (
     *("condition", "radius_here_mm", "radius_there_mm", "largest_difference", "largest_over_stop", "noise_mm"),
     *("height_rms_here_mm", "height_rms_there_mm", "distance_rms_here_mm", "distance_rms_there_mm"),
-    *("arm_standard_error_mm", "common_arm_standard_error_mm", "suspect_p"),
+    *("arm_standard_error_mm", "common_arm_standard_error_mm", "dense_common_arm_standard_error_mm", "suspect_p"),
 )
 
 
@@ -21,22 +23,24 @@ def tables(printers, settings):
     """Frames by table name: printers, printer_parameters, printer_readings, printer_causes.
 
     settings: `stopping_step`, `level` and `imitated_from` of the configuration's `printers` section. A printer that cannot be fitted has a
-    row in `printers` that says why, and none elsewhere.
+    row in `printers` that says why, and none elsewhere. Printers that share readings are one piece of evidence; for causes of the machines
+    the level is divided by the pieces in which something can be found.
     """
     rows = {name: [] for name in ("printers", "printer_parameters", "printer_readings", "printer_causes")}
-    twins = _shared_readings(printers)
+    twins, groups = _shared_readings(printers), _groups(printers)
+    level, pieces = settings["level"], max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
     for printer in printers:
         try:
             result = fit_printer(printer, settings["stopping_step"])
             left = left_out(result)
         except FitError as error:
-            rows["printers"].append(_failed_row(printer, str(error)))
+            rows["printers"].append(_failed_row(printer, str(error)) | {"evidence": groups[printer.name]})
             continue
-        answers = causes(result, left, settings["level"], settings["imitated_from"])
-        rows["printers"].append(_printer_row(result, left, answers, twins[printer.name]))
+        answers = causes(result, left, level, settings["imitated_from"], pieces)
+        rows["printers"].append(_printer_row(result, left, answers, twins[printer.name]) | {"evidence": groups[printer.name]})
         rows["printer_parameters"] += _parameter_rows(result)
         rows["printer_readings"] += _reading_rows(result, left, answers[0].verdict == FOUND)
-        rows["printer_causes"] += _cause_rows(printer, answers)
+        rows["printer_causes"] += _cause_rows(result, answers, level, pieces, settings["imitated_from"])
     return {name: pd.DataFrame(entries) for name, entries in rows.items()}
 
 
@@ -48,7 +52,7 @@ def _labels(printer):
 def _failed_row(printer, message):
     """Row of `printers` for one that cannot be fitted."""
     texts = {"largest_difference_in": "", "verdict": FAILED, "reason": message, "suspect": "", "cause": "not decidable", "notes": ""}
-    counts = {"numbers": 0, "freedom": 0, "rank": 0, "heights_rank_of_nine": 0}
+    counts = {"numbers": 0, "freedom": 0, "rank": 0}
     return _labels(printer) | counts | dict.fromkeys(_NUMBERS, np.nan) | texts
 
 
@@ -56,7 +60,7 @@ def _printer_row(result, left, answers, twins):
     """Row of `printers`."""
     difference = np.abs(result.there - result.here)
     worst = int(difference.argmax())
-    rank, common = common_arm_error(result)
+    common, dense = common_arm_error(result), dense_arm_error(result)
     suspect = left.suspect
     why = reason(result)
     return _labels(result.printer) | {
@@ -72,14 +76,14 @@ def _printer_row(result, left, answers, twins):
         **_rms(result),
         "noise_mm": result.fit.noise_mm,
         "arm_standard_error_mm": result.standard_errors[6:].max(initial=-np.inf) if len(result.names) > 6 else np.nan,
-        "heights_rank_of_nine": rank,
         "common_arm_standard_error_mm": common,
+        "dense_common_arm_standard_error_mm": dense,
         "verdict": FOREIGN if why else REPRODUCED,
         "reason": why,
         "suspect": "" if suspect is None else result.reading_name(suspect),
         "suspect_p": np.nan if suspect is None else left.p[suspect],
         "cause": diagnosis(answers),
-        "notes": "; ".join(_notes(result, answers, common, twins)),
+        "notes": "; ".join(_notes(result, answers, common, dense, twins)),
     }
 
 
@@ -98,13 +102,13 @@ def _rms(result):
     return values
 
 
-def _notes(result, answers, common, twins):
+def _notes(result, answers, common, dense, twins):
     """What a reader of the row should know."""
     if result.freedom < _LITTLE_FREEDOM:
         widths = (result.half_widths / result.standard_errors)[0]
         yield f"readings exceed numbers by {result.freedom} only: 95 % intervals are {widths:.1f} standard errors wide to each side"
     if result.printer.errors == "heights":
-        yield f"arms as saved: heights alone would give their common length with a standard error of {common:.1f} mm"
+        yield f"arms as saved: heights alone would give their common length with a standard error of {common:.1f} mm, 100 of them {dense:.2f} mm"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"
     scale = next((one for one in answers if one.name == "caliper_scale"), None)
@@ -124,6 +128,19 @@ def _shared_readings(printers):
             if size.size and first != printer.name:
                 notes[printer.name].append(f"the same {kind} as {first}")
     return notes
+
+
+def _groups(printers):
+    """Name by printer of the first one that it shares readings with, also by way of others."""
+    sizes = [{size.tobytes() for size in (p.height_drop_mm, p.distance_drop_mm, p.distance_mm) if size.size} for p in printers]
+    shared = np.array([[not one.isdisjoint(other) for other in sizes] for one in sizes])
+    _, piece = csgraph.connected_components(shared, directed=False)
+    return {printer.name: printers[int(np.argmax(piece == own))].name for printer, own in zip(printers, piece, strict=True)}
+
+
+def _decides(printer):
+    """Whether a printer's readings leave the freedom to tell anything."""
+    return len(printer.height_mm) + len(printer.distance_mm) - len(printer.mechanism().parameters) > 1
 
 
 def _parameter_rows(result):
@@ -175,11 +192,17 @@ def _reading_rows(result, left, bad):
     return rows
 
 
-def _cause_rows(printer, answers):
+def _cause_rows(result, answers, level, pieces, imitated_from):
     """Rows of `printer_causes`."""
+    evidence = Evidence(result)
+    limits = {one.name: limit_of(result, level, pieces, one.name) for one in answers}
+
+    def hopeless(name):
+        return not _decides(result.printer) or evidence.always_imitated(name, imitated_from)
+
     return [
         {
-            "printer": printer.name,
+            "printer": result.printer.name,
             "cause": one.name,
             "freedom_used": one.freedom,
             "explained_share": one.share,
@@ -187,7 +210,8 @@ def _cause_rows(printer, answers):
             "estimate": one.estimate,
             "standard_error": one.standard_error,
             "unit": one.unit,
-            "detectable_mm": one.detectable_mm,
+            "limit": limits[one.name],
+            "detectable_mm": np.nan if hopeless(one.name) else evidence.detectable_mm(one.name, limits[one.name]),
             "imitated_by": ", ".join(one.imitated_by),
             "verdict": one.verdict,
         }

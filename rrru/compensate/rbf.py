@@ -60,21 +60,23 @@ def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=No
     train = len(points_mm)
     basis, size = every - every[:train].mean(axis=0), (every[:train] ** 2).sum(axis=0)
     rest = np.concatenate([targets, np.empty((0, targets.shape[1])) if check_targets is None else check_targets]) - targets.mean(axis=0)
+    # what of every neuron's answers is new beside those taken, squared
+    new, taken = (basis[:train] ** 2).sum(axis=0), np.empty((neurons, len(every)))
     order, errors = [], [_split_mse(rest, train)]
     while len(order) < neurons:
-        new = (basis[:train] ** 2).sum(axis=0)
         allowed = new > new_share * size
         allowed[order] = False
         if not allowed.any():
             break
-        gain = ((basis[:train].T @ rest[:train]) ** 2).sum(axis=1) / np.where(allowed, new, 1.0)
+        gain = ((rest[:train].T @ basis[:train]) ** 2).sum(axis=0) / np.where(allowed, new, 1.0)
         chosen = int(np.where(allowed, gain, -1.0).argmax())
+        direction, before = basis[:, chosen], taken[: len(order)]
         # twice, since rounding leaves a part behind
         for _ in range(2):
-            direction = basis[:, chosen] / np.linalg.norm(basis[:train, chosen])
-            others = direction[:train] @ basis[:train]
-            others[chosen] = 0.0
-            basis = basis - np.outer(direction, others)
+            direction = direction - (before[:, :train] @ direction[:train]) @ before
+        direction = direction / np.linalg.norm(direction[:train])
+        taken[len(order)] = direction
+        new = new - (direction[:train] @ basis[:train]) ** 2
         rest = rest - np.outer(direction, direction[:train] @ rest[:train])
         order.append(chosen)
         errors.append(_split_mse(rest, train))
@@ -111,4 +113,4 @@ def make_folds(count, folds, generator):
 
 def _split_mse(rest, train):
     """Mean squared rest of the first `train` rows and of the others, NaN without others."""
-    return (rest[:train] ** 2).mean(), (rest[train:] ** 2).mean() if len(rest) > train else np.nan
+    return tuple(np.vdot(part, part) / part.size if part.size else np.nan for part in (rest[:train], rest[train:]))

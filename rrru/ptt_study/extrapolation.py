@@ -5,24 +5,24 @@ import pandas as pd
 
 from rrru.errors import UnreachableError
 from rrru.ptt_study import robot
-from rrru.ptt_study.results import AXES, along_axes, benefit, driven
+from rrru.ptt_study.driving import driven
+from rrru.ptt_study.results import AXES, along_axes, benefit
 
 METHODS = ("rbf_inverse", "rbf_paper_mm", "parameters", "rbf_after_parameters")
 
 
 def changes(config, payload_kg):
-    """Changed tasks as (family, size, plan): the curve again, with another radius, at another height, backwards, under another payload."""
+    """Changed tasks as (family, size, plan of one pass): the curve again, wider, higher or lower, backwards, under another payload."""
     section = config["ptt"]["extrapolation"]
-    repeats = section["repeats"]
-    yield "none", 0.0, robot.plan(config, payload_kg, repeats=repeats)
+    yield "none", 0.0, robot.plan(config, payload_kg, repeats=1)
     for size in section["radius_mm"]:
-        yield "radius_mm", size, robot.plan(config, payload_kg, robot.curve(config, radius_mm=size), repeats=repeats)
+        yield "radius_mm", size, robot.plan(config, payload_kg, robot.curve(config, radius_mm=size), repeats=1)
     for size in section["height_mm"]:
-        yield "height_mm", size, robot.plan(config, payload_kg, robot.curve(config, height_mm=size), repeats=repeats)
-    yield "reverse", 0.0, robot.plan(config, payload_kg, reverse=(True,), repeats=repeats)
+        yield "height_mm", size, robot.plan(config, payload_kg, robot.curve(config, height_mm=size), repeats=1)
+    yield "reverse", 0.0, robot.plan(config, payload_kg, reverse=(True,), repeats=1)
     for load in section["payload_kg"]:
         if load != payload_kg:
-            yield "payload_kg", load - payload_kg, robot.plan(config, load, repeats=repeats)
+            yield "payload_kg", load - payload_kg, robot.plan(config, load, repeats=1)
 
 
 def extrapolations(config, experiment, widths_mm, controllers):
@@ -31,7 +31,7 @@ def extrapolations(config, experiment, widths_mm, controllers):
     used = {"before": nominal} | {name: controllers[name] for name in METHODS}
     for family, size, plan in changes(config, experiment.payload_kg):
         try:
-            errors = driven(config, experiment, widths_mm, used, plan)
+            errors = driven(config, experiment, widths_mm, used, plan=plan)
         except UnreachableError:
             # a larger curve may leave the workspace; its rows are absent
             continue

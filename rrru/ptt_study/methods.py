@@ -95,49 +95,62 @@ class Learning:
         rows = self.train
         return least_squares(Residuals(self.mechanism, self.sliders_mm[rows], self.measured_mm[rows], self.command_mm[rows]))
 
+    @cached_property
+    def rest(self):
+        """The network of a choice of its own, on what the calibration leaves."""
+        left = self.measured_mm - self.mechanism.forward(self.sliders_mm, self.calibration.errors)
+        again = self.choose(left)
+        return self.trained(left, again.spread_mm, again.neurons)
+
+    @cached_property
+    def paper(self):
+        """Networks of the paper's spread by both readings, with all the neurons that its target of zero error asks for."""
+        error, count = relative(self.error_mm), int(self.train.sum())
+        return {key: self.trained(error, spread, count, ROUNDING) for key, spread in self.paper_spreads_mm.items()}
+
+    @cached_property
+    def spline(self):
+        """The biharmonic spline through the training points: in three dimensions its kernel is the distance itself."""
+        return RBFInterpolator(self.command_mm[self.train], relative(self.error_mm)[self.train], kernel="linear")
+
     def controllers(self):
-        """Every method's controller by name.
+        """Every method's controller by name; what one needs is learned when it is first called.
 
         rbf_inverse, rbf_jacobian: the cross-validated network, through eq. (11) or eq. (12); rbf_absolute: with the common height error learned;
         rbf_paper, rbf_paper_mm: the paper's spread, scaled or in mm, and all the neurons that its target of zero error asks for; interpolator:
         scipy's biharmonic spline through the training points, which has nothing to choose; parameters: calibrated model; rbf_after_parameters:
         a network on what the calibration leaves.
         """
-        mechanism, error, count = self.mechanism, relative(self.error_mm), int(self.train.sum())
-        height = self.error_mm[0] * np.array([0.0, 0.0, 1.0])
-        calibrated = self.calibration.errors
-        left = self.measured_mm - mechanism.forward(self.sliders_mm, calibrated)
-        again = self.choose(left)
-        rest = self.trained(left, again.spread_mm, again.neurons)
-        paper = {key: self.trained(error, spread, count, ROUNDING) for key, spread in self.paper_spreads_mm.items()}
-        # in three dimensions the biharmonic spline's kernel is the distance itself
-        spline = RBFInterpolator(self.command_mm[self.train], error[self.train], kernel="linear")
+        mechanism, height = self.mechanism, self.error_mm[0] * np.array([0.0, 0.0, 1.0])
         return {
             "rbf_inverse": lambda path: through_inverse(mechanism, path, self.chosen(path)),
             "rbf_jacobian": lambda path: through_jacobian(mechanism, path, self.chosen(path)),
             "rbf_absolute": lambda path: through_inverse(mechanism, path, self.chosen(path) + height),
-            "rbf_paper": lambda path: through_inverse(mechanism, path, paper["paper_scaled"](path)),
-            "rbf_paper_mm": lambda path: through_inverse(mechanism, path, paper["paper_mm"](path)),
-            "interpolator": lambda path: through_inverse(mechanism, path, spline(path)),
-            "parameters": lambda path: mechanism.inverse(path, calibrated),
-            "rbf_after_parameters": lambda path: through_inverse(mechanism, path, rest(path), calibrated),
+            "rbf_paper": lambda path: through_inverse(mechanism, path, self.paper["paper_scaled"](path)),
+            "rbf_paper_mm": lambda path: through_inverse(mechanism, path, self.paper["paper_mm"](path)),
+            "interpolator": lambda path: through_inverse(mechanism, path, self.spline(path)),
+            "parameters": lambda path: mechanism.inverse(path, self.calibration.errors),
+            "rbf_after_parameters": lambda path: through_inverse(mechanism, path, self.rest(path), self.calibration.errors),
         }
 
 
-def learning(config, experiment, measurements):
-    """What an experiment's measurements allow to learn; which points train is drawn from the experiment's own random stream."""
+def learning(config, experiment, means, labels=()):
+    """What an experiment's point means (see `robot.point_means`) allow to learn.
+
+    Which points train, and their folds, are drawn from the experiment's streams of those labels.
+    """
     section = config["ptt"]
-    command, sliders, measured = robot.point_means(config, measurements)
+    command, sliders, measured = means
     count, size = section["network"]["train"], len(command)
     train = np.zeros(size, dtype=bool)
-    train[experiment.generator("split").permutation(size)[:count]] = True
+    train[experiment.generator("split", *labels).permutation(size)[:count]] = True
     return Learning(
         robot.mechanism(config, section["parameters"]),
         command,
         sliders,
         measured,
         train,
-        make_folds(count, section["network"]["folds"], experiment.generator("folds")),
+        make_folds(count, section["network"]["folds"], experiment.generator("folds", *labels)),
         section["network"],
         section["experiments"][experiment.name]["paper_spread"],
     )

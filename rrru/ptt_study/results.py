@@ -5,28 +5,15 @@ import pandas as pd
 
 from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.compensate.rbf import ROUNDING, grow, validation_mse
-from rrru.ptt_study import robot
-from rrru.ptt_study.methods import METHODS, relative
+from rrru.ptt_study.methods import relative
 
-AXES = ("x", "y", "z", "z_absolute")
-_LEVELS = (2.5, 97.5)
+AXES = ("x", "y", "z", "z_mean", "z_absolute")
 
 
 def along_axes(error_mm):
-    """Errors (n, 4) along AXES from errors (n, 3): the height's relative to the first point's, then as it is."""
-    return np.column_stack([relative(error_mm), error_mm[:, 2]])
-
-
-def driven(config, experiment, widths_mm, controllers, plan=None):
-    """Errors (n, 3) of the point means with every controller, the virtual robot driven again, by name.
-
-    Every method gets the same draws of the tracker's noise, so that differences are the methods'.
-    """
-    result = {}
-    for name, sliders in controllers.items():
-        command, _, measured = robot.point_means(config, experiment.run(widths_mm, experiment.generator("closed_loop"), sliders, plan))
-        result[name] = measured - command
-    return result
+    """Errors (n, 5) along AXES from errors (n, 3): the height's relative to the first point's, relative to their mean, then as it is."""
+    height = error_mm[:, 2]
+    return np.column_stack([relative(error_mm), height - height.mean(), height])
 
 
 def benefit(before_mm, after_mm):
@@ -34,30 +21,25 @@ def benefit(before_mm, after_mm):
     return 100.0 * (1.0 - np.abs(after_mm).mean(axis=-1) / np.abs(before_mm).mean(axis=-1))
 
 
-def benefits(learned, after, draws, generator):
-    """Rows of `ptt_benefit` without the experiment; after: errors (n, 3) by method. Intervals are of resampled points."""
+def benefits(learned, after):
+    """Rows of `ptt_benefit` without the experiment and without the range over redraws; after: errors (n, 3) by method."""
     before, result = along_axes(learned.error_mm), []
-    sets = {"train": learned.train, "test": ~learned.train}
-    picks = {name: generator.integers(rows.sum(), size=(draws, rows.sum())) for name, rows in sets.items()}
-    for method in METHODS:
-        errors = along_axes(after[method])
-        for name, rows in sets.items():
-            for k, axis in enumerate(AXES):
-                old, new = before[rows, k], errors[rows, k]
-                low, high = np.percentile(benefit(old[picks[name]], new[picks[name]]), _LEVELS)
-                result.append(
+    for method, error in after.items():
+        errors = along_axes(error)
+        for name, rows in (("train", learned.train), ("test", ~learned.train)):
+            result.append(
+                pd.DataFrame(
                     {
                         "method": method,
                         "set": name,
-                        "axis": axis,
-                        "before_mm": np.abs(old).mean(),
-                        "after_mm": np.abs(new).mean(),
-                        "benefit_percent": benefit(old, new),
-                        "benefit_low_percent": low,
-                        "benefit_high_percent": high,
+                        "axis": AXES,
+                        "before_mm": np.abs(before[rows]).mean(axis=0),
+                        "after_mm": np.abs(errors[rows]).mean(axis=0),
+                        "benefit_percent": benefit(before[rows].T, errors[rows].T),
                     }
                 )
-    return pd.DataFrame(result)
+            )
+    return pd.concat(result, ignore_index=True)
 
 
 def points(learned, after_mm):
@@ -125,23 +107,24 @@ def trainings(learned):
     has it; the latter is followed with the paper's spread only.
     """
     error = relative(learned.error_mm)
-    wanted = [("candidate", "correction", spread) for spread in learned.network["spreads_mm"]]
-    for source, spread in learned.paper_spreads_mm.items():
-        wanted += [(source, "correction", spread), (source, "position", spread)]
     frames = []
-    for source, learns, spread in wanted:
-        targets = error if learns == "correction" else learned.command_mm - error
-        share = learned.network["new_share"] if source == "candidate" else ROUNDING
-        frames.append(_growth(learned, targets, spread, share).assign(spread_from=source, learns=learns, spread_mm=spread))
+    for spread, validation in zip(learned.network["spreads_mm"], learned.choice.validation_mse, strict=True):
+        growth = _growth(learned, error, spread, learned.network["new_share"], validation)
+        frames.append(growth.assign(spread_from="candidate", learns="correction", spread_mm=spread))
+    points_mm, most = learned.command_mm[learned.train], learned.network["neurons"]
+    for source, spread in learned.paper_spreads_mm.items():
+        for learns, targets in (("correction", error), ("position", learned.command_mm - error)):
+            validation = validation_mse(points_mm, targets[learned.train], spread, most, learned.folds)
+            growth = _growth(learned, targets, spread, ROUNDING, validation)
+            frames.append(growth.assign(spread_from=source, learns=learns, spread_mm=spread))
     return pd.concat(frames, ignore_index=True)
 
 
-def _growth(learned, targets, spread_mm, new_share):
-    """Mean squared errors of the training, cross-validation and test points after every neuron."""
-    points_mm, train, most = learned.command_mm, learned.train, learned.network["neurons"]
-    growth = grow(points_mm[train], targets[train], spread_mm, most, new_share, points_mm[~train], targets[~train])
+def _growth(learned, targets, spread_mm, new_share, validation):
+    """Mean squared errors of the training, cross-validation and test points after every neuron; validation: as of `validation_mse`."""
+    points_mm, train = learned.command_mm, learned.train
+    growth = grow(points_mm[train], targets[train], spread_mm, learned.network["neurons"], new_share, points_mm[~train], targets[~train])
     count = len(growth.train_mse)
-    validation = validation_mse(points_mm[train], targets[train], spread_mm, most, learned.folds, new_share)
     return pd.DataFrame(
         {
             "neurons": np.arange(count),

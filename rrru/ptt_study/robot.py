@@ -108,9 +108,18 @@ class Experiment:
         plan, sliders = plan or self.plan, sliders or self.robot.mechanism.inverse
         path, index = plan.path()
         wanted = sliders(path)
-        sent = compensated(wanted, widths_mm) if self.compensated else wanted
-        measured, _ = self.robot.run(plan, self.noise_mm, generator, lambda _: sent)
+        measured, _ = self.robot.run(plan, self.noise_mm, generator, lambda _: self._sent(wanted, widths_mm))
         return measured.assign(**dict(zip(rows.actuator_columns("mm"), wanted[index].T, strict=True)))
+
+    def positions(self, widths_mm, sliders, plan):
+        """True positions (n, 3) at a plan's points, driven as in `run`; raises UnreachableError."""
+        self.robot.mechanism.require_reachable(plan.targets())
+        position, _ = self.robot.positions(self.robot.motion(plan, lambda path: self._sent(sliders(path), widths_mm)))
+        return position
+
+    def _sent(self, wanted_mm, widths_mm):
+        """Drive commands (N, 3) for wanted slider positions (N, 3) in the order driven."""
+        return compensated(wanted_mm, widths_mm) if self.compensated else wanted_mm
 
 
 def experiment(config, name, compensate=None):

@@ -18,7 +18,9 @@ def study_b(config, benefit, spread, training, repeatability):
     """
     section = config["ptt"]
     numbers = {name: number for number, name in enumerate(section["experiments"], start=1)}
-    rows = benefit[np.logical_and.reduce([benefit[key] == value for key, value in _PAPERS_WAY.items()]) & (benefit["axis"] != "z_absolute")]
+    rows = benefit[
+        np.logical_and.reduce([benefit[key] == value for key, value in _PAPERS_WAY.items()]) & benefit["axis"].isin(("x", "y", "z"))
+    ]
     half = max(section["curve"]["radius_mm"], 0.5 * np.ptp(section["curve"]["z_mm"]))
     chosen = spread[spread["chosen"]]
     networks = chosen.assign(
@@ -29,6 +31,16 @@ def study_b(config, benefit, spread, training, repeatability):
     by_leg = repeatability.pivot(index="leg", columns="compensated", values="per_travel_um_per_mm")
     return here_b(_design_b(section, numbers), rows.assign(experiment=rows["experiment"].map(numbers)), networks) | {
         "order_repeatability": float((by_leg[True] < by_leg[False]).all())
+    }
+
+
+def spread_c(draws):
+    """Item of paper C to its (low, high) over draws, from the table delta_draws."""
+    rows = draws.set_index("variant")
+    return {
+        f"{label}_{kind}": tuple(rows.loc[variant, f"plane_{of}_{side}_mm"] for side in ("low", "high"))
+        for label, variant in (("before", _BEFORE), ("after", _AFTER))
+        for kind, of in (("mean", "mean"), ("max", "max"), ("about", "mean"))
     }
 
 

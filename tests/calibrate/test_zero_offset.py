@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.calibrate.least_squares import least_squares
 from rrru.calibrate.residuals import Residuals
-from rrru.calibrate.zero_offset import Distances, Heights, Shape, one_step, taken_for_errors
+from rrru.calibrate.zero_offset import Distances, Heights, Shape, one_step, step_fit, taken_for_errors
 from rrru.errors import FitError
 from rrru.mechanisms.delta import Delta
 
@@ -72,6 +72,29 @@ def test_standard_errors_are_the_scatter_under_noise(kind):
     scatter = np.std([fit.errors for fit in fits], axis=0)
     # four standard deviations of an estimated standard deviation
     np.testing.assert_allclose(scatter, fits[0].standard_errors, rtol=4.0 / np.sqrt(2.0 * draws))
+
+
+def test_the_papers_step_is_as_uncertain_as_it_says():
+    """The first place's noise is in every distance: estimated noise and standard errors are right all the same."""
+    generator, noise, draws = np.random.default_rng(9), 0.01, 400
+    small = TRUE / 100.0
+    places = moved(ROBOT.forward(THETA, small))
+    noisy = [Distances(ROBOT, THETA, places + noise * generator.standard_normal(places.shape), alike=True) for _ in range(draws)]
+    fits = [step_fit(points) for points in noisy]
+    tolerance = 4.0 / np.sqrt(2.0 * draws)
+    scale = np.sqrt(np.mean([fit.noise_mm**2 for fit, _ in fits]))
+    # residuals that share a noise tell less of it than as many independent ones: variance of a quadratic form
+    jacobian = noisy[0].jacobian(np.zeros(3))[:, 0]
+    left = (np.eye(len(noisy[0])) - jacobian @ np.linalg.pinv(jacobian)) @ noisy[0].covariance
+    assert scale == pytest.approx(noise, rel=4.0 * 0.5 * np.sqrt(2.0 * np.trace(left @ left) / draws) / np.trace(left))
+    scatter = np.std([fit.errors for fit, _ in fits], axis=0)
+    expected = np.sqrt(np.mean([fit.standard_errors**2 for fit, _ in fits], axis=0))
+    np.testing.assert_allclose(scatter, expected, rtol=tolerance)
+    fit, covariance = fits[0]
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), fit.standard_errors)
+    # the condition is that of what the distances hold, not of the paper's weights
+    other = least_squares(Distances(ROBOT, THETA, noisy[0].measured_mm))
+    assert fit.identifiability.condition == pytest.approx(other.identifiability.condition, rel=1e-2)
 
 
 def test_what_is_taken_for_zero_errors_is_what_a_fit_finds():

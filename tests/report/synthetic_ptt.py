@@ -11,7 +11,8 @@ from rrru.report.tables import check
 
 EXPERIMENTS = tuple(f"ptt_{k}" for k in range(1, 6))
 _POINTS = 24
-_AXES = ("x", "y", "z", "z_absolute")
+_NO_RANGE = {"benefit_low_percent": np.nan, "benefit_high_percent": np.nan}
+_AXES = ("x", "y", "z", "z_mean", "z_absolute")
 
 
 def _filled(name, rows, generator):
@@ -94,10 +95,10 @@ def _networks():
 
 
 def _benefits(generator):
-    """Rows of `ptt_benefit` and `ptt_extrapolation`."""
+    """Rows of `ptt_benefit`, `ptt_start` and `ptt_extrapolation`."""
     benefit = [
         {"experiment": name, "method": method, "set": part, "axis": axis, "benefit_percent": 95.0}
-        | {"benefit_low_percent": 93.0, "benefit_high_percent": 96.0}
+        | ({"benefit_low_percent": 93.0, "benefit_high_percent": 96.0} if method == "rbf_jacobian" else _NO_RANGE)
         for name, method, part, axis in product(EXPERIMENTS, METHODS, ("train", "test"), _AXES)
     ]
     changes = [("none", 0.0), ("reverse", 0.0), *product(("radius_mm", "height_mm", "payload_kg"), (-5.0, 5.0))]
@@ -105,7 +106,12 @@ def _benefits(generator):
         {"experiment": name, "family": family, "size": size, "method": method, "axis": axis, "benefit_percent": 90.0 - 40.0 * abs(size)}
         for name, (family, size), method, axis in product(EXPERIMENTS, changes, METHODS[-3:], _AXES)
     ]
-    return {"ptt_benefit": _filled("ptt_benefit", benefit, generator), "ptt_extrapolation": _filled("ptt_extrapolation", away, generator)}
+    start = [
+        {"experiment": name, "start_deg": angle, "axis": axis, "benefit_percent": 90.0}
+        for name, angle, axis in product(EXPERIMENTS, (0.0, 120.0, 240.0), _AXES)
+    ]
+    rows = {"ptt_benefit": benefit, "ptt_start": start, "ptt_extrapolation": away}
+    return {name: _filled(name, part, generator) for name, part in rows.items()}
 
 
 def ptt_tables():

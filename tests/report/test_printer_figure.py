@@ -35,6 +35,7 @@ def test_every_fitted_printer_has_a_row_with_its_numbers():
         (panels[1], "distances, saved", "distance_rms_there_mm"),
         (panels[2], "an arm, with distances", "arm_standard_error_mm"),
         (panels[2], "all arms, heights alone", "common_arm_standard_error_mm"),
+        (panels[2], "all arms, 100 heights", "dense_common_arm_standard_error_mm"),
     ):
         np.testing.assert_array_equal(drawn(axes, label)[0], fitted[column])
 

@@ -13,8 +13,9 @@ results_dir: build
 ptt:
   repeats: 3
   network: {spreads_mm: [15.0, 60.0]}
-  extrapolation: {repeats: 1, radius_mm: [5.0], height_mm: [], payload_kg: []}
-  draws: 20
+  extrapolation: {radius_mm: [5.0], height_mm: [], payload_kg: []}
+  redraws: 3
+  starts_deg: [0.0, 180.0]
   bench: {samples_per_turn: 10}
 """
 _TARGETS = ("build/tables/ptt_benefit.parquet", "build/tables/ptt_repeatability.parquet", "build/campaigns/ptt_1/gap_verdicts.parquet")
@@ -57,9 +58,10 @@ def test_the_diagnosis_names_the_backlash_that_was_not_compensated(finished):
 
 
 def test_one_core_gives_the_same_bytes(finished, tmp_path):
-    parts = [f"campaigns/ptt_1/{name}.parquet" for name in ("measurements", "ptt_points", "ptt_benefit", "ptt_extrapolation")]
+    parts = [f"tables/{name}.parquet" for name in ("ptt_backlash", "ptt_points", "ptt_benefit", "ptt_start", "ptt_extrapolation")]
+    parts.append("campaigns/ptt_1/measurements.parquet")
     code, output = _run(tmp_path, *(f"build/{part}" for part in parts), cores=1)
     assert code == 0, output
-    for part in ("tables/ptt_backlash.parquet", *parts):
+    for part in parts:
         here, there = (hashlib.sha256((folder / part).read_bytes()).hexdigest() for folder in (finished, tmp_path / "build"))
         assert here == there, part

@@ -1,5 +1,13 @@
 PTT_BENCH_TABLES = ["ptt_kinematics", "ptt_singularity", "ptt_encoder", "ptt_backlash", "ptt_repeatability"]
-PTT_PART_TABLES = ["ptt_points", "ptt_benefit", "ptt_training", "ptt_spread", "ptt_corrections", "ptt_extrapolation"]
+PTT_STUDY_TABLES = [
+    "ptt_points",
+    "ptt_benefit",
+    "ptt_start",
+    "ptt_training",
+    "ptt_spread",
+    "ptt_corrections",
+    "ptt_extrapolation",
+]
 PTT_ROOMS = (
     *TABLE_ROOMS,
     "errors",
@@ -42,30 +50,20 @@ rule ptt_measure:
         "../scripts/ptt_measure.py"
 
 
+# one job: starting five takes longer than what they do
 rule ptt_compensate:
     input:
-        measurements=part("measurements", "{experiment}"),
+        **{name: part("measurements", name) for name in PTT_EXPERIMENTS},
         backlash=table("ptt_backlash"),
     output:
-        **{name: part(name, "{experiment}") for name in PTT_PART_TABLES},
+        **{name: table(name) for name in PTT_STUDY_TABLES},
     log:
-        f"{RESULTS}/logs/ptt_compensate/{{experiment}}.log",
-    wildcard_constraints:
-        experiment="|".join(PTT_EXPERIMENTS),
+        f"{RESULTS}/logs/ptt_compensate.log",
     params:
         settings=settings("seed", "robots", "loads", "ptt"),
         code=code_digest(*PTT_ROOMS),
     script:
         "../scripts/ptt_compensate.py"
-
-
-use rule gather as gather_ptt with:
-    input:
-        **{name: [part(name, experiment) for experiment in PTT_EXPERIMENTS] for name in PTT_PART_TABLES},
-    output:
-        **{name: table(name) for name in PTT_PART_TABLES},
-    log:
-        f"{RESULTS}/logs/gather_ptt.log",
 
 
 rule ptt_figures:
@@ -85,6 +83,7 @@ rule ptt_figures:
 
 rule ptt:
     input:
-        [table(name) for name in (*PTT_BENCH_TABLES, *PTT_PART_TABLES)],
+        [table(name) for name in (*PTT_BENCH_TABLES, *PTT_STUDY_TABLES)],
         rules.ptt_figures.output,
-        expand(f"{RESULTS}/figures/{{campaign}}/gap.png", campaign=[*PTT_EXPERIMENTS, *PTT_JOINT]),
+        # their figures are of `gap`
+        [part("gap_verdicts", name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)],

@@ -1,31 +1,47 @@
-"""What one experiment of paper B teaches, and the robot driven again with it."""
+"""What the experiments of paper B teach, and the robot driven again with it."""
 
-from rrru.ptt_study import bench, methods, results, robot
+import pandas as pd
+
+from rrru.ptt_study import bench, methods, redraws, results, robot
+from rrru.ptt_study.driving import driven
 from rrru.ptt_study.extrapolation import extrapolations
 from rrru.report import tables
 from rrru.report.job import job
 
 
-def main(config, experiment, inputs, outputs):
-    """Write networks, corrections, errors and benefits, on the curve and away from it."""
-    one = robot.experiment(config, experiment)
-    widths = bench.widths_mm(tables.read(inputs["backlash"]), one.payload_kg)
-    learned = methods.learning(config, one, tables.read(inputs["measurements"]))
+def main(config, backlash, measurements, outputs):
+    """Write networks, corrections, errors and benefits of every experiment, on the curve and away from it.
+
+    measurements: path of an experiment's table by its name.
+    """
+    backlash, parts = tables.read(backlash), {name: [] for name in outputs}
+    for name, path in measurements.items():
+        one = robot.experiment(config, name)
+        widths = bench.widths_mm(backlash, one.payload_kg)
+        for table, frame in _frames(config, one, widths, tables.read(path)).items():
+            parts[table].append(frame.assign(experiment=name))
+    for table, frames in parts.items():
+        tables.write(table, pd.concat(frames, ignore_index=True), outputs[table])
+
+
+def _frames(config, one, widths, measurements):
+    """Tables of one experiment by name, without its name."""
+    learned = methods.learning(config, one, robot.point_means(config, measurements))
     controllers = learned.controllers()
-    after = results.driven(config, one, widths, controllers)
+    after = driven(config, one, widths, controllers)
     training = results.trainings(learned)
-    frames = {
+    return {
         "ptt_points": results.points(learned, after["rbf_inverse"]),
-        "ptt_benefit": results.benefits(learned, after, config["ptt"]["draws"], one.generator("bootstrap")),
+        "ptt_benefit": redraws.with_ranges(config, one, widths, results.benefits(learned, after)),
+        "ptt_start": redraws.starts(config, one.name, widths),
         "ptt_training": training,
         "ptt_spread": results.spreads(learned, training),
         "ptt_corrections": results.corrections(learned),
         "ptt_extrapolation": extrapolations(config, one, widths, controllers),
     }
-    for name, frame in frames.items():
-        tables.write(name, frame.assign(experiment=experiment), outputs[name])
 
 
 if __name__ == "__main__":
     with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.experiment, snakemake.input, snakemake.output)
+        paths = {name: snakemake.input[name] for name in snakemake.config["ptt"]["experiments"]}
+        main(snakemake.config, snakemake.input["backlash"], paths, dict(snakemake.output.items()))

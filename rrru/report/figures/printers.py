@@ -67,12 +67,13 @@ def _residuals(axes, frame, rows):
 
 
 def _arms(axes, frame, rows):
-    """Standard error of the arms: calibrated with distances, and of their common length if heights had to give it."""
+    """Standard error of the arms: calibrated with distances, and of their common length if its heights, or 100, had to give it."""
     columns = (
-        ("arm_standard_error_mm", "an arm, with distances", _DISTANCE),
-        ("common_arm_standard_error_mm", "all arms, heights alone", _HEIGHT),
+        ("arm_standard_error_mm", "an arm, with distances", {"color": style.ORANGE, "marker": "s"}),
+        ("common_arm_standard_error_mm", "all arms, heights alone", {"color": style.BLUE, "marker": "s"}),
+        ("dense_common_arm_standard_error_mm", "all arms, 100 heights", {"color": style.BLUE, "marker": "v"}),
     )
     for column, label, look in columns:
-        axes.plot(frame[column], rows, linestyle="none", label=label, **look | {"marker": "s", "markerfacecolor": "white"})
+        axes.plot(frame[column], rows, linestyle="none", label=label, markerfacecolor="white", **look)
     axes.set(xlabel="standard error (mm)")
     axes.set_title("(c) how well arms are known")

@@ -92,36 +92,51 @@ def ptt_corrections(tables, options):
 
 @style.printed
 def ptt_benefit(tables, options):
-    """Benefit per axis, experiment and method on the test points, with 95 % intervals and the paper's bounds."""
+    """Benefit per axis, experiment and method on the test points, with ranges over redraws and the paper's bounds; and what the start does."""
     frame = tables["ptt_benefit"][tables["ptt_benefit"]["set"] == "test"]
-    names = sorted(frame["experiment"].unique())
-    figure = style.new(style.DOUBLE_MM, 108.0)
-    panels = figure.subplots(3, 1, sharex=True)
-    offsets = np.linspace(-0.33, 0.33, len(METHODS))
-    for axes, (axis, bound) in zip(panels, _PUBLISHED_PERCENT.items(), strict=True):
-        for offset, (method, (label, colour, mark)) in zip(offsets, METHODS.items(), strict=True):
-            part = frame[(frame["axis"] == axis) & (frame["method"] == method)].set_index("experiment").loc[names]
-            value = part["benefit_percent"]
-            bars = [value - part["benefit_low_percent"], part["benefit_high_percent"] - value]
-            axes.errorbar(
-                np.arange(len(names)) + offset,
-                value,
-                np.maximum(bars, 0.0),
-                color=colour,
-                marker=mark,
-                linestyle="none",
-                elinewidth=0.7,
-                markersize=4.0,
-                label=label,
-            )
-        axes.axhline(bound, label="published: at least", **style.TOLERANCE)
-        low = min(frame.loc[(frame["axis"] == axis) & frame["method"].isin(METHODS), "benefit_percent"].min(), bound)
-        axes.set(ylim=(low - 5.0, 101.0), ylabel="benefit (%)")
-        axes.set_title(f"{axis}" + (", from the first point's" if axis == "z" else ""))
-    panels[-1].set_xticks(np.arange(len(names)), names)
+    figure = style.new(style.DOUBLE_MM, 148.0)
+    grid = figure.add_gridspec(4, 2, height_ratios=(1.0, 1.0, 1.0, 1.35))
+    panels = [figure.add_subplot(grid[0, :])]
+    panels += [figure.add_subplot(grid[row, :], sharex=panels[0]) for row in (1, 2)]
+    for letter, axes, axis in zip("abc", panels, _PUBLISHED_PERCENT, strict=True):
+        _methods(axes, frame[frame["axis"] == axis], _PUBLISHED_PERCENT[axis])
+        axes.set_title(f"({letter}) {axis}" + (", from the first point's" if axis == "z" else ""))
+        axes.tick_params(labelbottom=axes is panels[-1])
     panels[-1].set_xlabel("experiment")
     style.legend_above(figure, panels[:1], columns=4)
+    lower = [figure.add_subplot(grid[3, 0])]
+    lower.append(figure.add_subplot(grid[3, 1], sharey=lower[0]))
+    _starts(lower, tables["ptt_start"])
     return figure
+
+
+def _methods(axes, frame, bound):
+    """Benefit along one axis of every method in every experiment, with its range where it has one."""
+    names = sorted(frame["experiment"].unique())
+    for offset, (method, (label, colour, mark)) in zip(np.linspace(-0.33, 0.33, len(METHODS)), METHODS.items(), strict=True):
+        part = frame[frame["method"] == method].set_index("experiment").loc[names]
+        place = np.arange(len(names)) + offset
+        axes.vlines(place, part["benefit_low_percent"], part["benefit_high_percent"], color=colour, linewidth=0.7)
+        axes.plot(place, part["benefit_percent"], color=colour, marker=mark, linestyle="none", markersize=4.0, label=label)
+    axes.axhline(bound, label="published: at least", **style.TOLERANCE)
+    drawn = frame.loc[frame["method"].isin(METHODS), ["benefit_percent", "benefit_low_percent"]]
+    axes.set(ylim=(min(drawn.min().min(), bound) - 3.0, 101.0), ylabel="benefit (%)")
+    axes.set_xticks(np.arange(len(names)), names)
+
+
+def _starts(panels, frame):
+    """Benefit in height of the paper's way over the azimuth of the first point, by the paper's reference and by the mean."""
+    colours = looks(frame["experiment"].unique())
+    titles = {"z": "(d) z, from the first point's, curve begun elsewhere", "z_mean": "(e) the same, z from the mean of all points"}
+    for axes, (axis, title) in zip(panels, titles.items(), strict=True):
+        for name, rows in frame[frame["axis"] == axis].groupby("experiment", sort=True):
+            rows = rows.sort_values("start_deg")
+            colour, mark = colours[name]
+            axes.plot(rows["start_deg"], rows["benefit_percent"], color=colour, marker=mark, label=name)
+        axes.axhline(_PUBLISHED_PERCENT["z"], **style.TOLERANCE)
+        axes.set(xlabel="azimuth of the first point (°)", ylabel="benefit (%)", xticks=range(0, 361, 60))
+        axes.set_title(title)
+    panels[1].legend(loc="lower left", ncols=3, frameon=True, framealpha=1.0, edgecolor="none")
 
 
 @style.printed

@@ -4,7 +4,7 @@ from rrru.report.schemas.base import NUMBER, Column, Table
 
 _PRINTER = Column("printer", "str", "its id in the file")
 _UNIT = ("mm", "deg")
-_DIAGNOSED = ("found", "not found", "not decidable")
+_DIAGNOSED = ("found", "not found", "not decidable", "not decidable (rests on one reading)")
 
 TABLES = (
     Table(
@@ -15,6 +15,9 @@ TABLES = (
         (
             _PRINTER,
             Column("source", "str", "where its readings are from; empty where the file does not say"),
+            Column(
+                "evidence", "str", "first printer that it shares readings with, itself where there is none before: one piece of evidence"
+            ),
             Column("heights", "int64", "probed heights"),
             Column("distances", "int64", "distances by calipers"),
             Column("numbers", "int64", "calibrated numbers: 6 from heights, 9 with distances; 0 where it cannot be fitted"),
@@ -32,12 +35,14 @@ TABLES = (
             Column("distance_rms_there_mm", NUMBER, "residual of the distances under the saved answer; null without distances", True),
             Column("noise_mm", NUMBER, "1 sigma, from the residuals: of a distance, of a height where there are no distances", True),
             Column("arm_standard_error_mm", NUMBER, "largest standard error of an arm's length; null where arms are not calibrated", True),
-            Column("heights_rank_of_nine", "int64", "combinations of all nine numbers that its heights alone would see"),
             Column(
                 "common_arm_standard_error_mm",
                 NUMBER,
                 "standard error of the arms' common length if heights alone had to give it: they hardly see the scale",
                 True,
+            ),
+            Column(
+                "dense_common_arm_standard_error_mm", NUMBER, "the same for 100 heights of the same noise, spread over the same disc", True
             ),
             Column(
                 "verdict",
@@ -47,7 +52,12 @@ TABLES = (
             ),
             Column("reason", "str", "why it does not belong, as far as the readings tell; empty where it does"),
             Column("suspect", "str", "reading that fits worst; empty where nothing tells"),
-            Column("suspect_p", NUMBER, "probability of so bad a reading among all of them by noise alone", True),
+            Column(
+                "suspect_p",
+                NUMBER,
+                "probability of so bad a reading among all of them by noise alone, the largest over the noises' ratios",
+                True,
+            ),
             Column("cause", "str", "cause of what the calibration leaves; none found; or not decidable, with those that it could be"),
             Column("notes", "str", "what to know about this row"),
         ),
@@ -84,8 +94,19 @@ TABLES = (
             Column("residual_here_mm", NUMBER, "reading less our model's"),
             Column("residual_there_mm", NUMBER, "reading less the saved model's"),
             Column("left_out_mm", NUMBER, "reading less what the fit of all others foretells"),
-            Column("studentised", NUMBER, "that over its standard error; null where the others leave no freedom", True),
-            Column("p", NUMBER, "probability of so large a value anywhere among the readings by noise alone (Bonferroni)", True),
+            Column(
+                "studentised",
+                NUMBER,
+                "that over its standard error, under the firmware's ratio of noises; null where the others leave no freedom",
+                True,
+            ),
+            Column(
+                "p",
+                NUMBER,
+                "probability of so large a value anywhere among the readings by noise alone (Bonferroni), the largest over ratios of the "
+                "noises of a height and a distance from 0.25 to 1",
+                True,
+            ),
             Column("flagged", "bool", "true for a bad reading"),
         ),
         ("printer", "kind", "number"),
@@ -93,26 +114,43 @@ TABLES = (
     Table(
         "printer_causes",
         "tables/printer_causes.parquet",
-        "Possible causes of what the calibration of a printer leaves. A bad reading that is found is left out before the others are tested.",
+        "Possible causes of what the calibration of a printer leaves, if its noise is normal and a height's 0.25 to 1 times a distance's. A bad "
+        "reading that is found is left out before the others are tested.",
         (
             _PRINTER,
             Column(
-                "cause", "str", "one bad reading; an error of the calipers; arms of unknown length; towers that lean, each by two angles"
+                "cause",
+                "str",
+                "one bad reading; an error of the calipers; a measured object of another shape in x and y; arms of unknown length; steps of "
+                "another length per tower; towers that lean, each by two angles",
             ),
             Column("freedom_used", "int64", "numbers that it adds, as far as the calibration does not absorb them"),
-            Column("explained_share", NUMBER, "share of the sum of squares left that it explains; null where nothing tells", True),
-            Column("p", NUMBER, "probability that noise explains as much; null without freedom", True),
+            Column(
+                "explained_share",
+                NUMBER,
+                "share of the sum of squares left that it explains, under the firmware's ratio of noises; null where nothing tells",
+                True,
+            ),
+            Column("p", NUMBER, "probability that noise explains as much, the largest over the noises' ratios; null without freedom", True),
+            Column("limit", NUMBER, "p has to be below it: the level over the causes and over the pieces of evidence"),
             Column("estimate", NUMBER, "its number; null for causes with several", True),
             Column("standard_error", NUMBER, "of the number", True),
             Column("unit", "str", "of the number; empty for causes with several"),
             Column(
                 "detectable_mm",
                 NUMBER,
-                "rms over the readings, of what the calibration does not absorb of it, that would be found 9 times of 10",
+                "rms over the readings, of what the calibration does not absorb of it, that has p below the limit 9 times of 10 (noise in the "
+                "firmware's ratio); of a bad reading its own error. Passing is not yet found: see verdict. Null where another cause always "
+                "imitates it, and where nothing is decidable",
                 True,
             ),
-            Column("imitated_by", "str", "other causes that explain the same, joined by a comma; empty where none"),
-            Column("verdict", "str", "whether it is at work", allowed=_DIAGNOSED),
+            Column("imitated_by", "str", "other causes that hold what it explains, joined by a comma; empty where none"),
+            Column(
+                "verdict",
+                "str",
+                "whether it is at work: found where p is below the limit, also without any single reading, and nothing imitates it",
+                allowed=_DIAGNOSED,
+            ),
         ),
         ("printer", "cause"),
     ),
