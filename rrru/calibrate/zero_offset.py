@@ -8,13 +8,15 @@ from the first and l_j the model's, u_j the direction between them and J_j the e
 All residuals here have `residual`, `jacobian` and a length, and are fitted by `rrru.calibrate.least_squares`. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 from scipy.spatial.transform import Rotation
 
+from rrru.calibrate.identifiability import analyse
+from rrru.calibrate.least_squares import make_fit
 from rrru.calibrate.residuals import Residuals
 
 
@@ -36,12 +38,15 @@ class Distances:
         return len(self.actuators) - 1
 
     @cached_property
-    def whitener(self):
-        """Inverse Cholesky factor (n-1, n-1) of the distances' covariance I + U U', U (n-1, 3) the directions from the first place."""
-        if self.alike:
-            return np.eye(len(self))
+    def covariance(self):
+        """Covariance (n-1, n-1) of the distances for unit noise of every axis: I + U U', U (n-1, 3) the directions from the first place."""
         direction = _apart(self.measured_mm)[1]
-        return np.linalg.inv(np.linalg.cholesky(np.eye(len(self)) + direction @ direction.T))
+        return np.eye(len(self)) + direction @ direction.T
+
+    @cached_property
+    def whitener(self):
+        """Inverse Cholesky factor (n-1, n-1) of the covariance, or the unit matrix where all count alike."""
+        return np.eye(len(self)) if self.alike else np.linalg.inv(np.linalg.cholesky(self.covariance))
 
     def residual(self, errors):
         """Measured less model distances (n-1, 1) in mm, whitened."""
@@ -114,6 +119,24 @@ def one_step(residuals):
     """Errors (p,) by one linear step from the nominal robot: on `Distances` that count alike it is the paper's answer (eq. 15)."""
     nominal = residuals.mechanism.parameters.nominal
     return nominal + taken_for_errors(residuals, residuals.residual(nominal)[..., None])[:, 0]
+
+
+def step_fit(distances):
+    """Fit of the paper's step on `Distances` that count alike, and the covariance (p, p) of its errors, in squares of their units.
+
+    With J' J in place of the best weights the covariance is s^2 J^+ C J^+', C that of the distances, and s^2 the sum of squared residuals over
+    the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in every other fit.
+    """
+    errors = one_step(distances)
+    plain, nominal = make_fit(distances, errors, 1), distances.mechanism.parameters.nominal
+    jacobian = distances.jacobian(nominal)[:, 0]
+    inverse = np.linalg.pinv(jacobian)
+    left = distances.covariance - jacobian @ (inverse @ distances.covariance)
+    noise = np.sqrt((plain.residual_mm**2).sum() / np.trace(left))
+    covariance = noise**2 * inverse @ distances.covariance @ inverse.T
+    seen = analyse(distances.mechanism, replace(distances, alike=False).jacobian(errors))
+    deviation = np.sqrt(np.diag(covariance))
+    return replace(plain, noise_mm=float(noise), standard_errors=deviation, identifiability=seen), covariance
 
 
 def taken_for_errors(residuals, changes):

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 
 from rrru.calibrate import vision
-from rrru.calibrate.least_squares import least_squares, make_fit
+from rrru.calibrate.least_squares import least_squares
 from rrru.calibrate.residuals import Residuals
-from rrru.calibrate.zero_offset import Distances, Heights, Shape, one_step, taken_for_errors
+from rrru.calibrate.zero_offset import Distances, Heights, Shape, step_fit, taken_for_errors
 from rrru.delta_study.robot import pose_commands
 from rrru.plant.tracker import measure
 
@@ -107,9 +107,12 @@ def residuals(variant, mechanism, command_mm, actuators, places_mm):
 
 
 def fit(variant, mechanism, command_mm, places_mm):
-    """Fit of a variant to places (n, 3) for commands (n, 3), and its residuals."""
+    """Fit of a variant to places (n, 3) for commands (n, 3), the covariance (3, 3) of its errors in rad^2, and its residuals."""
     points = residuals(variant, mechanism, command_mm, mechanism.require_reachable(command_mm), places_mm)
-    return (make_fit(points, one_step(points), 1) if variant.step else least_squares(points)), points
+    if variant.step:
+        return *step_fit(points), points
+    result = least_squares(points)
+    return result, result.identifiability.covariance(result.noise_mm), points
 
 
 def paper_fit(mechanism, centres):
@@ -135,17 +138,23 @@ def places(variant, twin, centres, truth):
     return command, columns(table, name)[used]
 
 
-def study(twin, centres, truth):
-    """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before any."""
+def study(twin, centres, truth, length_error_mm):
+    """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before any.
+
+    length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zero errors.
+    """
     points = [_points(twin, "none", None)]
     calibrations = [{"variant": "none", "source": "none", "measure": "none", "planes": "none", "poses": 0} | _sizes(points[0])]
     directions = []
     for variant in VARIANTS:
         command, seen = places(variant, twin, centres, truth)
-        result, fitted = fit(variant, twin.mechanism, command, seen)
+        result, covariance, fitted = fit(variant, twin.mechanism, command, seen)
         points.append(_points(twin, variant.name, result.errors))
-        calibrations.append(_calibration(variant, twin, result, len(command)) | _sizes(points[-1]))
-        directions.append(_directions(variant, twin, result, fitted, command, seen))
+        legs = residuals(variant, twin.truth, command, fitted.actuators, seen).jacobian(twin.truth.parameters.nominal)[..., 3:]
+        # a longer arm changes the model, which the fit sees as measured less model with the other sign
+        lengths = taken_for_errors(fitted, -legs)
+        calibrations.append(_calibration(variant, twin, result, len(command), length_error_mm * lengths) | _sizes(points[-1]))
+        directions.append(_directions(variant, result.identifiability, covariance, lengths, _scale(variant, fitted)))
     return pd.DataFrame(calibrations), pd.concat(directions, ignore_index=True), pd.concat(points, ignore_index=True)
 
 
@@ -154,8 +163,8 @@ def columns(table, name):
     return table[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy()
 
 
-def _calibration(variant, twin, result, poses):
-    """The fit's columns of `delta_calibrations`."""
+def _calibration(variant, twin, result, poses, lengths_rad):
+    """The fit's columns of `delta_calibrations`; lengths_rad (3, q): what one sigma of every length does to the zero errors."""
     row = {
         "variant": variant.name,
         "source": variant.source,
@@ -171,21 +180,24 @@ def _calibration(variant, twin, result, poses):
     for k, name in enumerate(twin.mechanism.parameters.names):
         row |= {f"{name}_true_rad": twin.zero_errors_rad[k], f"{name}_found_rad": result.errors[k]}
         row |= {f"{name}_error_rad": result.errors[k] - twin.zero_errors_rad[k], f"{name}_standard_error_rad": result.standard_errors[k]}
+        row[f"{name}_length_error_rad"] = np.linalg.norm(lengths_rad[k])
     return row
 
 
-def _directions(variant, twin, result, fitted, command, seen):
-    """Rows of `delta_observability`: combinations of the zero errors from the best seen to the worst, and what is mistaken for them."""
-    found = result.identifiability
-    nominal = twin.truth.parameters.nominal
-    legs = residuals(variant, twin.truth, command, fitted.actuators, seen).jacobian(nominal)[..., 3:]
-    # a longer arm changes the model, which the fit sees as measured less model with the other sign
-    lengths = found.directions @ taken_for_errors(fitted, -legs)
-    scale = np.full(3, np.nan)
-    if variant.source != "tracker":
-        larger = residuals(variant, twin.mechanism, command, fitted.actuators, seen * (1.0 + _SCALE_ERROR))
-        zero = twin.mechanism.parameters.nominal
-        scale = np.abs(found.directions @ taken_for_errors(fitted, (larger.residual(zero) - fitted.residual(zero))[..., None])[:, 0])
+def _scale(variant, fitted):
+    """Zero errors (3,) by which a fit answers to a target that is too large by `_SCALE_ERROR`; NaN without a target."""
+    if variant.source == "tracker":
+        return np.full(3, np.nan)
+    larger = residuals(variant, fitted.mechanism, None, fitted.actuators, fitted.measured_mm * (1.0 + _SCALE_ERROR))
+    zero = fitted.mechanism.parameters.nominal
+    return taken_for_errors(fitted, (larger.residual(zero) - fitted.residual(zero))[..., None])[:, 0]
+
+
+def _directions(variant, found, covariance, lengths, scale):
+    """Rows of `delta_observability`: combinations of the zero errors from the best seen to the worst, and what is mistaken for them.
+
+    found: the Identifiability; covariance (3, 3) in rad^2; lengths (3, q), scale (3,): zero errors from lengths and from the target's scale.
+    """
     common = found.directions.sum(axis=1) ** 2 / 3.0
     return pd.DataFrame(
         {
@@ -195,9 +207,9 @@ def _directions(variant, twin, result, fitted, command, seen):
             "common_share": common,
             "kind": np.where(common > 0.5, "common", "differential"),
             "singular_value": found.singular_values,
-            "standard_error_rad": result.noise_mm * found.scale[0] / found.singular_values,
-            "per_length_rad_mm": np.linalg.norm(lengths, axis=1),
-            "per_scale_rad": scale,
+            "standard_error_rad": np.sqrt(np.einsum("da,ab,db->d", found.directions, covariance, found.directions)),
+            "per_length_rad_mm": np.linalg.norm(found.directions @ lengths, axis=1),
+            "per_scale_rad": np.abs(found.directions @ scale),
         }
     )
 

@@ -22,7 +22,7 @@ class DeltaTwin:
 
     mechanism: what the controller believes, its parameters are the drives' zero errors; truth: the same robot with every leg's lengths as
     parameters, errors (12,) the true ones; plane_mm (n, 3): where errors are counted; axes_mm (3, 3): commands that lay out the
-    calibration frame; tracker_noise_mm: 1 sigma per axis.
+    calibration frame; tracker_noise_mm: 1 sigma per axis; labels: which repetition of the study this is, every one has its own noise.
     """
 
     mechanism: Delta
@@ -32,6 +32,7 @@ class DeltaTwin:
     axes_mm: np.ndarray
     tracker_noise_mm: float
     seed: int
+    labels: tuple = ()
 
     @property
     def zero_errors_rad(self):
@@ -40,7 +41,7 @@ class DeltaTwin:
 
     def generator(self, *labels):
         """Random stream of the study for a purpose."""
-        return stream(self.seed, "delta", *labels)
+        return stream(self.seed, "delta", *self.labels, *labels)
 
     def positions(self, actuators):
         """Where the robot really stands (n, 3) in the base frame for the drive angles (n, 3) that its controller commands."""

@@ -33,14 +33,14 @@ class Scene:
     distance_mm: float
 
 
-def scene(config):
-    """The scene of the configuration's `delta` section."""
+def scene(config, labels=()):
+    """The scene of the configuration's `delta` section, with another plate for other labels."""
     section = config["delta"]
     given, mount, plate = dict(section["camera"]), section["mount"], dict(section["target"])
     for key in ("centre_offset_px", "distortion"):
         given[key] = tuple(given[key])
     turns = [Rotation.from_rotvec(part["turn_deg"], degrees=True).as_matrix() for part in (mount, plate)]
-    generator = twin(config).generator("target")
+    generator = twin(config).generator("target", *labels)
     offsets = plate.pop("dot_error_mm") * generator.standard_normal((plate["rows"], plate["columns"], 2))
     plate.pop("turn_deg")
     target = Target(**plate, offsets_mm=offsets)
@@ -66,12 +66,16 @@ def true_poses(config):
     )
 
 
+def pose_places(view, truth):
+    """Rotation (3, 3) and translation (3,) from the target's frame to the camera's at every pose of `true_poses`."""
+    rotation = view.camera_turn.T @ view.target_turn
+    return [(rotation, -rotation @ centre) for centre in truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()]
+
+
 def pose_images(config, truth):
     """Images (n, height, width) of every pose of `true_poses`."""
     view, generator = scene(config), twin(config).generator("pose images")
-    rotation = view.camera_turn.T @ view.target_turn
-    centres = truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()
-    return np.stack([render(view.camera, view.target, rotation, -rotation @ centre, generator) for centre in centres])
+    return np.stack([render(view.camera, view.target, *place, generator) for place in pose_places(view, truth)])
 
 
 def true_camera(config):
@@ -83,13 +87,16 @@ def true_camera(config):
 def tilted_images(config):
     """Images (n, height, width) of the target from all sides, taken by hand before the camera is mounted."""
     view, generator = scene(config), twin(config).generator("tilted images")
-    tilted = config["delta"]["tilted_views"]
-    images = []
+    places = tilted_places(view, config["delta"]["tilted_views"], generator)
+    return np.stack([render(view.camera, view.target, *place, generator) for place in places])
+
+
+def tilted_places(view, tilted, generator):
+    """Rotation (3, 3) and translation (3,) from the target's frame to the camera's of one tilted view after the other."""
     for side in 2.0 * np.pi * np.arange(tilted["count"]) / tilted["count"]:
         about = np.radians(tilted["tilt_deg"]) * np.array([np.cos(side), np.sin(side), 0.0])
         rotation = Rotation.from_rotvec(about).as_matrix() @ _LOOKING_DOWN
         # ASSUME by hand: a tenth nearer or farther, aimed a few dots off the middle
         distance = view.distance_mm * generator.uniform(0.9, 1.1)
         aim = view.target.middle_mm + np.append(generator.uniform(-60.0, 60.0, 2), 0.0)
-        images.append(render(view.camera, view.target, rotation, [0.0, 0.0, distance] - rotation @ aim, generator))
-    return np.stack(images)
+        yield rotation, [0.0, 0.0, distance] - rotation @ aim

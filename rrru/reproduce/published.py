@@ -12,13 +12,13 @@ _COLUMNS = ["paper", "item", "source", "unit", "published", "here", "ratio", "he
 _AXES = [f"error_{axis}_mm" for axis in "xyz"]
 
 
-def published_table(config, errors, calibrations, parameters, genetic, sweep_runs, spread=None, sisters=None):
+def published_table(config, errors, calibrations, parameters, genetic, sweep_runs, spread=None, sisters=None, sister_spread=None):
     """Rows of `published` from tables of the study.
 
     config: the whole configuration, whose `reproduce` section says which calibrations stand for the paper's; errors, calibrations, parameters
     (the genetic algorithm's median run included), genetic, sweep_runs: the tables of those names; spread: item to (low, high) over other
-    draws, see `rrru.reproduce.redraw`; sisters: "B" and "C" to {item: number of this study}, see `rrru.reproduce.published_sisters`. Numbers
-    that this study does not have are null.
+    draws, see `rrru.reproduce.redraw`; sisters: "B" and "C" to {item: number of this study}, sister_spread: to
+    {item: (low, high)}, see `rrru.reproduce.published_sisters`. Numbers that this study does not have are null.
     """
     reproduce = config["reproduce"]
     before, lines, spiral = (_study_errors(errors, reproduce, key) for key in ("none", "line_calibration", "spiral_calibration"))
@@ -47,7 +47,7 @@ def published_table(config, errors, calibrations, parameters, genetic, sweep_run
                 "note": "; ".join(text for text in (number.note, notes.get(number.item, "")) if text),
             }
         )
-    return pd.concat([pd.DataFrame(rows), _orders(before, lines), pd.DataFrame(sister_rows(sisters))], ignore_index=True)
+    return pd.concat([pd.DataFrame(rows), _orders(before, lines), pd.DataFrame(sister_rows(sisters, sister_spread))], ignore_index=True)
 
 
 def _study_errors(errors, reproduce, key):

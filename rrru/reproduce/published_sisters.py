@@ -9,12 +9,13 @@ from rrru.reproduce import paper_b, paper_c
 NUMBERS = {"B": paper_b.NUMBERS, "C": paper_c.NUMBERS}
 
 
-def sister_rows(here=None):
-    """Rows of `published` of papers B and C; here: paper to {item: this study's number}, null for what is absent.
+def sister_rows(here=None, spread=None):
+    """Rows of `published` of papers B and C, null for what is absent.
 
-    Raises ConfigError for an item that the paper does not have.
+    here: paper to {item: this study's number}; spread: paper to {item: (low, high)} over other draws. Raises ConfigError for an item that
+    the paper does not have.
     """
-    here = here or {}
+    here, spread = here or {}, spread or {}
     rows = []
     for paper, numbers in NUMBERS.items():
         own = here.get(paper, {})
@@ -23,6 +24,7 @@ def sister_rows(here=None):
             raise ConfigError(f"paper {paper} prints no {', '.join(unknown)}; known: {', '.join(number.item for number in numbers)}")
         for number in numbers:
             value = own.get(number.item, np.nan)
+            low, high = spread.get(paper, {}).get(number.item, (np.nan, np.nan))
             rows.append(
                 {
                     "paper": paper,
@@ -32,8 +34,8 @@ def sister_rows(here=None):
                     "published": number.value,
                     "here": value,
                     "ratio": value / number.value if number.value else np.nan,
-                    "here_low": np.nan,
-                    "here_high": np.nan,
+                    "here_low": low,
+                    "here_high": high,
                     "note": number.note,
                 }
             )

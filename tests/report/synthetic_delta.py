@@ -82,6 +82,14 @@ def calibrations(point_rows):
     return check("delta_calibrations", pd.DataFrame(rows))
 
 
+def draws(rows):
+    """`delta_draws` about the calibrations."""
+    sides = {"low": 0.8, "median": 1.0, "high": 1.3}
+    sizes = [f"{frame}_{kind}" for frame in ("plane", "base") for kind in ("mean", "max")]
+    columns = {f"{size}_{side}_mm": factor * rows[f"{size}_mm"] for size in sizes for side, factor in sides.items()}
+    return check("delta_draws", rows[["variant"]].assign(draws=20, **columns))
+
+
 def observability():
     """`delta_observability` of every variant but `none`."""
     rows = [
@@ -105,5 +113,6 @@ def observability():
 def delta_tables():
     """Every table that the figures of the Delta's study read."""
     point_rows = points()
-    own = {"delta_points": point_rows, "delta_calibrations": calibrations(point_rows), "delta_observability": observability()}
+    rows = calibrations(point_rows)
+    own = {"delta_points": point_rows, "delta_calibrations": rows, "delta_draws": draws(rows), "delta_observability": observability()}
     return image_tables() | own

@@ -27,6 +27,7 @@ WITHOUT_UNIT = (
     *("true share closed", "predicted share closed", "effect", "trajectory", "printer", "points", "method"),
     *("neurons", "mean squared error (mm²)", "exact less Jacobian (µm)", "benefit (%)", "payload changed by (kg)", "experiment"),
     *("experiment, curve backwards", "payload (kg)", "slider", "scatter per travel (µm/mm)", "left over (µm)"),
+    "azimuth of the first point (°)",
     "size of the weight in the unit direction (angles as arcs at the end of the drive arm)",
 )
 SMALLEST_PT = 7.0

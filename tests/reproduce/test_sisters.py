@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from rrru.reproduce.published_sisters import sister_rows
-from rrru.reproduce.sisters import study_b, study_c
+from rrru.reproduce.sisters import spread_c, study_b, study_c
 from tests.workflow.folder import ROOT
 
 CONFIG = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -62,3 +62,14 @@ def test_paper_cs_numbers_are_those_of_the_papers_variant():
     assert here["after_mean"] == pytest.approx(0.3)
     assert here["focal_length_mm"] == pytest.approx(1600.0 * 0.0099) and here["poses"] == 20.0
     sister_rows({"C": here})
+
+
+def test_paper_cs_ranges_are_those_of_before_and_the_papers_variant():
+    sizes = [f"plane_{kind}_{side}_mm" for kind in ("mean", "max") for side in ("low", "high")]
+    draws = pd.DataFrame(np.arange(12.0).reshape(3, 4), columns=sizes).assign(variant=["none", "paper", "shape"])
+    spread = spread_c(draws)
+    assert spread["before_mean"] == (0.0, 1.0) and spread["after_mean"] == spread["after_about"] == (4.0, 5.0)
+    assert spread["after_max"] == (6.0, 7.0)
+    rows = {row["item"]: row for row in sister_rows(spread={"C": spread}) if row["paper"] == "C"}
+    assert (rows["after_max"]["here_low"], rows["after_max"]["here_high"]) == (6.0, 7.0)
+    assert np.isnan(rows["poses"]["here_low"])

@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -9,13 +10,15 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from rrru.delta_study import fits, robot, search
+from rrru.calibrate import vision
+from rrru.delta_study import draws, fits, robot, search, views
 from rrru.errors import ConfigError
 from rrru.mechanisms.delta import Delta
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 _OVERLAY = (
-    "delta: {poses: {counts: [3, 3], half_mm: [100.0, 90.0]}, tilted_views: {count: 7}, spread: {robots: 12}, search: {generations: 1}}\n"
+    "delta: {poses: {counts: [3, 3], half_mm: [100.0, 90.0]}, tilted_views: {count: 7}, spread: {draws: 3, robots: 12},\n"
+    "  search: {draws: 2, generations: 1}}\n"
 )
 _AXES = ("x", "y", "z")
 
@@ -56,8 +59,6 @@ def test_images_lead_to_smaller_errors_and_every_variant_stands_in_the_tables(fi
     assert calibrations.index.tolist() == ["none", *(variant.name for variant in fits.VARIANTS)]
     assert (calibrations["rank"].iloc[1:] == 3).all() and calibrations.loc["paper", "equations"] == 8
     assert calibrations.loc["paper", "plane_mean_mm"] < calibrations.loc["none", "plane_mean_mm"]
-    # what knows the base frame is nearest to the truth there
-    assert calibrations["base_mean_mm"].idxmin() in ("tracker_positions", "tracker_heights")
     poses = _table(finished, "poses")
     assert len(poses) == 9 + 5 and (poses["dots"] > 100).all()
     assert np.abs(_columns(poses, "one_rotation_error")[:, :2]).max() < np.abs(_columns(poses, "error")[:, :2]).max() < 0.2
@@ -89,9 +90,69 @@ def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(finished,
     small, large = (robots.loc[length] for length in (0.0, 0.2))
     assert (large["base_median_mm"].drop("none") > small["base_median_mm"].drop("none")).all()
     assert (robots["plane_median_mm"] <= robots["plane_high_mm"]).all()
+    # what knows the base frame is nearest to the truth there, on one robot another may be lucky
+    assert large["base_median_mm"].idxmin() in ("tracker_positions", "tracker_heights")
     # without length errors and noise of the camera every variant is exact but for the tracker's noise and the paper's one step
     for name in ("true_centres", "true_centres_two_heights", "tracker_positions"):
         assert small.loc[name, "base_median_mm"] < 4.0 * config["delta"]["tracker_noise_mm"]
+
+
+def test_other_draws_move_what_images_find_and_leave_the_rest(finished, config):
+    rows, noise = _table(finished, "draws").set_index("variant"), config["delta"]["tracker_noise_mm"]
+    assert rows.index.tolist() == ["none", *(variant.name for variant in fits.VARIANTS)] and (rows["draws"] == 3).all()
+    for size in ("plane_mean", "plane_max", "base_mean", "base_max"):
+        low, median, high = (rows[f"{size}_{side}_mm"] for side in ("low", "median", "high"))
+        assert ((low <= median) & (median <= high)).all()
+    width = rows["base_mean_high_mm"] - rows["base_mean_low_mm"]
+    assert width["none"] < noise < width["paper"]
+    # the configured run's error before is one of many alike
+    before = _table(finished, "calibrations").set_index("variant").loc["none", "base_mean_mm"]
+    assert abs(before - rows.loc["none", "base_mean_median_mm"]) < noise
+
+
+def test_dots_that_are_projected_are_those_of_the_rendered_images(finished, config):
+    """Dot by dot, and by the optical centres: what the plate's errors do to these is the same without noise."""
+    section = config["delta"] | {"poses": config["delta"]["poses"] | {"counts": [3, 3], "half_mm": [100.0, 90.0]}}
+    config = config | {"delta": section}
+    truth, found = pd.read_parquet(finished[0] / "delta/truth.parquet"), _table(finished, "dots")
+    camera, target = config["delta"]["camera"], config["delta"]["target"]
+    # by error propagation: centroid of a round window of pixels, each with its noise, over the dot's darkness
+    radius = target["diameter_mm"] / 2.0 * camera["focal_mm"] / camera["pixel_mm"] / section["distance_mm"]
+    window = radius + 4.0
+    expected = camera["noise_grey"] * np.sqrt(np.pi * window**4 / 4.0) / ((215.0 - 40.0) * np.pi * radius**2)
+    assert draws.centre_noise_px(config, truth, found) == pytest.approx(expected, rel=0.15)
+    lens = _table(finished, "camera")["found"].to_numpy()
+    matrix = np.array([[lens[0], 0.0, lens[2]], [0.0, lens[1], lens[3]], [0.0, 0.0, 1.0]])
+    model = vision.CameraModel(matrix, lens[4:8], lens[8], 7)
+    view = views.scene(config)
+    seen = [draws.seen_dots(view, *place) for place in views.pose_places(view, truth)]
+    exact = np.array([vision.camera_pose(model, dots, target["pitch_mm"], target["diameter_mm"]).centre_mm for dots in seen])
+    rendered, projected = (places - _columns(truth, "true") for places in (_columns(_table(finished, "centres"), "centre"), exact))
+    rendered, projected = rendered - rendered.mean(axis=0), projected - projected.mean(axis=0)
+    # each axis: most of the error is the plate's and the lens's
+    assert (((rendered - projected) ** 2).sum(axis=0) < 0.5 * (rendered**2).sum(axis=0)).all()
+    assert np.array([len(dots.number) for dots in seen]) == pytest.approx(_table(finished, "poses")["dots"].to_numpy(), rel=0.1)
+
+
+def test_draws_differ_and_the_same_label_gives_the_same(config):
+    config = config | {"delta": config["delta"] | {"tilted_views": {"count": 5, "tilt_deg": 25.0}}}
+    truth = views.true_poses(config).head(4)
+    first, again = (draws.drawn_errors(config, truth, 0.006, 2, "a") for _ in range(2))
+    other = draws.drawn_errors(config, truth, 0.006, 1, "b")
+    np.testing.assert_array_equal(first[1]["centre"], again[1]["centre"])
+    for one in (first[1], other[0]):
+        assert np.abs(one["centre"] - first[0]["centre"]).max() > 1e-3
+    exact = {"target": config["delta"]["target"] | {"dot_error_mm": 0.0}}
+    none = draws.drawn_errors(config | {"delta": config["delta"] | exact}, truth, 0.0, 1, "a")[0]
+    # an exact plate without noise leaves what single precision does to the lens; under one rotation the origin may shift
+    assert np.abs(none["centre"]).max() < 1e-4
+    assert np.ptp(none["one_rotation"], axis=0).max() < 1e-4
+
+
+def test_every_robot_has_its_own_tracker_noise(config):
+    one = robot.twin(config)
+    runs = [replace(one, labels=("robots", k)).generator("tracker", "tracker_heights").standard_normal(50) for k in range(2)]
+    assert abs(np.corrcoef(runs)[0, 1]) < 4.0 / np.sqrt(50)
 
 
 def test_an_own_frame_has_its_axes_where_the_robot_went():
@@ -125,12 +186,16 @@ def test_a_step_of_the_search_stays_near_the_configured_robot(finished, config):
     for name, value in errors.items():
         reach = config["delta"]["search"]["share"] * (0.02 if name.startswith("dtheta") else 0.3)
         assert abs(value - config["delta"]["errors"][name]) <= reach + 1e-6
-    # the misfit is that of the four published numbers
-    small = config | {"delta": config["delta"] | {"errors": errors, "poses": config["delta"]["poses"] | {"counts": [3, 3]}}}
-    truth, centres = pd.read_parquet(finished[0] / "delta/truth.parquet"), _table(finished, "centres")
+    # the misfit is that of the four published numbers, medians over the draws
+    poses, tilted = {"counts": [3, 3], "half_mm": [100.0, 90.0]}, {"count": 7}
+    changed = {key: config["delta"][key] | new for key, new in (("poses", poses), ("tilted_views", tilted))}
+    own = config | {"delta": config["delta"] | changed}
+    truth = pd.read_parquet(finished[0] / "delta/truth.parquet")
+    noise = draws.centre_noise_px(own, truth, _table(finished, "dots"))
     first = (truth["plane"] == "first").to_numpy()
-    centre_errors = (_columns(centres, "centre") - _columns(truth, "true"))[first]
-    here = search.numbers(robot.twin(small), _columns(truth, "command")[first], centre_errors)
+    drawn = [one["centre"][first] for one in draws.drawn_errors(own, truth, noise, 2, "search")]
+    small = own | {"delta": own["delta"] | {"errors": errors}}
+    here = search.numbers(robot.twin(small), _columns(truth, "command")[first], drawn)
     published = {"before_mean": 0.932, "before_max": 1.442, "after_mean": 0.211, "after_max": 0.374}
     assert misfit == pytest.approx(np.sqrt(np.mean([(here[k] / v - 1.0) ** 2 for k, v in published.items()])), abs=2e-4)
 

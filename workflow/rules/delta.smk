@@ -9,6 +9,7 @@ DELTA_TABLES = [
     "delta_poses",
     "delta_calibrations",
     "delta_observability",
+    "delta_draws",
     "delta_points",
     "delta_robots",
 ]
@@ -63,6 +64,7 @@ rule delta_calibrate:
     input:
         lens=f"{DELTA_PARTS}/lens.parquet",
         centres=table("delta_centres"),
+        dots=table("delta_dots"),
         truth=f"{DELTA_PARTS}/truth.parquet",
     output:
         **{name: table(name) for name in DELTA_TABLES},
@@ -77,7 +79,7 @@ rule delta_calibrate:
 
 rule delta_twin:
     input:
-        centres=table("delta_centres"),
+        dots=table("delta_dots"),
         truth=f"{DELTA_PARTS}/truth.parquet",
     output:
         f"{RESULTS}/twin/delta.yaml",

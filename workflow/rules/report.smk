@@ -9,6 +9,7 @@ rule published:
                 "ptt_repeatability",
                 "delta_points",
                 "delta_camera",
+                "delta_draws",
             )
         },
         errors=table("errors"),

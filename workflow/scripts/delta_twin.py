@@ -5,7 +5,7 @@ from pathlib import Path
 
 import yaml
 
-from rrru.delta_study import robot, search
+from rrru.delta_study import draws, robot, search
 from rrru.report import tables
 from rrru.report.job import job
 
@@ -13,10 +13,9 @@ from rrru.report.job import job
 def main(config, inputs, output):
     """Write the twin's errors as an overlay of the configuration."""
     twin = robot.twin(config)
-    section = config["delta"]["search"]
-    found, misfit = search.search(
-        twin, tables.read(inputs["centres"]), tables.read(inputs["truth"]), section["generations"], section["share"]
-    )
+    section, truth = config["delta"]["search"], tables.read(inputs["truth"])
+    noise = draws.centre_noise_px(config, truth, tables.read(inputs["dots"]))
+    found, misfit = search.search(twin, truth, draws.drawn_errors(config, truth, noise, section["draws"], "search"), section)
     logging.info("misfit %.4f", misfit)
     errors = {name: round(value, 6) for name, value in twin.truth.parameters.mapping(found).items()}
     partial = Path(f"{output}.partial")

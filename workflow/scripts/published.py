@@ -9,7 +9,7 @@ from rrru.report.job import job
 from rrru.reproduce.audit import audit_table
 from rrru.reproduce.published import published_table
 from rrru.reproduce.redraw import spread
-from rrru.reproduce.sisters import study_b, study_c
+from rrru.reproduce.sisters import spread_c, study_b, study_c
 
 
 def main(config, inputs, outputs):
@@ -30,7 +30,8 @@ def main(config, inputs, outputs):
         "B": study_b(config, *(tables.read(inputs[name]) for name in ("ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"))),
         "C": study_c(config, *(tables.read(inputs[name]) for name in ("delta_points", "delta_camera"))),
     }
-    frame = published_table(config, errors, calibrations, parameters, genetic, runs, others, sisters)
+    sister_spread = {"C": spread_c(tables.read(inputs["delta_draws"]))}
+    frame = published_table(config, errors, calibrations, parameters, genetic, runs, others, sisters, sister_spread)
     tables.write("published", frame, outputs["published"])
     tables.write("audit", audit_table(), outputs["audit"])
 

@@ -125,10 +125,10 @@ FIGURES = {
     ),
     "delta_errors": (
         delta.delta_errors,
-        ("delta_points", "delta_calibrations"),
+        ("delta_points", "delta_calibrations", "delta_draws"),
         "Errors on the plane before and after the paper's calibration (paper C, Figs. 7 and 8): colour is the size of the error in the "
-        "calibration frame, arrows its part in the plane, magnified as stated. Below, mean and largest error under every variant, (c) in the "
-        "calibration frame, (d) in the frame of the robot's base.",
+        "calibration frame, arrows its part in the plane, magnified as stated. Below, mean and largest error under every variant, and the "
+        "range of the mean when plate, views and noise are drawn anew, (c) in the calibration frame, (d) in the frame of the robot's base.",
     ),
     "delta_observability": (
         delta.delta_observability,

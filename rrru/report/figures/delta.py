@@ -26,6 +26,7 @@ _COMMON = {"color": style.BLUE, "marker": "s", "linestyle": "none"}
 _DIFFERENTIAL = {"color": style.VERMILION, "marker": "o", "markerfacecolor": "white", "linestyle": "none"}
 _MEAN = {"color": style.BLUE, "marker": "s", "linestyle": "none"}
 _MAX = {"color": style.BLACK, "marker": "|", "markersize": 6.0, "linestyle": "none"}
+_DRAWS = {"color": style.BLUE, "alpha": 0.3, "linewidth": 4.5}
 _FOUND = {"color": style.ORANGE, "marker": "+", "markersize": 4.0, "linestyle": "none"}
 
 
@@ -74,8 +75,9 @@ def _pitch(dots, centres):
 
 @style.printed
 def delta_errors(tables, options):
-    """Maps of the errors before and after the paper's calibration, and what every variant leaves."""
+    """Maps of the errors before and after the paper's calibration, and what every variant leaves, in other draws too."""
     points, calibrations = _rows(tables, "delta_points", "delta_errors"), _rows(tables, "delta_calibrations", "delta_errors")
+    draws = _rows(tables, "delta_draws", "delta_errors").set_index("variant").reindex(calibrations["variant"])
     figure = style.new(style.DOUBLE_MM, 92.0 + 4.6 * len(calibrations))
     grid = figure.add_gridspec(2, 1, height_ratios=[78.0, 10.0 + 4.6 * len(calibrations)])
     upper, lower = grid[0].subgridspec(1, 2), grid[1].subgridspec(1, 2)
@@ -86,10 +88,10 @@ def delta_errors(tables, options):
         _map(figure.add_subplot(upper[place]), rows, f"({'ab'[place]}) {title}")
     left = figure.add_subplot(lower[0])
     right = figure.add_subplot(lower[1], sharey=left)
-    _sizes(left, calibrations, "plane", "(c) calibration frame")
-    _sizes(right, calibrations, "base", "(d) frame of the base")
+    _sizes(left, calibrations, draws, "plane", "(c) calibration frame")
+    _sizes(right, calibrations, draws, "base", "(d) frame of the base")
     right.tick_params(labelleft=False)
-    left.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2)
+    left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.06), ncols=3, borderaxespad=0.2)
     return figure
 
 
@@ -109,14 +111,17 @@ def _map(axes, rows, title):
     bar.set_label(f"error (mm); arrows magnified {factor:g} times")
 
 
-def _sizes(axes, calibrations, frame, title):
-    """Mean and largest error of every variant in a frame."""
+def _sizes(axes, calibrations, draws, frame, title):
+    """Mean and largest error of every variant in a frame, and the mean's range over draws."""
     rows = np.arange(len(calibrations))
+    low, high = (draws[f"{frame}_mean_{side}_mm"].to_numpy() for side in ("low", "high"))
+    axes.hlines(rows, low, high, **_DRAWS, label=f"mean in {draws['draws'].max():g} draws, 5 to 95 %")
     axes.hlines(rows, calibrations[f"{frame}_mean_mm"], calibrations[f"{frame}_max_mm"], color="#bbbbbb", linewidth=0.9)
     axes.plot(calibrations[f"{frame}_mean_mm"], rows, **_MEAN, label="mean")
     axes.plot(calibrations[f"{frame}_max_mm"], rows, **_MAX, label="largest")
     axes.set_yticks(rows, [_NAMES.get(name, name) for name in calibrations["variant"]])
-    axes.set(xlim=(0.0, 1.08 * calibrations[f"{frame}_max_mm"].max()), ylim=(len(rows) - 0.5, -0.5), xlabel="error on the plane (mm)")
+    right = max(calibrations[f"{frame}_max_mm"].max(), np.nanmax(high))
+    axes.set(xlim=(0.0, 1.08 * right), ylim=(len(rows) - 0.5, -0.5), xlabel="error on the plane (mm)")
     axes.set_ylabel("variant" if frame == "plane" else "")
     axes.tick_params(axis="y", length=0.0)
     axes.set_title(title)

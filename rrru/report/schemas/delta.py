@@ -121,13 +121,33 @@ TABLES = (
             Column("poses", "int64", "poses used"),
             Column("equations", NUMBER, "numbers that are fitted", True),
             Column("rank", NUMBER, "combinations of the three zero errors that they see", True),
-            Column("condition", NUMBER, "largest over smallest singular value", True),
+            Column(
+                "condition",
+                NUMBER,
+                "largest over smallest singular value of the Jacobian by the zero errors, rows brought to independent noise of one axis each "
+                "(for the paper's step too, which itself counts all distances alike)",
+                True,
+            ),
             Column("residual_rms_mm", NUMBER, "RMS of what the fit leaves", True),
-            Column("noise_mm", NUMBER, "noise of one axis estimated from it; length errors count as noise here", True),
+            Column(
+                "noise_mm",
+                NUMBER,
+                "noise of one axis estimated from it, taken as alike along all axes (optical centres' is larger along the target than across); "
+                "length errors count as noise here",
+                True,
+            ),
             *_per_drive("true", "true zero error"),
             *_per_drive("found", "zero error found"),
             *_per_drive("error", "found less true zero error"),
-            *_per_drive("standard_error", "standard error from the residuals; length errors are systematic and may exceed it: zero error"),
+            *_per_drive(
+                "standard_error",
+                "standard error from noise_mm as if the lengths were exact, the first pose's noise in all distances counted: zero error",
+            ),
+            *_per_drive(
+                "length_error",
+                "1 sigma by which unknown length errors of all legs (`delta.length_error_mm`) move what is found, beside the standard error: "
+                "zero error",
+            ),
             *(
                 Column(f"{frame}_{kind}_mm", NUMBER, f"{text} error on the plane, {where}")
                 for frame, where in (("plane", "in the calibration frame, as published"), ("base", "in the frame of the robot's base"))
@@ -146,8 +166,12 @@ TABLES = (
             *(Column(f"weight_{name}", NUMBER, f"share of {name} in the unit direction") for name in _DRIVES),
             Column("common_share", NUMBER, "squared part of the direction in which all drives move alike"),
             Column("kind", "str", "common: that part is more than half", allowed=("common", "differential")),
-            Column("singular_value", NUMBER, "mm that the data change per mm of arc at the end of the drive arm"),
-            Column("standard_error_rad", NUMBER, "of the combination, from the residuals"),
+            Column(
+                "singular_value",
+                NUMBER,
+                "mm of one axis's noise that the data change by per mm of arc at the end of the drive arm, see condition",
+            ),
+            Column("standard_error_rad", NUMBER, "of the combination, as in delta_calibrations"),
             Column(
                 "per_length_rad_mm",
                 NUMBER,
@@ -162,7 +186,8 @@ TABLES = (
     Table(
         "delta_robots",
         "tables/delta_robots.parquet",
-        "The same calibrations on other robots, whose zero and length errors are drawn: mean error on the plane, over the robots.",
+        "The same calibrations on other robots, whose zero and length errors are drawn, with plates and noise as in delta_draws: mean error on "
+        "the plane, over the robots.",
         (
             _VARIANT,
             Column("length_error_mm", NUMBER, "1 sigma of every leg's lengths"),
@@ -174,6 +199,23 @@ TABLES = (
             ),
         ),
         ("variant", "length_error_mm"),
+    ),
+    Table(
+        "delta_draws",
+        "tables/delta_draws.parquet",
+        "The same calibrations of the same robot with everything random drawn anew: dots of the plate, tilted views, noise of the dots' centres "
+        "and of the tracker; dots are projected, not rendered. Percentiles over the draws.",
+        (
+            _VARIANT,
+            Column("draws", "int64", "draws"),
+            *(
+                Column(f"{frame}_{kind}_{label}_mm", NUMBER, f"{share} of the {text} error on the plane, {where}")
+                for frame, where in (("plane", "in the calibration frame"), ("base", "in the frame of the robot's base"))
+                for kind, text in (("mean", "mean"), ("max", "largest"))
+                for label, share in (("low", "5 %"), ("median", "median"), ("high", "95 %"))
+            ),
+        ),
+        ("variant",),
     ),
     Table(
         "delta_points",
