@@ -11,7 +11,7 @@ The part common to the legs, (dLk_1 + dLk_2 + dLk_3) / 3, is the calibration's o
 new. L2 and L3 of one leg act nearly alike, since rho = L2 + sqrt(L3^2 - v^2) tells them apart only where the tangential offset v of the
 platform is large.
 
-A robot with one link per leg (`LinkAsymmetry`) has the three dL3_i only.
+A robot with one link per leg (SLIDER) has the three dL3_i only.
 
 Assumptions: rigid links, constant over the campaign.
 
@@ -35,38 +35,20 @@ _COORDINATES = plain_coordinates(_PARAMETERS, 0.3)
 
 @dataclass(frozen=True)
 class LegAsymmetry:
-    """Link lengths of every leg by themselves."""
+    """Link lengths of every leg by themselves; links: the numbers of those that a leg has."""
 
     name: str = "leg_asymmetry"
     parameters: ParameterSet = _PARAMETERS
     coordinates: Coordinates = _COORDINATES
     needs: tuple = ()
+    links: tuple = _LINKS
 
     def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under dL1, dL2, dL3 of leg 1, then of legs 2 and 3, (9,) in mm."""
+        """Changes (n, 3, 5) of the lengths under dL of the links of leg 1, then of legs 2 and 3, (3 times the links,) in mm."""
         length = np.zeros((len(motion), 3, 5))
-        length[..., 1:4] = np.reshape(values, (3, 3))
+        length[..., self.links] = np.reshape(values, (3, len(self.links)))
         return Contribution(length_mm=length)
 
 
 _ONE_LINK = ParameterSet(tuple(Parameter(f"dL_leg{leg}", "mm", 0.0, -4.0, 4.0, "workshop tolerance, assumed") for leg in LEGS))
-_ONE_LINK_COORDINATES = plain_coordinates(_ONE_LINK, 0.3)
-
-
-@dataclass(frozen=True)
-class LinkAsymmetry:
-    """Length of every leg's one link by itself."""
-
-    name: str = "leg_asymmetry"
-    parameters: ParameterSet = _ONE_LINK
-    coordinates: Coordinates = _ONE_LINK_COORDINATES
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under dL of legs 1 to 3, (3,) in mm."""
-        length = np.zeros((len(motion), 3, 5))
-        length[..., 3] = values
-        return Contribution(length_mm=length)
-
-
-SLIDER = LinkAsymmetry()
+SLIDER = LegAsymmetry(parameters=_ONE_LINK, coordinates=plain_coordinates(_ONE_LINK, 0.3), links=(3,))

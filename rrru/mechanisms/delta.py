@@ -23,7 +23,6 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.mechanisms.three_legs import points
 from rrru.mechanisms.tripod import Tripod
-from rrru.parameters import Parameter, ParameterSet
 
 COLUMNS = ("dtheta_rad", "l1_mm", "l2_mm", "a_mm")
 _LEGS = (1, 2, 3)
@@ -33,7 +32,6 @@ ERROR_NAMES = {
     "tied": (*_DRIVES, "dl1", "dl2", "da"),
     "legs": (*_DRIVES, *(f"dl1_{leg}" for leg in _LEGS), *(f"dl2_{leg}" for leg in _LEGS), *(f"da_{leg}" for leg in _LEGS)),
 }
-_SOURCE = "paper C, 1.1; bounds assumed"
 _KINDS = {"dtheta": 0, "dl1": 1, "dl2": 2, "da": 3}
 
 
@@ -53,12 +51,13 @@ class Delta(Tripod):
     ARM, LINK, OFFSET = 1, 2, 3
     TRACKED = "tied"
 
+    DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
+    ANGLES = ("dtheta",)
+    ERROR_NAMES = ERROR_NAMES
+    SOURCE = "paper C, 1.1; bounds assumed"
+
     def __post_init__(self):
-        for key in ("l1_mm", "l2_mm", "a_mm", "angle_limit_rad", "length_limit_mm"):
-            if not getattr(self, key) > 0.0:
-                raise ConfigError(f"delta: {key} is {getattr(self, key)}; allowed: a positive number")
-        if self.errors not in ERROR_NAMES:
-            raise ConfigError(f"delta: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
+        super().__post_init__()
         if not self.l2_mm > self.a_mm + self.l1_mm:
             raise ConfigError(f"delta: l2_mm is {self.l2_mm}; allowed: more than a_mm + l1_mm, else no pose has level arms")
 
@@ -76,17 +75,6 @@ class Delta(Tripod):
     def origin_depth_mm(self):
         """Depth of the calibration frame's origin below the drive axes: the platform's at zero drive angles."""
         return float(np.sqrt(self.l2_mm**2 - (self.a_mm + self.l1_mm) ** 2))
-
-    @cached_property
-    def parameters(self):
-        """The error parameters: the meaning of every `errors` vector."""
-        return ParameterSet(tuple(self._parameter(name) for name in ERROR_NAMES[self.errors]))
-
-    def _parameter(self, name):
-        """One error parameter, nominally zero."""
-        angle = name.startswith("dtheta")
-        limit = self.angle_limit_rad if angle else self.length_limit_mm
-        return Parameter(name, "rad" if angle else "mm", 0.0, -limit, limit, _SOURCE)
 
     @cached_property
     def leg_map(self):

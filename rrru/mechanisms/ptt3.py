@@ -25,7 +25,6 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.mechanisms.three_legs import points
 from rrru.mechanisms.tripod import Tripod
-from rrru.parameters import Parameter, ParameterSet
 
 COLUMNS = ("db_mm", "L_mm", "a_mm", "azimuth_rad", "rise_rad", "swing_rad")
 _LEGS = (1, 2, 3)
@@ -41,9 +40,7 @@ ERROR_NAMES = {
     "heights": ("da", "dphi1", "dphi2", *_SLIDERS),
     "distances": ("da", "dphi1", "dphi2", *_SLIDERS, *_LINKS),
 }
-_SOURCE = "paper B, 2.2; bounds assumed"
 _KINDS = {"db": 0, "dL": 1, "da": 2, "dphi": 3, "rise": 4, "swing": 5}
-_ANGLES = ("dphi", "rise", "swing")
 
 
 @dataclass(frozen=True)
@@ -68,14 +65,15 @@ class Ptt3(Tripod):
     drive_unit = "mm"
     TRACKED = "tied"
 
+    DIMENSIONS = ("L_mm", "R_mm", "r_mm")
+    ANGLES = ("dphi", "rise", "swing")
+    ERROR_NAMES = ERROR_NAMES
+    SOURCE = "paper B, 2.2; bounds assumed"
+
     def __post_init__(self):
-        for key in ("L_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
-            if not getattr(self, key) > 0.0:
-                raise ConfigError(f"ptt3: {key} is {getattr(self, key)}; allowed: a positive number")
+        super().__post_init__()
         if not 0.0 <= self.rail_inclination_rad <= np.pi / 2.0 + 1e-12:
             raise ConfigError(f"ptt3: rail_inclination_rad is {self.rail_inclination_rad}; allowed: 0 to pi / 2")
-        if self.errors not in ERROR_NAMES:
-            raise ConfigError(f"ptt3: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
 
     @property
     def angle_arm_mm(self):
@@ -86,17 +84,6 @@ class Ptt3(Tripod):
     def lengths_mm(self):
         """Nominal R, L1, L2, L3, r (5,) as effects count them: without arms, the link is the forearm."""
         return np.array([self.R_mm, 0.0, 0.0, self.L_mm, self.r_mm])
-
-    @cached_property
-    def parameters(self):
-        """The error parameters: the meaning of every `errors` vector."""
-        return ParameterSet(tuple(self._parameter(name) for name in ERROR_NAMES[self.errors]))
-
-    def _parameter(self, name):
-        """One error parameter, nominally zero."""
-        angle = name.rstrip("123") in _ANGLES
-        limit = self.angle_limit_rad if angle else self.length_limit_mm
-        return Parameter(name, "rad" if angle else "mm", 0.0, -limit, limit, _SOURCE)
 
     @cached_property
     def leg_map(self):

@@ -7,23 +7,48 @@ The driven end of link i, moved inwards by the platform's radius, is E_i(q_i); t
 which the 3-PTT and the rotary Delta have in common. z points up and the platform hangs below. Lengths in mm, angles in rad.
 """
 
+from functools import cached_property
+
 import numpy as np
 
+from rrru.errors import ConfigError
 from rrru.mechanisms.spheres import lower_intersection
 from rrru.mechanisms.three_legs import ThreeLegs, points
+from rrru.parameters import Parameter, ParameterSet
 
 ELBOW_SIGN = {"out": 1.0, "in": -1.0}
 
 
 class Tripod(ThreeLegs):
-    """Base of these mechanisms: they add `inverse_of_legs`, `ends`, `end_rates`, `levers`, and the columns of the legs' numbers
+    """Base of these mechanisms: they add ERROR_NAMES, `inverse_of_legs`, `ends`, `end_rates`, `levers`, and the columns of the legs' numbers
     that hold the link (LINK), the driven arm (ARM, None without one) and R - r (OFFSET).
     """
 
     LINK = OFFSET = 0
     ARM = None
+    # nominal dimensions, kinds of error parameters that are angles, and where the parameters come from
+    DIMENSIONS = ANGLES = ()
+    SOURCE = ""
     # unit of an actuator value
     drive_unit = "rad"
+
+    def __post_init__(self):
+        for key in (*self.DIMENSIONS, "angle_limit_rad", "length_limit_mm"):
+            if not getattr(self, key) > 0.0:
+                raise ConfigError(f"{self.name}: {key} is {getattr(self, key)}; allowed: a positive number")
+        if self.errors not in self.ERROR_NAMES:
+            raise ConfigError(f"{self.name}: errors is {self.errors!r}; allowed: {', '.join(self.ERROR_NAMES)}")
+
+    @cached_property
+    def parameters(self):
+        """The error parameters, nominally zero: the meaning of every `errors` vector."""
+        return ParameterSet(tuple(self._parameter(name) for name in self.ERROR_NAMES[self.errors]))
+
+    def _parameter(self, name):
+        """One error parameter."""
+        angle = name.rstrip("123") in self.ANGLES
+        limit = self.angle_limit_rad if angle else self.length_limit_mm
+        return Parameter(name, "rad" if angle else "mm", 0.0, -limit, limit, self.SOURCE)
 
     @property
     def radial(self):

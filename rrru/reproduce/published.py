@@ -5,7 +5,7 @@ import pandas as pd
 
 from rrru.mechanisms.rrru3 import ERROR_NAMES
 from rrru.reproduce import paper_a
-from rrru.reproduce.published_sisters import sister_rows
+from rrru.reproduce.published_sisters import row, sister_rows
 from rrru.reproduce.study_numbers import TRAJECTORIES, group_orders, study_numbers
 
 _COLUMNS = ["paper", "item", "source", "unit", "published", "here", "ratio", "here_low", "here_high", "note"]
@@ -30,23 +30,7 @@ def published_table(config, errors, calibrations, parameters, genetic, sweep_run
         | _objective(calibrations, genetic, reproduce)
     )
     notes, spread = _notes(genetic, reproduce), spread or {}
-    rows = []
-    for number in paper_a.NUMBERS:
-        value = here.get(number.item, np.nan)
-        rows.append(
-            {
-                "paper": "A",
-                "item": number.item,
-                "source": number.source,
-                "unit": number.unit,
-                "published": number.value,
-                "here": value,
-                "ratio": value / number.value if number.value else np.nan,
-                "here_low": spread.get(number.item, (np.nan, np.nan))[0],
-                "here_high": spread.get(number.item, (np.nan, np.nan))[1],
-                "note": "; ".join(text for text in (number.note, notes.get(number.item, "")) if text),
-            }
-        )
+    rows = [row("A", number, here, spread, notes.get(number.item, "")) for number in paper_a.NUMBERS]
     return pd.concat([pd.DataFrame(rows), _orders(before, lines), pd.DataFrame(sister_rows(sisters, sister_spread))], ignore_index=True)
 
 

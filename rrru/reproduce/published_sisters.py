@@ -9,6 +9,24 @@ from rrru.reproduce import paper_b, paper_c
 NUMBERS = {"B": paper_b.NUMBERS, "C": paper_c.NUMBERS}
 
 
+def row(paper, number, here, spread, note=""):
+    """Row of `published` for a printed number; here, spread: item to this study's number and to its (low, high), null for what is absent."""
+    value = here.get(number.item, np.nan)
+    low, high = spread.get(number.item, (np.nan, np.nan))
+    return {
+        "paper": paper,
+        "item": number.item,
+        "source": number.source,
+        "unit": number.unit,
+        "published": number.value,
+        "here": value,
+        "ratio": value / number.value if number.value else np.nan,
+        "here_low": low,
+        "here_high": high,
+        "note": "; ".join(text for text in (number.note, note) if text),
+    }
+
+
 def sister_rows(here=None, spread=None):
     """Rows of `published` of papers B and C, null for what is absent.
 
@@ -22,23 +40,7 @@ def sister_rows(here=None, spread=None):
         unknown = sorted(set(own) - {number.item for number in numbers})
         if unknown:
             raise ConfigError(f"paper {paper} prints no {', '.join(unknown)}; known: {', '.join(number.item for number in numbers)}")
-        for number in numbers:
-            value = own.get(number.item, np.nan)
-            low, high = spread.get(paper, {}).get(number.item, (np.nan, np.nan))
-            rows.append(
-                {
-                    "paper": paper,
-                    "item": number.item,
-                    "source": number.source,
-                    "unit": number.unit,
-                    "published": number.value,
-                    "here": value,
-                    "ratio": value / number.value if number.value else np.nan,
-                    "here_low": low,
-                    "here_high": high,
-                    "note": number.note,
-                }
-            )
+        rows += [row(paper, number, own, spread.get(paper, {})) for number in numbers]
     return rows
 
 

@@ -1,5 +1,6 @@
+from rrru.method_study.benches import ROBOTS as METHOD_ROBOTS
+
 METHOD_TABLES = ["methods", "method_points"]
-METHOD_ROBOTS = ["rrru3", "ptt3", "delta"]
 
 
 # path of one robot's part of a table of the comparison
