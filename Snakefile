@@ -1,7 +1,7 @@
 from snakemake.utils import min_version, validate
 
-from rrru.ptt_study.robot import check as check_ptt
-from rrru.study import check
+from rrru.studies.ptt3.experiments import check as check_ptt
+from rrru.studies.setup import check
 
 min_version("9.0")
 

@@ -1,4 +1,5 @@
-"""Seconds and right answers of the gap diagnosis, beside what one would do instead: linear signatures of single effects and the BIC.
+"""Seconds and right answers of the gap diagnosis, beside what one would do instead: linear signatures of single effects
+and the BIC.
 
 `.venv/bin/python benchmarks/diagnosis.py` on robots of the withheld check, one after another in one run on one core.
 """
@@ -11,15 +12,17 @@ import numpy as np
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import make_case
 from rrru.gap.diagnose import GapSettings, diagnose, sim
-from rrru.mechanisms.dynamics import Masses
-from rrru.withheld.draw import draw_labelled
-from rrru.withheld.robots import NOISE_MM, measure, nominal, truth_of
+from rrru.robots.dynamics import Masses
+from rrru.studies.withheld.draw import draw_labelled
+from rrru.studies.withheld.robots import NOISE_MM, measure, nominal, truth_of
 
 _SEED = 2021
 
 
 def plain(measurements, mechanism, settings):
-    """Name of the effect of lowest BIC, none or unexplained: each effect's linear columns beside the calibration's, noise known."""
+    """Name of the effect of lowest BIC, none or unexplained: each effect's linear columns beside the calibration's,
+    noise known.
+    """
     case = make_case(measurements, sim(mechanism), Masses(), NOISE_MM, settings.library())
     linear = case.linearise(calibrate(case))
     data, base = linear.data.ravel() / NOISE_MM, linear.base.reshape(-1, 7) / NOISE_MM
@@ -51,10 +54,16 @@ def main(count=40):
                 seconds[name].append((len(measurements), perf_counter() - start))
             same = set(answers[name].split("+")) == set(truth.split("+"))
             right[name] += same or (truth.startswith("outside") and "unexplained" in answers[name])
-        print(f"{len(measurements):4d} points  {truth:45s} here: {answers['here']:45s} plain: {answers['plain']}", flush=True)
+        print(
+            f"{len(measurements):4d} points  {truth:45s} here: {answers['here']:45s} plain: {answers['plain']}",
+            flush=True,
+        )
     for name, times in seconds.items():
         print(f"{name}: right {right[name]} of {count}")
-        for size, chosen in (("up to 400 points", [t for n, t in times if n <= 400]), ("more", [t for n, t in times if n > 400])):
+        for size, chosen in (
+            ("up to 400 points", [t for n, t in times if n <= 400]),
+            ("more", [t for n, t in times if n > 400]),
+        ):
             if chosen:
                 print(f"  {size}: median {np.median(chosen):.2f} s, longest {max(chosen):.2f} s")
 

@@ -1,7 +1,7 @@
 """Times the paper's genetic algorithm, and PyGAD with its own operators on the same task, side by side.
 
-Task: paper A's seven lines (182 points) and its first (26), 8 errors, population 30, measured with Table 5's errors and 0.3 mm of noise.
-Run: python benchmarks/genetic.py
+Task: paper A's seven lines (182 points) and its first (26), 8 errors, population 30, measured with Table 5's errors and
+0.3 mm of noise. Run: python benchmarks/genetic.py
 """
 
 import time
@@ -9,9 +9,9 @@ import time
 import numpy as np
 import pygad
 
-from rrru.calibrate.genetic import GeneticSettings, minimise
-from rrru.calibrate.residuals import Residuals
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.fit.residuals import Residuals
+from rrru.genetic.algorithm import GeneticSettings, minimise
+from rrru.robots.rrru3 import Rrru3
 
 TABLE_5_RAD = {"dtheta1": 0.0012, "dtheta2": -0.0003, "dtheta3": 0.0003}
 TABLE_5_MM = {"dL1": 0.3092, "dL2": 0.2405, "dL3": -0.1761, "dR": -1.209, "dr": 0.8865}
@@ -30,7 +30,9 @@ def task(sides_mm):
 
 
 def builtin(objective, low, high, seed, **options):
-    """Best objective and generations of PyGAD's own operators at their nearest to the paper's; `options` go to PyGAD."""
+    """Best objective and generations of PyGAD's own operators at their nearest to the paper's; `options` go to
+    PyGAD.
+    """
     ga = pygad.GA(
         num_generations=GENERATIONS,
         num_parents_mating=POPULATION,
@@ -64,7 +66,11 @@ def timed(run, *arguments, **settings):
     start = time.perf_counter()
     found = [run(*arguments, seed, **settings) for seed in SEEDS]
     seconds = time.perf_counter() - start
-    return seconds / len(SEEDS), seconds / sum(generations for _, generations in found), float(np.median([best for best, _ in found]))
+    return (
+        seconds / len(SEEDS),
+        seconds / sum(generations for _, generations in found),
+        float(np.median([best for best, _ in found])),
+    )
 
 
 def main():

@@ -1,4 +1,5 @@
-"""Pose solves per second of the calibration's objective, beside a loop over scipy.optimize.fsolve, in one run on one core.
+"""Pose solves per second of the calibration's objective, beside a loop over scipy.optimize.fsolve, in one run on one
+core.
 
 `.venv/bin/python benchmarks/objective.py`
 """
@@ -8,9 +9,9 @@ from time import perf_counter
 import numpy as np
 from scipy.optimize import fsolve
 
-from rrru.calibrate.residuals import Residuals
 from rrru.campaign.trajectories import line_groups, sample
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.fit.residuals import Residuals
+from rrru.robots.rrru3 import Rrru3
 
 _POPULATION = 30
 
@@ -26,7 +27,9 @@ def _campaign():
 
 
 def _fsolve_rate(residuals, errors, count):
-    """Pose solves per second of fsolve on eq. (8), written out in plain numpy as a user would, and the positions (count, 3)."""
+    """Pose solves per second of fsolve on eq. (8), written out in plain numpy as a user would, and the positions
+    (count, 3).
+    """
     legs, (cx, cy) = residuals.mechanism.legs(errors), residuals.mechanism.turn
 
     def closure(p, theta):
@@ -37,7 +40,10 @@ def _fsolve_rate(residuals, errors, count):
         return x * x + z * z - (legs[:, 2] + np.sqrt(legs[:, 3] ** 2 - v * v)) ** 2
 
     start = perf_counter()
-    positions = [fsolve(closure, g, args=(t,)) for t, g in zip(residuals.actuators[:count], residuals.start_mm[:count], strict=True)]
+    positions = [
+        fsolve(closure, g, args=(t,))
+        for t, g in zip(residuals.actuators[:count], residuals.start_mm[:count], strict=True)
+    ]
     return count / (perf_counter() - start), np.array(positions)
 
 
@@ -55,7 +61,9 @@ def main():
         ours = repeats * _POPULATION * len(residuals) / (perf_counter() - start)
         theirs, positions = _fsolve_rate(residuals, errors[0], len(residuals))
         apart = np.abs(positions - residuals.model(errors[0])).max()
-        print(f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, positions apart {apart:.1e} mm")
+        print(
+            f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, positions apart {apart:.1e} mm"
+        )
 
 
 if __name__ == "__main__":

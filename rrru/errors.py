@@ -12,8 +12,8 @@ class ConfigError(RrruError):
 class IngestError(RrruError):
     """A measurement file is refused.
 
-    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number of the data row,
-    counted from 1 below the header, or None where the whole file or column is meant.
+    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number of the
+    data row, counted from 1 below the header, or None where the whole file or column is meant.
     """
 
     def __init__(self, problems):

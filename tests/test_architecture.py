@@ -1,42 +1,33 @@
 """Imports point one way, and only the named files know the named libraries."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-_ROOT = Path(__file__).resolve().parents[1]
+from tests.places import ROOT
+
+_ROOT = ROOT
 _FLOORS = {
     "errors": 1,
     "seeds": 1,
     "parameters": 2,
-    "mechanisms": 3,
+    "robots": 3,
     "effects": 4,
     "campaign": 4,
-    "calibrate": 5,
     "plant": 5,
-    "compensate": 6,
-    "gap": 6,
-    "withheld": 7,
-    "ptt_study": 7,
-    "reproduce": 7,
-    "study": 7,
-    "delta_study": 7,
-    "method_study": 8,
-    "report": 0,
+    "fit": 6,
+    "genetic": 7,
+    "compensate": 7,
+    "gap": 7,
+    "studies": 8,
 }
-_SIBLINGS = {
-    ("effects", "campaign"),
-    ("campaign", "effects"),
-    ("calibrate", "plant"),
-    ("plant", "calibrate"),
-    ("reproduce", "study"),
-    ("delta_study", "study"),
-}
+# tables in, figures out: they import none of the computing packages
+_APART = {"store": {"errors"}, "figures": {"errors", "store"}}
+_DRAWING = {p.relative_to(_ROOT).as_posix() for p in (_ROOT / "rrru").rglob("*.py") if "figures" in str(p)}
 _LIBRARIES = {
-    "pygad": {"rrru/calibrate/genetic.py"},
-    "matplotlib": {p.relative_to(_ROOT).as_posix() for p in (_ROOT / "rrru/report/figures").glob("*.py")},
-    "cv2": {"rrru/plant/camera.py", "rrru/calibrate/vision.py"},
+    "pygad": {"rrru/genetic/algorithm.py"},
+    "matplotlib": _DRAWING,
+    "cv2": {"rrru/plant/camera.py", "rrru/studies/delta/vision.py"},
     "snakemake": set(),
 }
 _FILES = sorted((_ROOT / "rrru").rglob("*.py"))
@@ -51,17 +42,18 @@ def _imports(path):
 
 
 @pytest.mark.parametrize("path", _FILES, ids=lambda p: p.relative_to(_ROOT).as_posix())
-def test_a_room_uses_only_rooms_below_it(path):
-    room = path.relative_to(_ROOT / "rrru").parts[0].removesuffix(".py")
-    if room == "__init__":
+def test_a_package_uses_only_packages_below_it(path):
+    package = path.relative_to(_ROOT / "rrru").parts[0].removesuffix(".py")
+    if package == "__init__":
         return
     for name in _imports(path):
         parts = name.split(".")
-        if parts[0] != "rrru" or len(parts) < 2 or parts[1] == room:
+        if parts[0] != "rrru" or len(parts) < 2 or parts[1] == package or parts[1] in _APART:
             continue
-        other = parts[1]
-        allowed = other in ("errors",) if room == "report" else _FLOORS[other] != 0 and _FLOORS[other] <= _FLOORS[room]
-        assert allowed and (room, other) not in _SIBLINGS, f"{room} imports {name}"
+        if package in _APART:
+            assert parts[1] in _APART[package], f"{path} imports {name}"
+        else:
+            assert _FLOORS[parts[1]] < _FLOORS[package], f"{path} imports {name}"
 
 
 @pytest.mark.parametrize("library", _LIBRARIES)
@@ -74,7 +66,11 @@ def test_nobody_uses_global_random_state():
     """Only generators: no numpy.random function but default_rng, SeedSequence and Generator."""
     for path in _FILES:
         for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute) and node.value.attr == "random":
+            if (
+                isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Attribute)
+                and node.value.attr == "random"
+            ):
                 assert node.attr in ("default_rng", "SeedSequence", "Generator"), f"{path}: np.random.{node.attr}"
             if isinstance(node, ast.Import):
                 assert "random" not in [alias.name for alias in node.names], path

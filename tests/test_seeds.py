@@ -15,7 +15,14 @@ def test_seeds_are_the_digest_of_their_labels():
 
 
 def test_seeds_differ_for_all_that_differs_and_only_for_that():
-    labels = [(s, p, k, v, n) for s in (0, 1) for p in ("a", "b") for k in ("one", "islands") for v in (0.1, 0.2, 1.0) for n in range(20)]
+    labels = [
+        (s, p, k, v, n)
+        for s in (0, 1)
+        for p in ("a", "b")
+        for k in ("one", "islands")
+        for v in (0.1, 0.2, 1.0)
+        for n in range(20)
+    ]
     assert len({stream_seed(*label) for label in labels}) == len({run_seed(*label) for label in labels}) == len(labels)
     assert all(0 <= run_seed(*label) < 2**32 for label in labels)
     assert run_seed(0, 0.1 + 0.2) == run_seed(0, 0.3) == run_seed(0, np.float64(0.3))

@@ -47,8 +47,8 @@ def usable(measurements, use_near_singularity=True):
 def repeat_noise(measurements):
     """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
 
-    Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where nothing
-    repeats. What moves the robot from pass to pass counts as noise here.
+    Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
+    nothing repeats. What moves the robot from pass to pass counts as noise here.
     """
     frame = measurements.loc[usable(measurements)].copy()
     axes = [f"measured_{axis}_mm" for axis in "xyz"]
@@ -75,6 +75,8 @@ def direction(measurements):
 
 
 def mark_near_singularity(measurements, constraint_measure, margin):
-    """The table with status "near_singularity" where the measure (n,) is below the margin and the point is otherwise fine."""
+    """The table with status "near_singularity" where the measure (n,) is below the margin and the point is otherwise
+    fine.
+    """
     near = (measurements["status"] == "ok") & (np.asarray(constraint_measure) < margin)
     return measurements.assign(status=measurements["status"].where(~near, "near_singularity"))

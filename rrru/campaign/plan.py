@@ -1,4 +1,5 @@
-"""What the robot is told to do: runs along trajectories, with time stamps, speed, payload and the path between the sampled points.
+"""What the robot is told to do: runs along trajectories, with time stamps, speed, payload and the path between the
+sampled points.
 
 Lengths in mm, times in s, angles in rad.
 """
@@ -10,7 +11,7 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 
 from rrru.campaign.measurements import actuator_columns
-from rrru.campaign.motion import Trapezoid
+from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import sample
 
 # Points of the path between two sampled points: enough for a drive that turns back between them to be seen by the play.
@@ -78,7 +79,8 @@ class Plan:
         return np.concatenate([run.points_mm for run in self.runs])
 
     def path(self):
-        """Positions (N, 3) along everything that is driven, transfers between runs included, and the rows (n,) of the sampled points.
+        """Positions (N, 3) along everything that is driven, transfers between runs included, and the rows (n,) of the
+        sampled points.
 
         # ASSUME the robot goes straight from the end of a run to the start of the next.
         """
@@ -125,8 +127,8 @@ def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse
 def make_plan(trajectories, passes, speed_mm_s, acceleration_mm_s2, dwell_s):
     """Plan of a campaign: every pass drives its trajectories one after another.
 
-    passes: mappings with the keys `reverse`, `speed_mm_s` and `acceleration_mm_s2` (absent: the campaign's), `payload_kg` and `trajectories`
-    (absent: all).
+    passes: mappings with the keys `reverse`, `speed_mm_s` and `acceleration_mm_s2` (absent: the campaign's),
+    `payload_kg` and `trajectories` (absent: all).
     """
     by_name = {trajectory.name: trajectory for trajectory in trajectories}
     runs = []

@@ -45,7 +45,9 @@ class Spiral:
     def __post_init__(self):
         _require_count(self.name, self.count)
         if not self.turns > 0.0 or min(self.radius_mm) < 0.0 or max(self.radius_mm) == 0.0:
-            raise ConfigError(f"trajectory {self.name}: turns {self.turns} and radius_mm {tuple(self.radius_mm)}; allowed: positive")
+            raise ConfigError(
+                f"trajectory {self.name}: turns {self.turns} and radius_mm {tuple(self.radius_mm)}; allowed: positive"
+            )
 
     def curve(self, share):
         """Positions (n, 3) in mm at shares (n,) of the curve's parameter, 0 at the start and 1 at the end."""
@@ -53,7 +55,9 @@ class Spiral:
         angle = np.radians(self.start_deg) + 2.0 * np.pi * self.turns * share
         radius = self.radius_mm[0] + share * (self.radius_mm[1] - self.radius_mm[0])
         height = self.z_mm[0] + share * (self.z_mm[1] - self.z_mm[0])
-        return np.stack([self.centre_mm[0] + radius * np.cos(angle), self.centre_mm[1] + radius * np.sin(angle), height], axis=-1)
+        return np.stack(
+            [self.centre_mm[0] + radius * np.cos(angle), self.centre_mm[1] + radius * np.sin(angle), height], axis=-1
+        )
 
 
 def sample(trajectory):

@@ -1,4 +1,6 @@
-"""Backlash of screws: measured, compensated, and what that does to the repeatability (paper B, 3.1.1). Lengths in mm."""
+"""Backlash of screws: measured, compensated, and what that does to the repeatability (paper B, 3.1.1). Lengths in
+mm.
+"""
 
 from dataclasses import dataclass
 
@@ -7,7 +9,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Width:
-    """A screw's backlash: the mean, the two differences of directions that it is the mean of, and its standard error, all in mm."""
+    """A screw's backlash: the mean, the two differences of directions that it is the mean of, and its standard error,
+    all in mm.
+    """
 
     mean_mm: float
     first_mm: float
@@ -18,11 +22,14 @@ class Width:
 def measured_width(record, lead_mm):
     """Width from a bench's record (`rrru.plant.screw.encoder_record`), eq. (19).
 
-    # ASSUME the body of eq. (19) is lost. Our reading: at the same commanded place the carriage stands by the width further back on the way
-    forwards than on the way back, so that e_1 = mean(y_reverse - y_forward_1), e_2 = mean(y_reverse - y_forward_2) over the places of the
-    passes, e = (e_1 + e_2) / 2. Places within one turn of a turning point are left out: the play is being taken up there.
+    # ASSUME the body of eq. (19) is lost. Our reading: at the same commanded place the carriage stands by the width
+    further back on the way forwards than on the way back, so that e_1 = mean(y_reverse - y_forward_1), e_2 =
+    mean(y_reverse - y_forward_2) over the places of the passes, e = (e_1 + e_2) / 2. Places within one turn of a
+    turning point are left out: the play is being taken up there.
     """
-    places = record.pivot_table(index=record["commanded_mm"].round(6), columns="pass", values="encoder_mm", aggfunc="first").dropna()
+    places = record.pivot_table(
+        index=record["commanded_mm"].round(6), columns="pass", values="encoder_mm", aggfunc="first"
+    ).dropna()
     at = places.index.to_numpy()
     inner = places[(at > at.min() + lead_mm) & (at < at.max() - lead_mm)]
     differences = [(inner["reverse"] - inner[name]).to_numpy() for name in ("forward_1", "forward_2")]
@@ -32,7 +39,8 @@ def measured_width(record, lead_mm):
 
 
 def compensated(values_mm, widths_mm):
-    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: half the play ahead, jumping by all of it at a reversal.
+    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: half the play ahead, jumping by all of it
+    at a reversal.
 
     A slider that stands keeps the side it came from; before its first move, the side of that move.
     """
@@ -48,10 +56,11 @@ def compensated(values_mm, widths_mm):
 
 
 def repeatability(values_mm):
-    """Scatter (3,) in mm of slider positions (k repeats, n places, 3) about each place's mean, 1 sigma, and the travel K (3,) they cover.
+    """Scatter (3,) in mm of slider positions (k repeats, n places, 3) about each place's mean, 1 sigma, and the travel
+    K (3,) they cover.
 
-    # ASSUME eq. (20) and Fig. 8 are lost: sigma is the standard deviation over the repeats pooled over the places, K the stretch between the
-    slider's outermost places; the paper's measure is their ratio.
+    # ASSUME eq. (20) and Fig. 8 are lost: sigma is the standard deviation over the repeats pooled over the places, K
+    the stretch between the slider's outermost places; the paper's measure is their ratio.
     """
     values = np.asarray(values_mm, dtype=float)
     deviation = values - values.mean(axis=0)

@@ -1,4 +1,5 @@
-"""Errors of every trajectory under every calibration: as the model predicts them, and driven again with corrected commands.
+"""Errors of every trajectory under every calibration: as the model predicts them, and driven again with corrected
+commands.
 
 Lengths in mm, angles in rad.
 """
@@ -21,19 +22,26 @@ def before(measurements):
 
 
 def model_residual(measurements, mechanism, errors, calibration, method):
-    """Rows of `errors` in mode "model": measured position minus the one that the calibrated model gives for the angles that were sent."""
+    """Rows of `errors` in mode "model": measured position minus the one that the calibrated model gives for the angles
+    that were sent.
+    """
     model = mechanism.forward(rows.actuators(measurements), errors, rows.command(measurements))
     return _rows(measurements, rows.measured(measurements) - model, calibration, method, "model")
 
 
 def closed_loop(robot, plan, errors, noise_mm, generator, calibration, method):
-    """Rows of `errors` in mode "closed_loop": the controller corrects its commands, the virtual robot drives them and is measured again.
+    """Rows of `errors` in mode "closed_loop": the controller corrects its commands, the virtual robot drives them and
+    is measured again.
 
     The corrected angles are those with which the calibrated model lands on the target.
     """
     mechanism = robot.mechanism
-    measurements, _ = robot.run(plan, noise_mm, generator, controller=lambda position: mechanism.inverse(position, errors))
-    return _rows(measurements, rows.measured(measurements) - rows.command(measurements), calibration, method, "closed_loop")
+    measurements, _ = robot.run(
+        plan, noise_mm, generator, controller=lambda position: mechanism.inverse(position, errors)
+    )
+    return _rows(
+        measurements, rows.measured(measurements) - rows.command(measurements), calibration, method, "closed_loop"
+    )
 
 
 def _rows(measurements, error, calibration, method, mode):
@@ -49,7 +57,8 @@ def _rows(measurements, error, calibration, method, mode):
 
 
 def summarise(errors, measurements):
-    """Rows of `error_summary`: minimum, mean, RMS and maximum, and accuracies after ISO 9283, per calibration and trajectory.
+    """Rows of `error_summary`: minimum, mean, RMS and maximum, and accuracies after ISO 9283, per calibration and
+    trajectory.
 
     errors: rows of `errors` of one campaign; besides every trajectory the groups "all_lines" and "all" are summed up.
     """
@@ -86,7 +95,9 @@ def _statistics(part):
 
 
 def _path_geometry(measurements):
-    """Per run and point: unit tangent of the commanded path, the commanded position as a key and the direction of motion."""
+    """Per run and point: unit tangent of the commanded path, the commanded position as a key and the direction of
+    motion.
+    """
     frames = []
     position = rows.command(measurements)
     side = rows.direction(measurements)
@@ -109,11 +120,13 @@ def _path_geometry(measurements):
 
 
 def _iso_9283(part):
-    """Accuracies after ISO 9283, from points passed `repeats` times under the same conditions (null where none was measured).
+    """Accuracies after ISO 9283, from points passed `repeats` times under the same conditions (null where none was
+    measured).
 
-    pose_accuracy_mm: largest distance between commanded position and barycentre of the attained ones (AP). path_accuracy_mm: the same across
-    the path only (AT: the standard compares in the plane normal to the commanded path). repeatability_mm: largest l + 3 S_l about
-    the barycentre (RP), null with fewer than three repeats. In mode "model" the model's position stands for the commanded one.
+    pose_accuracy_mm: largest distance between commanded position and barycentre of the attained ones (AP).
+    path_accuracy_mm: the same across the path only (AT: the standard compares in the plane normal to the commanded
+    path). repeatability_mm: largest l + 3 S_l about the barycentre (RP), null with fewer than three repeats. In mode
+    "model" the model's position stands for the commanded one.
     """
     axes = [f"error_{axis}_mm" for axis in "xyz"]
     part = part.dropna(subset=axes).reset_index(drop=True)
@@ -130,5 +143,7 @@ def _iso_9283(part):
         "repeats": repeats,
         "pose_accuracy_mm": np.linalg.norm(barycentre, axis=1).max(),
         "path_accuracy_mm": np.linalg.norm(across, axis=1).max(),
-        "repeatability_mm": (distance.mean() + 3.0 * distance.std(ddof=1)).max() if repeats >= _FEWEST_REPEATS else np.nan,
+        "repeatability_mm": (distance.mean() + 3.0 * distance.std(ddof=1)).max()
+        if repeats >= _FEWEST_REPEATS
+        else np.nan,
     }

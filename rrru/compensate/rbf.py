@@ -1,14 +1,16 @@
 """Radial basis network that learns a correction of the position from measured points (paper B, 2.4). Lengths in mm.
 
-A hidden neuron answers with a Gaussian of the distance from its centre, the output is a weighted sum and a threshold (eqs. 14, 15, 17):
+A hidden neuron answers with a Gaussian of the distance from its centre, the output is a weighted sum and a threshold
+(eqs. 14, 15, 17):
 
     h_k(x) = exp(-ln 2 (|x - c_k| / S)^2),    y(x) = sum_k h_k(x) w_k + theta
 
-# ASSUME the spread S is the distance at which a neuron's answer has fallen to one half, as in MATLAB's `newrb`; the scan has lost eq. (14).
-Centres are training points, taken one by one, each time the one that lowers the error most: orthogonal least squares (Chen, Cowan and Grant,
-IEEE Transactions on Neural Networks 2, 1991). The weights are those of least squares; eq. (16) goes down to the same minimum step by step.
-The paper's network answers with the corrected position p - dp; here it answers with dp alone, so that narrow Gaussians need not add up to the
-straight line p (the table ptt_training follows both).
+# ASSUME the spread S is the distance at which a neuron's answer has fallen to one half, as in MATLAB's `newrb`; the
+scan has lost eq. (14). Centres are training points, taken one by one, each time the one that lowers the error most:
+orthogonal least squares (Chen, Cowan and Grant, IEEE Transactions on Neural Networks 2, 1991). The weights are those of
+least squares; eq. (16) goes down to the same minimum step by step. The paper's network answers with the corrected
+position p - dp; here it answers with dp alone, so that narrow Gaussians need not add up to the straight line p (the
+table ptt_training follows both).
 """
 
 from dataclasses import dataclass
@@ -36,7 +38,9 @@ class Network:
 
 @dataclass(frozen=True)
 class Growth:
-    """Neurons in the order taken (k,), rows of the training points, and mean squared errors (k + 1,), without a neuron first."""
+    """Neurons in the order taken (k,), rows of the training points, and mean squared errors (k + 1,), without a neuron
+    first.
+    """
 
     order: np.ndarray
     train_mse: np.ndarray
@@ -44,22 +48,27 @@ class Growth:
 
 
 def answers(points_mm, centres_mm, spread_mm):
-    """Answers (n, k) of Gaussian neurons with centres (k, 3) at points (n, 3): one half at the distance of the spread."""
+    """Answers (n, k) of Gaussian neurons with centres (k, 3) at points (n, 3): one half at the distance of the
+    spread.
+    """
     return np.exp(-np.log(2.0) * cdist(points_mm, centres_mm, "sqeuclidean") / spread_mm**2)
 
 
 def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=None, check_targets=None):
-    """Growth on training points (n, 3) and targets (n, q), up to a number of neurons; stops early where no neuron adds anything.
+    """Growth on training points (n, 3) and targets (n, q), up to a number of neurons; stops early where no neuron adds
+    anything.
 
-    new_share: share of a neuron's squared answers that the neurons before it must not give as well. What is hardly new gets a huge weight,
-    which others cancel at the training points and nowhere else. check_mm (m, 3), check_targets (m, q): points that are not trained on, whose
-    error is followed as well; NaN without them.
+    new_share: share of a neuron's squared answers that the neurons before it must not give as well. What is hardly new
+    gets a huge weight, which others cancel at the training points and nowhere else. check_mm (m, 3), check_targets (m,
+    q): points that are not trained on, whose error is followed as well; NaN without them.
     """
     check_mm = np.empty((0, 3)) if check_mm is None else check_mm
     every = answers(np.concatenate([points_mm, check_mm]), points_mm, spread_mm)
     train = len(points_mm)
     basis, size = every - every[:train].mean(axis=0), (every[:train] ** 2).sum(axis=0)
-    rest = np.concatenate([targets, np.empty((0, targets.shape[1])) if check_targets is None else check_targets]) - targets.mean(axis=0)
+    rest = np.concatenate(
+        [targets, np.empty((0, targets.shape[1])) if check_targets is None else check_targets]
+    ) - targets.mean(axis=0)
     # what of every neuron's answers is new beside those taken, squared
     new, taken = (basis[:train] ** 2).sum(axis=0), np.empty((neurons, len(every)))
     order, errors = [], [_split_mse(rest, train)]
@@ -85,7 +94,9 @@ def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=No
 
 
 def fit(points_mm, targets, spread_mm, order):
-    """Network whose centres are the rows `order` of the points (n, 3), with the weights that fit the targets (n, q) best."""
+    """Network whose centres are the rows `order` of the points (n, 3), with the weights that fit the targets (n, q)
+    best.
+    """
     centres = points_mm[order]
     design = answers(points_mm, centres, spread_mm)
     mean, level = design.mean(axis=0), targets.mean(axis=0)
@@ -94,14 +105,17 @@ def fit(points_mm, targets, spread_mm, order):
 
 
 def validation_mse(points_mm, targets, spread_mm, neurons, folds, new_share=ROUNDING):
-    """Cross-validated mean squared error (neurons + 1,) after every neuron; folds (n,): the fold that holds each point back.
+    """Cross-validated mean squared error (neurons + 1,) after every neuron; folds (n,): the fold that holds each point
+    back.
 
     A fold that runs out of neurons keeps its last error.
     """
     result = np.zeros(neurons + 1)
     for fold in np.unique(folds):
         out = folds == fold
-        curve = grow(points_mm[~out], targets[~out], spread_mm, neurons, new_share, points_mm[out], targets[out]).check_mse
+        curve = grow(
+            points_mm[~out], targets[~out], spread_mm, neurons, new_share, points_mm[out], targets[out]
+        ).check_mse
         result += out.mean() * np.pad(curve, (0, neurons + 1 - len(curve)), mode="edge")
     return result
 

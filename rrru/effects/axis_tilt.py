@@ -1,32 +1,37 @@
 """Axis tilt: a drive axis that is neither tangential nor horizontal.
 
-In the frame of leg k (x radial, y tangential, z down) the drive axis lies along y. Its seat on the base is turned by the rotation vector
+In the frame of leg k (x radial, y tangential, z down) the drive axis lies along y. Its seat on the base is turned by
+the rotation vector
 
     w_k = (tilt_x_k, 0, tilt_z_k)
 
-about the seat's own place: tilt_x about the radial axis lifts one end of the drive axis, tilt_z about the vertical swings it. The third entry, a
-turn about the drive axis itself, is a constant drive error and belongs to the calibration. It enters as a displacement at the place
-`base`, six numbers.
+about the seat's own place: tilt_x about the radial axis lifts one end of the drive axis, tilt_z about the vertical
+swings it. The third entry, a turn about the drive axis itself, is a constant drive error and belongs to the
+calibration. It enters as a displacement at the place `base`, six numbers.
 
-The whole leg leans with its axis, and its U-joint with it: the platform, which three parallel legs hold upright, turns as well (up to a like
-angle), and more so near a constraint singularity. Eq. (8) does not know of this; the full spatial closure does. To first order
-(`rrru.mechanisms.first_order`) the platform's motion is linear in the tilts.
+The whole leg leans with its axis, and its U-joint with it: the platform, which three parallel legs hold upright, turns
+as well (up to a like angle), and more so near a constraint singularity. Eq. (8) does not know of this; the full spatial
+closure does. To first order (`rrru.robots.first_order`) the platform's motion is linear in the tilts.
 
 Assumptions: rigid seat, constant over the campaign; axes of the other joints parallel to the drive axis as built.
 
-Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Fundamentals of Manipulator Calibration, 1991. Typical size
-assumed: 0.1 mm over a bearing distance of 100 mm.
+Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Fundamentals of Manipulator Calibration,
+1991. Typical size assumed: 0.1 mm over a bearing distance of 100 mm.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
-    tuple(Parameter(f"tilt_{axis}{k}", "rad", 0.0, -0.03, 0.03, "seat of the drive, size assumed") for k in LEGS for axis in "xz")
+    tuple(
+        Parameter(f"tilt_{axis}{k}", "rad", 0.0, -0.03, 0.03, "seat of the drive, size assumed")
+        for k in LEGS
+        for axis in "xz"
+    )
 )
 _COORDINATES = plain_coordinates(_PARAMETERS, 1e-3)
 

@@ -1,23 +1,24 @@
 """Backlash: play between motor and drive arm.
 
-The arm's angle y follows the motor's angle u only when the play of width w is used up (the play operator of hysteresis theory: Krasnosel'skii
-and Pokrovskii, Systems with Hysteresis, 1989, section 2):
+The arm's angle y follows the motor's angle u only when the play of width w is used up (the play operator of hysteresis
+theory: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989, section 2):
 
     y_k = min(max(y_{k-1}, u_k - w / 2), u_k + w / 2),    dtheta_k = y_k - u_k
 
-so it remembers the path, not only the sign of the speed: a drive that turns back by less than w does not move the arm, and one that has turned
-back by more drags it along w / 2 behind. It enters at the drive angle, one width per leg. Where every turn-back is longer than the play, which
-is so for all but a few points of a campaign, the law is linear in w:
+so it remembers the path, not only the sign of the speed: a drive that turns back by less than w does not move the arm,
+and one that has turned back by more drags it along w / 2 behind. It enters at the drive angle, one width per leg. Where
+every turn-back is longer than the play, which is so for all but a few points of a campaign, the law is linear in w:
 
     dtheta = -(w / 2) sign(du)
 
-Assumptions: friction holds the arm within the play, so that neither gravity nor inertia carries it across (a load that never changes its
-sign would hold the arm at one side and make a constant of it); the play starts centred at the first angle of the campaign; motor and path
-are those commanded. Points of the path at which the angle is unknown are passed over.
+Assumptions: friction holds the arm within the play, so that neither gravity nor inertia carries it across (a load that
+never changes its sign would hold the arm at one side and make a constant of it); the play starts centred at the first
+angle of the campaign; motor and path are those commanded. Points of the path at which the angle is unknown are passed
+over.
 
-Source: as above; Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002. The size is assumed:
-worm and planetary drives of the cheaper kind have some arc minutes, 1 arc minute is 2.9e-4 rad. SLIDER is the law of a
-screw drive, with the play of its nut in mm (paper B, section 3.1).
+Source: as above; Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002. The
+size is assumed: worm and planetary drives of the cheaper kind have some arc minutes, 1 arc minute is 2.9e-4 rad. SLIDER
+is the law of a screw drive, with the play of its nut in mm (paper B, section 3.1).
 """
 
 from dataclasses import dataclass
@@ -25,13 +26,15 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 
 @numba.njit(cache=True)
 def play(path, half_width):
-    """Play operator along a path (N, k) with half widths (k,), same unit; returns y - u, shape (N, k), NaN where the path is."""
+    """Play operator along a path (N, k) with half widths (k,), same unit; returns y - u, shape (N, k), NaN where the
+    path is.
+    """
     result = np.empty_like(path)
     for leg in range(path.shape[1]):
         y = np.nan
@@ -46,7 +49,10 @@ def play(path, half_width):
 
 
 _PARAMETERS = ParameterSet(
-    tuple(Parameter(f"width{k}", "rad", 0.0, 0.0, 0.02, "play of worm and harmonic drives: up to some arc minutes") for k in LEGS)
+    tuple(
+        Parameter(f"width{k}", "rad", 0.0, 0.0, 0.02, "play of worm and harmonic drives: up to some arc minutes")
+        for k in LEGS
+    )
 )
 _COORDINATES = plain_coordinates(_PARAMETERS, 5e-4)
 
@@ -66,5 +72,7 @@ class Backlash:
         return Contribution(drive=along_path[motion.path_index])
 
 
-_SCREW = ParameterSet(tuple(Parameter(f"width{k}", "mm", 0.0, 0.0, 1.0, "paper B, eq. (19) measures it; size assumed") for k in LEGS))
+_SCREW = ParameterSet(
+    tuple(Parameter(f"width{k}", "mm", 0.0, 0.0, 1.0, "paper B, eq. (19) measures it; size assumed") for k in LEGS)
+)
 SLIDER = Backlash(parameters=_SCREW, coordinates=plain_coordinates(_SCREW, 0.02))

@@ -1,7 +1,7 @@
 """Base placement: a leg stands elsewhere on the base than the drawing says.
 
-In the frame of leg k (x radial, y tangential, z down) its foot belongs at (R, 0, 0). With an azimuth error b, a radius error p and a
-height error h it stands, turned by b about the vertical, at
+In the frame of leg k (x radial, y tangential, z down) its foot belongs at (R, 0, 0). With an azimuth error b, a radius
+error p and a height error h it stands, turned by b about the vertical, at
 
     foot = Rz(b) (R + p, 0, 0) + (0, 0, h)
 
@@ -9,26 +9,29 @@ so that, as a displacement at the place `base`,
 
     shift = ((R + p) cos b - R, (R + p) sin b, h),    w = (0, 0, b)
 
-nine numbers, linear to first order: shift = (p, R b, h). What is common to the legs is known elsewhere: a common radius is the
-calibration's r - R; a common height shifts the whole robot along z and a common azimuth turns it, platform included, about z, as a
-wrong frame would. One leg's azimuth error turns that leg's plane against the others', and the platform with it.
+nine numbers, linear to first order: shift = (p, R b, h). What is common to the legs is known elsewhere: a common radius
+is the calibration's r - R; a common height shifts the whole robot along z and a common azimuth turns it, platform
+included, about z, as a wrong frame would. One leg's azimuth error turns that leg's plane against the others', and the
+platform with it.
 
 Assumptions: rigid base; the platform's side is as drawn; constant over the campaign.
 
-Source: geometry; leg placement as in Mooring, Roth and Driels, Fundamentals of Manipulator Calibration, 1991. Sizes assumed: a base
-drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
+Source: geometry; leg placement as in Mooring, Roth and Driels, Fundamentals of Manipulator Calibration, 1991. Sizes
+assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _SOURCE = "drilling of the base, size assumed"
 _KINDS = (("azimuth", "rad", 0.03), ("radius", "mm", 30.0), ("height", "mm", 30.0))
-_PARAMETERS = ParameterSet(tuple(Parameter(f"{name}{k}", unit, 0.0, -limit, limit, _SOURCE) for k in LEGS for name, unit, limit in _KINDS))
+_PARAMETERS = ParameterSet(
+    tuple(Parameter(f"{name}{k}", unit, 0.0, -limit, limit, _SOURCE) for k in LEGS for name, unit, limit in _KINDS)
+)
 _COORDINATES = plain_coordinates(_PARAMETERS, np.tile([1e-3, 0.5, 0.5], 3))
 
 
@@ -42,7 +45,9 @@ class BasePlacement:
     needs: tuple = ()
 
     def contribute(self, motion, values):
-        """Displacement of the legs' feet under azimuth (rad), radius and height (mm) of leg 1, then of legs 2 and 3, (9,)."""
+        """Displacement of the legs' feet under azimuth (rad), radius and height (mm) of leg 1, then of legs 2 and 3,
+        (9,).
+        """
         azimuth, radius, height = np.reshape(values, (3, 3)).T
         foot = motion.lengths_mm[0] + radius
         nothing = np.zeros(3)

@@ -1,8 +1,9 @@
-"""Encoder eccentricity: the encoder's disc sits off the shaft's centre, so that its reading errs once per turn of the drive arm.
+"""Encoder eccentricity: the encoder's disc sits off the shaft's centre, so that its reading errs once per turn of the
+drive arm.
 
-A disc of grating radius rho whose centre lies at a distance e from the shaft's axis is read at the arc rho theta + e sin(theta + p), where p is
-the direction in which the centre lies off. One reading head therefore sees an angle that errs by e / rho at most. The drive stands where its
-encoder reads the command, so that the arm errs by
+A disc of grating radius rho whose centre lies at a distance e from the shaft's axis is read at the arc rho theta + e
+sin(theta + p), where p is the direction in which the centre lies off. One reading head therefore sees an angle that
+errs by e / rho at most. The drive stands where its encoder reads the command, so that the arm errs by
 
     dtheta_i = a_i sin(theta_i + p_i),    a_i = e_i / rho
 
@@ -10,18 +11,19 @@ It enters at the drive angle, three times two numbers. With s_i = a_i cos(p_i) a
 
     dtheta_i = s_i sin(theta_i) + c_i cos(theta_i)
 
-Assumptions: one reading head per encoder (two opposite heads cancel it), the encoder on the arm's own axis (behind a gear the error is that of
-`transmission_error`), higher harmonics small; the commanded angle stands for the true one, an error of second order. Over the part of a
-turn that an arm swings through, a constant drive error imitates most of the cosine; only the curvature tells them apart.
+Assumptions: one reading head per encoder (two opposite heads cancel it), the encoder on the arm's own axis (behind a
+gear the error is that of `transmission_error`), higher harmonics small; the commanded angle stands for the true one, an
+error of second order. Over the part of a turn that an arm swings through, a constant drive error imitates most of the
+cosine; only the curvature tells them apart.
 
-Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 2010, on optical encoders. The size is assumed: 10 um off
-at a grating radius of 20 mm make 5e-4 rad.
+Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 2010, on optical encoders. The size is
+assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
 from dataclasses import dataclass
 
+from rrru.effects.effect import Contribution, Coordinates
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Contribution, Coordinates
 from rrru.parameters import ParameterSet
 
 _PARAMETERS = ParameterSet(harmonic_parameters("eccentricity over grating radius; up to some arc minutes, assumed"))

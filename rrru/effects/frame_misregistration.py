@@ -1,33 +1,41 @@
 """Frame misregistration: the tracker's frame is not the robot's.
 
-The tracker's frame was set on marks of the base with errors of its own. A point at p in the robot's frame is reported at
+The tracker's frame was set on marks of the base with errors of its own. A point at p in the robot's frame is reported
+at
 
     p' = Q(w) p + s
 
-with the shift s = (shift_x, shift_y, shift_z) and the rotation Q of the rotation vector w = (turn_x, turn_y, turn_z) about the robot frame's
-origin, the centre of the base. It enters at the frame, six numbers; to first order p' = p + s + w x p. The robot itself does nothing wrong, and
-no compensation by the controller is right for it: the registration is to be done anew.
+with the shift s = (shift_x, shift_y, shift_z) and the rotation Q of the rotation vector w = (turn_x, turn_y, turn_z)
+about the robot frame's origin, the centre of the base. It enters at the frame, six numbers; to first order p' = p + s +
+w x p. The robot itself does nothing wrong, and no compensation by the controller is right for it: the registration is
+to be done anew.
 
-Part of it can be imitated by the calibration (a shift along z by the drives, a turn about z hardly at all), the rest is a gap that looks
-the same in every run, direction, speed and payload.
+Part of it can be imitated by the calibration (a shift along z by the drives, a turn about z hardly at all), the rest is
+a gap that looks the same in every run, direction, speed and payload.
 
 Assumptions: the frame does not move during the campaign, and the tracker's scale is right.
 
-Source: rigid motion between point sets: Arun, Huang and Blostein, Least-squares fitting of two 3-D point sets, IEEE Transactions on Pattern
-Analysis and Machine Intelligence 9, 1987. Sizes assumed: marks off by 0.5 mm, a metre apart.
+Source: rigid motion between point sets: Arun, Huang and Blostein, Least-squares fitting of two 3-D point sets, IEEE
+Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed: marks off by 0.5 mm, a metre apart.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
     (
-        *(Parameter(f"shift_{axis}", "mm", 0.0, -100.0, 100.0, "setting of the tracker's frame, size assumed") for axis in "xyz"),
-        *(Parameter(f"turn_{axis}", "rad", 0.0, -0.1, 0.1, "setting of the tracker's frame, size assumed") for axis in "xyz"),
+        *(
+            Parameter(f"shift_{axis}", "mm", 0.0, -100.0, 100.0, "setting of the tracker's frame, size assumed")
+            for axis in "xyz"
+        ),
+        *(
+            Parameter(f"turn_{axis}", "rad", 0.0, -0.1, 0.1, "setting of the tracker's frame, size assumed")
+            for axis in "xyz"
+        ),
     )
 )
 _COORDINATES = plain_coordinates(_PARAMETERS, np.repeat([0.5, 5e-4], 3))

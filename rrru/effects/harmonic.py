@@ -1,8 +1,10 @@
-"""What the periodic drive errors share: amplitude and phase per leg as parameters, sine and cosine parts as coordinates."""
+"""What the periodic drive errors share: amplitude and phase per leg as parameters, sine and cosine parts as
+coordinates.
+"""
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Coordinates
+from rrru.effects.effect import LEGS, Coordinates
 from rrru.parameters import Parameter
 
 
@@ -15,7 +17,9 @@ def harmonic_parameters(source, unit="rad", highest=0.01):
 
 
 def harmonic(drive, periods, values):
-    """Errors a_i sin(N theta_i + p_i), shape (n, 3), of angles (n, 3); values: amplitudes (3) and phases (3) first; N periods per turn."""
+    """Errors a_i sin(N theta_i + p_i), shape (n, 3), of angles (n, 3); values: amplitudes (3) and phases (3) first; N
+    periods per turn.
+    """
     return values[:3] * np.sin(periods * drive + values[3:6])
 
 

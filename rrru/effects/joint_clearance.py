@@ -1,36 +1,40 @@
 """Joint clearance: the U-joint's pin lies on the side of its bore towards which the leg pushes.
 
-With the force f_i that leg i transmits along the unit direction g_i (compression positive, `rrru.mechanisms.dynamics.loads`), the bore (the
-platform) lags behind the pin (the forearm) by the radial clearance c_i:
+With the force f_i that leg i transmits along the unit direction g_i (compression positive,
+`rrru.robots.dynamics.loads`), the bore (the platform) lags behind the pin (the forearm) by the radial clearance c_i:
 
     shift_i = -c_i sign(f_i) g_i,   or, softer,   shift_i = -c_i tanh(f_i / f_0) g_i
 
-The second form changes sides within a force f_0, the parameter `transition`, as contacts with friction and some elasticity do. As in
-`link_flexure`, `held` says whether f_i is the force with joint 3 free or held by friction.
+The second form changes sides within a force f_0, the parameter `transition`, as contacts with friction and some
+elasticity do. As in `link_flexure`, `held` says whether f_i is the force with joint 3 free or held by friction.
 
-It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It flips with the sign
-of the force and vanishes where the leg transmits none. While the force keeps its sign it is a change of L3 by c_i, which a calibration
-with three free forearm lengths takes up, and one with tied lengths in part; it shows itself by the jump where the force changes sign.
+It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It
+flips with the sign of the force and vanishes where the leg transmits none. While the force keeps its sign it is a
+change of L3 by c_i, which a calibration with three free forearm lengths takes up, and one with tied lengths in part; it
+shows itself by the jump where the force changes sign.
 
-Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time); the contact lies on
-the forearm's line; the pin's radius left out.
+Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time);
+the contact lies on the forearm's line; the pin's radius left out.
 
 SLIDER is the law of a robot whose link has no joint of its own that could be held.
 
-Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005. Paper A,
-section 3.3, blames it for what calibration leaves; its size is assumed.
+Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005.
+Paper A, section 3.3, blames it for what calibration leaves; its size is assumed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
     (
-        *(Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed") for k in LEGS),
+        *(
+            Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed")
+            for k in LEGS
+        ),
         Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
         Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
     )
@@ -61,5 +65,7 @@ class JointClearance:
 
 
 SLIDER = JointClearance(
-    coordinates=plain_coordinates(_PARAMETERS, 0.05, tuple({"transition": force, "held": 0.0} for force in (0.2, 0.7, 2.0)))
+    coordinates=plain_coordinates(
+        _PARAMETERS, 0.05, tuple({"transition": force, "held": 0.0} for force in (0.2, 0.7, 2.0))
+    )
 )

@@ -1,37 +1,43 @@
 """Link flexure: a forearm gives way along its length to the force that it carries.
 
-Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive, `rrru.mechanisms.dynamics.loads`). With
-its end fittings and U-joint it is a spring of compliance k_i; compression shortens it:
+Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive,
+`rrru.robots.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression shortens
+it:
 
     dL3_i = -k_i f_i
 
-It enters at the length L3, one compliance per leg, and is linear in k. The platform follows its load: it sinks under its weight, and further in
-proportion to a payload, which tells it from errors of the lengths; `drive_compliance` does so too, but with the drive's torque, so
-that the pattern over the workspace differs.
+It enters at the length L3, one compliance per leg, and is linear in k. The platform follows its load: it sinks under
+its weight, and further in proportion to a payload, which tells it from errors of the lengths; `drive_compliance` does
+so too, but with the drive's torque, so that the pattern over the workspace differs.
 
-Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the leg is one two-force
-member from elbow to U-joint (`rrru.mechanisms.dynamics.held_force`). Both are tried; `held` is 0 or 1, or a share between.
+Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
+leg is one two-force member from elbow to U-joint (`rrru.robots.dynamics.held_force`). Both are tried; `held` is 0 or 1,
+or a share between.
 
-Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads are those at the
-commanded pose.
+Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads
+are those at the commanded pose.
 
 SLIDER is the law of a robot whose link has no joint of its own that could be held.
 
-Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain aluminium tube
-of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here are assumed.
+Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain
+aluminium tube of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here
+are assumed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _FOREARM = 3
 _PARAMETERS = ParameterSet(
     (
-        *(Parameter(f"flexure{k}", "mm/N", 0.0, 0.0, 0.1, "axial spring of forearm and its joints, size assumed") for k in LEGS),
+        *(
+            Parameter(f"flexure{k}", "mm/N", 0.0, 0.0, 0.1, "axial spring of forearm and its joints, size assumed")
+            for k in LEGS
+        ),
         Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
     )
 )

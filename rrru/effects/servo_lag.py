@@ -1,30 +1,34 @@
 """Servo lag: the joint follows its command late.
 
-A drive whose position loop has the gain K_v follows a command of constant speed at the distance theta' / K_v, which is as if it were late
-by T = 1 / K_v; so do delays in the controller. With the delay T_i of drive i
+A drive whose position loop has the gain K_v follows a command of constant speed at the distance theta' / K_v, which is
+as if it were late by T = 1 / K_v; so do delays in the controller. With the delay T_i of drive i
 
     dtheta_i(t) = theta_i(t - T_i) - theta_i(t) = -T_i theta_i'(t) + T_i^2 theta_i''(t) / 2 + ...
 
-It enters at the drive angle, one delay per leg. The terms left out, T^3 theta''' / 6, are below 1e-8 rad for some milliseconds at speeds of
-100 mm/s, and the quadratic one is small as well, so that the law is nearly linear in T. It vanishes at rest, grows with the speed, and
-turns its sign with the direction of motion. `backlash` turns its sign too, but does not grow with the speed.
+It enters at the drive angle, one delay per leg. The terms left out, T^3 theta''' / 6, are below 1e-8 rad for some
+milliseconds at speeds of 100 mm/s, and the quadratic one is small as well, so that the law is nearly linear in T. It
+vanishes at rest, grows with the speed, and turns its sign with the direction of motion. `backlash` turns its sign too,
+but does not grow with the speed.
 
-Assumptions: the motion has lasted longer than T (a point at which it just starts gets T^2 theta'' / 2 too much); the tracker samples in time
-with the command (an offset of its clock is a delay common to all drives); no overshoot. Where the speed is unknown the law says nothing,
-and the contribution is zero.
+Assumptions: the motion has lasted longer than T (a point at which it just starts gets T^2 theta'' / 2 too much); the
+tracker samples in time with the command (an offset of its clock is a delay common to all drives); no overshoot. Where
+the speed is unknown the law says nothing, and the contribution is zero.
 
-Source: velocity lag of a type-1 servo: Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, on system type and steady-state
-error. Sizes assumed: position-loop gains of machine tools and robots are 20 to 300 per second.
+Source: velocity lag of a type-1 servo: Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, on
+system type and steady-state error. Sizes assumed: position-loop gains of machine tools and robots are 20 to 300 per
+second.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-_PARAMETERS = ParameterSet(tuple(Parameter(f"lag{k}", "s", 0.0, 0.0, 0.1, "inverse of the position loop's gain, assumed") for k in LEGS))
+_PARAMETERS = ParameterSet(
+    tuple(Parameter(f"lag{k}", "s", 0.0, 0.0, 0.1, "inverse of the position loop's gain, assumed") for k in LEGS)
+)
 _COORDINATES = plain_coordinates(_PARAMETERS, 0.003)
 
 
@@ -40,4 +44,6 @@ class ServoLag:
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles under delays (3,) in s."""
         delay = np.asarray(values, dtype=float)
-        return Contribution(drive=0.5 * delay**2 * np.nan_to_num(motion.drive_acceleration) - delay * np.nan_to_num(motion.drive_rate))
+        return Contribution(
+            drive=0.5 * delay**2 * np.nan_to_num(motion.drive_acceleration) - delay * np.nan_to_num(motion.drive_rate)
+        )

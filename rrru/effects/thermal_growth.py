@@ -1,28 +1,30 @@
 """Thermal growth: all links grow with time towards a limit while the robot warms up.
 
-A body of heat capacity C that takes up a constant power and loses heat in proportion to its excess temperature warms up as 1 - exp(-t / tau)
-(Newton's law of cooling). With its coefficient of expansion every length l of R, L1, L2, L3, r grows by
+A body of heat capacity C that takes up a constant power and loses heat in proportion to its excess temperature warms up
+as 1 - exp(-t / tau) (Newton's law of cooling). With its coefficient of expansion every length l of R, L1, L2, L3, r
+grows by
 
     dl(t) = l e (1 - exp(-t / tau))
 
-where e is the final strain and t the time since the campaign's start, when the robot was at the temperature of its drawing. It enters at the
-lengths. It is linear in e; tau, which is not, is tried on a grid of time constants.
+where e is the final strain and t the time since the campaign's start, when the robot was at the temperature of its
+drawing. It enters at the lengths. It is linear in e; tau, which is not, is tried on a grid of time constants.
 
-A grown 3-RRRU is similar to the nominal one: since all angles stay, the platform moves along the ray from the base's centre by the
-strain itself, p' = (1 + e(t)) p. What tells it from errors of the lengths is only that the same pass, driven later, ends elsewhere.
+A grown 3-RRRU is similar to the nominal one: since all angles stay, the platform moves along the ray from the base's
+centre by the strain itself, p' = (1 + e(t)) p. What tells it from errors of the lengths is only that the same pass,
+driven later, ends elsewhere.
 
-Assumptions: one temperature for base, links and platform, one material, constant power over the campaign whether it moves or rests; no drift
-of the tracker.
+Assumptions: one temperature for base, links and platform, one material, constant power over the campaign whether it
+moves or rests; no drift of the tracker.
 
-Source: Incropera and DeWitt, Fundamentals of Heat and Mass Transfer, lumped capacitance method (ch. 5). Sizes: aluminium has
-2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from half a minute to an hour assumed.
+Source: Incropera and DeWitt, Fundamentals of Heat and Mass Transfer, lumped capacitance method (ch. 5). Sizes:
+aluminium has 2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from half a minute to an hour assumed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
@@ -45,7 +47,9 @@ class ThermalGrowth:
     needs: tuple = ("time_s",)
 
     def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under the final strain and the time constant in s; none where the time is unknown."""
+        """Changes (n, 3, 5) of the lengths under the final strain and the time constant in s; none where the time is
+        unknown.
+        """
         strain, time_constant = values
         grown = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
         return Contribution(length_mm=np.broadcast_to(grown[:, None, None] * motion.lengths_mm, (len(motion), 3, 5)))

@@ -1,7 +1,7 @@
 """Transmission error: a periodic drive-angle error with a whole number of periods per turn of the drive arm.
 
-The motor turns N times per turn of the arm (N the gear ratio). Eccentric wheels, a wave generator out of round and the errors of its
-teeth make the output lead and lag once per turn of the motor, hence N times per turn of the arm:
+The motor turns N times per turn of the arm (N the gear ratio). Eccentric wheels, a wave generator out of round and the
+errors of its teeth make the output lead and lag once per turn of the motor, hence N times per turn of the arm:
 
     dtheta_i = a_i sin(N theta_i + p_i)
 
@@ -11,20 +11,20 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
 
 A screw of lead h (`ScrewError`) leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
 
-Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction of motion. The ratio is a
-number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2 degrees of the arm, and a campaign must sample more
-densely than every 3.6 degrees to see it as what it is.
+Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
+of motion. The ratio is a number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2
+degrees of the arm, and a campaign must sample more densely than every 3.6 degrees to see it as what it is.
 
-Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50 is a common
-ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
+Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50
+is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from rrru.effects.effect import Contribution, Coordinates
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Contribution, Coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(

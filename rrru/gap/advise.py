@@ -21,10 +21,16 @@ _COLUMNS = ("run", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points"
 
 
 def advise(attribution, verdict, masses, most=3):
-    """Rows of `gap_next_runs` without campaign and rank, best first; none where no rival answer is left that the library can predict."""
+    """Rows of `gap_next_runs` without campaign and rank, best first; none where no rival answer is left that the
+    library can predict.
+    """
     beliefs = attribution.posterior
     favoured = beliefs.best_of(frozenset(verdict.effects))
-    rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != frozenset(verdict.effects)]
+    rivals = [
+        frozenset(names)
+        for names, flag, _ in verdict.rivals
+        if not flag and frozenset(names) != frozenset(verdict.effects)
+    ]
     if favoured is None or verdict.unexplained or not rivals:
         return pd.DataFrame(columns=_COLUMNS)
     candidates, table = _candidates(attribution.case)
@@ -42,7 +48,9 @@ def advise(attribution, verdict, masses, most=3):
             for candidate, gain in zip(candidates, gains, strict=True)
         )
     result = pd.DataFrame(found).drop(columns="rows")
-    result = result[result["gain_nats"] > _WORTH_NATS].sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
+    result = result[result["gain_nats"] > _WORTH_NATS].sort_values(
+        ["gain_nats", "run"], ascending=[False, True], kind="stable"
+    )
     return result.drop_duplicates("run").head(most).reset_index(drop=True)[list(_COLUMNS)]
 
 
@@ -58,7 +66,9 @@ def _worth(attribution, truth, imitator, candidates, table, masses):
     size = sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)
     made = [_columns(case.library, linear, hypothesis.terms) @ mean[:size] for linear in (here, there)]
     rival, rival_level = imitator
-    designs = [np.concatenate([linear.base, _columns(case.library, linear, rival.terms)], axis=-1) for linear in (here, there)]
+    designs = [
+        np.concatenate([linear.base, _columns(case.library, linear, rival.terms)], axis=-1) for linear in (here, there)
+    ]
     penalty = np.zeros(designs[0].shape[-1])
     penalty[here.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
     now = _misfit(designs[0], made[0], penalty, case.noise_mm)
@@ -87,7 +97,9 @@ def _columns(library, linear, terms):
 
 
 def _candidates(case):
-    """Candidate runs, each a mapping with its rows of a table of commands, and that table: every kind of pass along some trajectories."""
+    """Candidate runs, each a mapping with its rows of a table of commands, and that table: every kind of pass along
+    some trajectories.
+    """
     frame = case.measurements
     names = pd.unique(frame["trajectory"])
     chosen = names[np.unique(np.linspace(0, len(names) - 1, _MOST_TRAJECTORIES).astype(int))]
@@ -106,7 +118,9 @@ def _candidates(case):
         ):
             if fast and not (np.isfinite(speed) and speed < _FAST_MM_S and np.isfinite(end)):
                 continue
-            run = _pass(first, len(found) + 1, end, reverse, _FAST_MM_S if fast else speed, load + (_LOAD_KG if loaded else 0.0))
+            run = _pass(
+                first, len(found) + 1, end, reverse, _FAST_MM_S if fast else speed, load + (_LOAD_KG if loaded else 0.0)
+            )
             words = [str(name), *(["in reverse"] if reverse else []), *([f"at {_FAST_MM_S:g} mm/s"] if fast else [])]
             if loaded:
                 words.append(f"with {load + _LOAD_KG:g} kg payload")
@@ -139,4 +153,6 @@ def _pass(first, number, end_s, reverse, speed_mm_s, payload_kg):
         # the same profile, driven faster: the average speed over the run rises in proportion
         time = time * own_speed / speed_mm_s if length > 0.0 else time
     measured = {f"measured_{axis}_mm": run[f"command_{axis}_mm"] for axis in "xyz"}
-    return run.assign(run=number, time_s=end_s + 60.0 + time, speed_mm_s=speed_mm_s, payload_kg=payload_kg, status="ok", **measured)
+    return run.assign(
+        run=number, time_s=end_s + 60.0 + time, speed_mm_s=speed_mm_s, payload_kg=payload_kg, status="ok", **measured
+    )

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.calibrate.least_squares import least_squares
-from rrru.calibrate.residuals import Residuals
 from rrru.campaign import measurements as rows
 from rrru.errors import FitError
+from rrru.fit.least_squares import least_squares
+from rrru.fit.residuals import Residuals
 from rrru.gap.case import State
 from rrru.gap.evidence import Evidence
 from rrru.gap.noise import estimate_noise, spoilt
@@ -25,9 +25,10 @@ _SMALL = 10.0
 class Attribution:
     """What the search has found.
 
-    calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the covariance (k, k) of its
-    terms' coefficients; evidence: on the last linearisation, about that state; posterior over all hypotheses; hypothesis, level: the best
-    one and its discrepancy level; noise_from: "given", "repeats" or "high_frequency"; dropped: number of points left out as spoilt.
+    calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the
+    covariance (k, k) of its terms' coefficients; evidence: on the last linearisation, about that state; posterior over
+    all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given", "repeats" or
+    "high_frequency"; dropped: number of points left out as spoilt.
     """
 
     case: object
@@ -68,11 +69,15 @@ def attribute(case, prior, noise_from="given"):
             break
         case = case.without(bad)
     state, covariance, evidence, beliefs, hypothesis, level = found
-    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, noise_from, total - len(case))
+    return Attribution(
+        case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, noise_from, total - len(case)
+    )
 
 
 def settle(found, effects):
-    """The attribution with its hypothesis and state those of exactly the named effects, fitted anew; the posterior stays."""
+    """The attribution with its hypothesis and state those of exactly the named effects, fitted anew; the posterior
+    stays.
+    """
     if found.hypothesis.effects == frozenset(effects):
         return found
     known = found.posterior.best_of(frozenset(effects))
@@ -96,8 +101,8 @@ def _rounds(case, calibrated, prior):
     state, covariance, last = calibrated, np.zeros((0, 0)), None
     linear = case.linearise(state)
     evidence = Evidence(case.library, linear, case.run, case.noise_mm)
-    # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the linear sim or a law's
-    # shape is still to be fitted
+    # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
+    # linear sim or a law's shape is still to be fitted
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
     for _ in range(_MOST_ROUNDS):
         beliefs = posterior(evidence, search(evidence), prior)

@@ -1,7 +1,8 @@
-"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, and the exact corrected sim.
+"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, and the exact
+corrected sim.
 
-The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the best one found.
-Lengths in mm, angles in rad.
+The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the
+best one found. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -9,12 +10,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.effects.protocol import Contribution
+from rrru.effects.effect import Contribution
 from rrru.errors import FitError
-from rrru.gap.motion import at_turn_back, motion_of, starts_of_runs
+from rrru.gap.driven_path import at_turn_back, motion_of, starts_of_runs
 from rrru.gap.unknown import UNKNOWN, unknown_functions
-from rrru.mechanisms.first_order import first_order
 from rrru.plant.closure import corrected_sim
+from rrru.robots.first_order import first_order
 
 # a parameter of a law's shape may be off by this share
 _SHAPE_STEP = 0.3
@@ -24,7 +25,9 @@ _ENOUGH = 0.8
 
 @dataclass(frozen=True)
 class State:
-    """A corrected sim: errors (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted further, by name."""
+    """A corrected sim: errors (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted
+    further, by name.
+    """
 
     errors: np.ndarray
     effects: dict
@@ -38,17 +41,21 @@ class State:
 
     def values(self, library):
         """Parameter values (p,) by effect name."""
-        return {key[0]: library[key[0]].coordinates.to_values(value, self.shape(library, key)) for key, value in self.effects.items()}
+        return {
+            key[0]: library[key[0]].coordinates.to_values(value, self.shape(library, key))
+            for key, value in self.effects.items()
+        }
 
 
 @dataclass(frozen=True)
 class Linear:
     """The sim linearised about a state.
 
-    data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the mechanism's errors;
-    columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect of the state to what the parameters of
-    its shape may be wrong by, (n, 3, q), each column one standard deviation; reshaped: effect to these parameters, each (name, value,
-    stepped value); drive (n, 3 axes, 3): derivative by the actuator values.
+    data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the
+    mechanism's errors; columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect
+    of the state to what the parameters of its shape may be wrong by, (n, 3, q), each column one standard deviation;
+    reshaped: effect to these parameters, each (name, value, stepped value); drive (n, 3 axes, 3): derivative by the
+    actuator values.
     """
 
     data: np.ndarray
@@ -63,8 +70,8 @@ class Linear:
 class Case:
     """Points of a campaign, all m of them, of which the n used ones are fitted.
 
-    library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can; untestable: name
-    to the reason for the other effects.
+    library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can;
+    untestable: name to the reason for the other effects.
     """
 
     mechanism: object
@@ -114,7 +121,9 @@ class Case:
         return corrected_sim(self.mechanism, state.errors, actuators, command, self.contribution(state))[self.used]
 
     def model(self, state):
-        """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has none."""
+        """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has
+        none.
+        """
         return self.exact(state) if state.effects else self.sim(state.errors)[self.used]
 
     def linearise(self, state, shapes=None):
@@ -130,7 +139,11 @@ class Case:
         if lost.any():
             raise FitError(f"the sim has no pose at {int(lost.sum())} points")
         if shapes is None:
-            shapes = [(name, shape) for name, effect in self.library.items() for shape in range(len(effect.coordinates.shapes))]
+            shapes = [
+                (name, shape)
+                for name, effect in self.library.items()
+                for shape in range(len(effect.coordinates.shapes))
+            ]
         columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*shapes, *state.effects))}
         laws, reshaped = {}, {}
         for key in state.effects:
@@ -148,16 +161,22 @@ class Case:
         )
 
     def _laws(self, legs, key, state):
-        """What the shape of an effect of the state may be wrong by, (n, 3, q), and the steps of its parameters; see Linear."""
+        """What the shape of an effect of the state may be wrong by, (n, 3, q), and the steps of its parameters; see
+        Linear.
+        """
         coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
         shape = state.shape(self.library, key)
         leg = legs.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
         columns, steps = [], []
         for name, value in shape.items():
             high = effect.parameters[name].high
-            stepped = value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
+            stepped = (
+                value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
+            )
             if stepped != value:
-                other = effect.contribute(self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped}))
+                other = effect.contribute(
+                    self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped})
+                )
                 columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_errors(other) - leg)[self.used])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
@@ -183,8 +202,8 @@ class Case:
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True):
     """The case of a measurement table.
 
-    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what a tested effect
-    needs are left out. Raises FitError for an empty table.
+    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what
+    a tested effect needs are left out. Raises FitError for an empty table.
     """
     if not len(measurements):
         raise FitError("the campaign has no points")
@@ -192,7 +211,9 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
     used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_turn_back(motion, mechanism.drive_unit)
-    used &= np.isfinite(mechanism.forward(rows.actuators(measurements), guess_mm=rows.command(measurements))).all(axis=1)
+    used &= np.isfinite(mechanism.forward(rows.actuators(measurements), guess_mm=rows.command(measurements))).all(
+        axis=1
+    )
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}

@@ -49,9 +49,15 @@ def _attribute_rows(found, verdict):
         alone_best = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
         if alone_best:
             hypothesis, level = alone_best, int(alone_best.evidence.argmax())
-            gained = log_score(predict(case, evidence, hypothesis.terms, hypothesis.strengths[level], level, fold), case) - alone
+            gained = (
+                log_score(predict(case, evidence, hypothesis.terms, hypothesis.strengths[level], level, fold), case)
+                - alone
+            )
             by_fold = np.array([gained[fold == k].sum() for k in np.unique(fold)])
-            gain, error = float(by_fold.sum()), float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1)) if len(by_fold) > 1 else np.nan
+            gain, error = (
+                float(by_fold.sum()),
+                float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1)) if len(by_fold) > 1 else np.nan,
+            )
         result.append(
             {
                 "effect": name,
@@ -64,11 +70,21 @@ def _attribute_rows(found, verdict):
             }
         )
     empty = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan}
-    result += [{"effect": name, "probability": 0.0, **empty, "note": f"not tested: {note}"} for name, note in case.untestable.items()]
+    result += [
+        {"effect": name, "probability": 0.0, **empty, "note": f"not tested: {note}"}
+        for name, note in case.untestable.items()
+    ]
     sets = beliefs.sets()
     result.append({"effect": "none", "probability": sets.get((frozenset(), False), 0.0), **empty, "note": ""})
     unknown = sum(p for (_, flag), p in sets.items() if flag)
-    result.append({"effect": "unexplained", "probability": unknown, **empty, "note": _looks_like(beliefs) if unknown > 0.5 else ""})
+    result.append(
+        {
+            "effect": "unexplained",
+            "probability": unknown,
+            **empty,
+            "note": _looks_like(beliefs) if unknown > 0.5 else "",
+        }
+    )
     return pd.DataFrame(result)
 
 
@@ -76,7 +92,11 @@ def _looks_like(beliefs):
     """What the unexplained part follows, where one of the unknown functions is likely."""
     likely = {name: beliefs.marginal(name) for name in UNKNOWN}
     best = max(likely, key=likely.get)
-    return f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})" if likely[best] > 0.5 else "follows no smooth function tried"
+    return (
+        f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})"
+        if likely[best] > 0.5
+        else "follows no smooth function tried"
+    )
 
 
 def _set_rows(found, most=20):
@@ -87,16 +107,29 @@ def _set_rows(found, most=20):
         legs = ", ".join(f"{term.effect}: {term.legs}" for term in hypothesis.terms)
         gained = float(hypothesis.evidence.max() - found.evidence.none.max())
         names = label(tuple(sorted(effects)), flag)
-        result.append({"rank": rank, "effects": names, "legs": legs, "unexplained": flag, "probability": p, "log_evidence": gained})
+        result.append(
+            {
+                "rank": rank,
+                "effects": names,
+                "legs": legs,
+                "unexplained": flag,
+                "probability": p,
+                "log_evidence": gained,
+            }
+        )
     return pd.DataFrame(result)
 
 
 def _parameter_rows(found):
-    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors by their change with the coordinates."""
+    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors by their change
+    with the coordinates.
+    """
     columns = ("effect", "parameter", "unit", "value", "standard_error", "at_bound")
     result, start, library = [], 0, found.case.library
     for parameter, value in zip(found.case.mechanism.parameters, found.state.errors, strict=True):
-        result.append(dict(zip(columns, ("calibration", parameter.name, parameter.unit, value, np.nan, False), strict=True)))
+        result.append(
+            dict(zip(columns, ("calibration", parameter.name, parameter.unit, value, np.nan, False), strict=True))
+        )
     for term in found.hypothesis.terms:
         key, effect = (term.effect, term.shape), library[term.effect]
         if key not in found.state.effects:
@@ -104,9 +137,15 @@ def _parameter_rows(found):
         shape, coordinates = found.state.shape(library, key), found.state.effects[key]
         values = effect.coordinates.to_values(coordinates, shape)
         matrix = spread(effect.coordinates, term.legs)
-        covariance = matrix @ found.covariance[start : start + matrix.shape[1], start : start + matrix.shape[1]] @ matrix.T
+        covariance = (
+            matrix @ found.covariance[start : start + matrix.shape[1], start : start + matrix.shape[1]] @ matrix.T
+        )
         start += matrix.shape[1]
-        errors = np.sqrt(np.maximum(np.diag(_slope(effect, coordinates, shape) @ covariance @ _slope(effect, coordinates, shape).T), 0.0))
+        errors = np.sqrt(
+            np.maximum(
+                np.diag(_slope(effect, coordinates, shape) @ covariance @ _slope(effect, coordinates, shape).T), 0.0
+            )
+        )
         bound = effect.parameters.at_bound(values)
         for k, parameter in enumerate(effect.parameters):
             fitted = bool(errors[k] > 0.0)
@@ -136,7 +175,9 @@ def _slope(effect, coordinates, shape):
     for k, step in enumerate(steps):
         shift = np.zeros(len(steps))
         shift[k] = step
-        difference = effect.coordinates.to_values(coordinates + shift, shape) - effect.coordinates.to_values(coordinates - shift, shape)
+        difference = effect.coordinates.to_values(coordinates + shift, shape) - effect.coordinates.to_values(
+            coordinates - shift, shape
+        )
         columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / (2.0 * step))
     return np.stack(columns, axis=-1)
 

@@ -1,4 +1,6 @@
-"""The diagnosis of one campaign: where the gap lies, which effect causes it, how far it shrinks, and what to measure next."""
+"""The diagnosis of one campaign: where the gap lies, which effect causes it, how far it shrinks, and what to measure
+next.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -27,8 +29,8 @@ _DEFAULTS = GapSettings()
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the corrected sim;
-    calibrated_errors (p,): of the calibration alone; attribution: everything that the search found.
+    """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
+    corrected sim; calibrated_errors (p,): of the calibration alone; attribution: everything that the search found.
     """
 
     verdict: dict
@@ -43,13 +45,23 @@ def sim(mechanism):
     return replace(mechanism, angle_limit_rad=_ANGLE_LIMIT_RAD, length_limit_mm=_LENGTH_LIMIT_MM)
 
 
-def diagnose(measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None, details=True, name="", use_near_singularity=True):
+def diagnose(
+    measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None, details=True, name="", use_near_singularity=True
+):
     """Diagnosis of a measurement table.
 
-    masses: `rrru.mechanisms.dynamics.Masses`; noise_mm: per axis, estimated where None; details: also the tables that no verdict needs; name:
-    of the campaign, for its random stream. Raises FitError where there are too few points to calibrate on.
+    masses: `rrru.robots.dynamics.Masses`; noise_mm: per axis, estimated where None; details: also the tables that no
+    verdict needs; name: of the campaign, for its random stream. Raises FitError where there are too few points to
+    calibrate on.
     """
-    case = make_case(measurements, sim(mechanism), masses, noise_mm or 1.0, settings.library(mechanism.drive_unit), use_near_singularity)
+    case = make_case(
+        measurements,
+        sim(mechanism),
+        masses,
+        noise_mm or 1.0,
+        settings.library(mechanism.drive_unit),
+        use_near_singularity,
+    )
     least = _POINTS_PER_PARAMETER * len(case.mechanism.parameters)
     if len(case) < least:
         whose = f"campaign {name}: " if name else ""
@@ -88,8 +100,8 @@ def diagnose(measurements, mechanism, masses, settings=_DEFAULTS, noise_mm=None,
 def _decide(found):
     """Verdict, the attribution settled on it, and its terms with their shares in order.
 
-    The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the verdict without it
-    does, by more than chance, is ruled out and the rest decides again.
+    The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
+    verdict without it does, by more than chance, is ruled out and the rest decides again.
     """
     while True:
         ordered = shrink.order_by_share(found.case, found.evidence, found.hypothesis, found.level)

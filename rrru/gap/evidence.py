@@ -1,17 +1,19 @@
-"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models with a discrepancy.
+"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models with
+a discrepancy.
 
 Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   e ~ N(0, sigma^2),   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with the calibration's errors b (flat prior), the effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is
-diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not
-(Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part of the
-gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of their prior. Strengths are
-averaged over a grid, even in their logarithm; none makes a coefficient's prior wider than the largest size that its law allows.
+with the calibration's errors b (flat prior), the effects' coefficients c, and a discrepancy w for whatever the library
+does not hold: K is diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth along the
+path, plus a small part that is not (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so
+that `strength` is the rms of the effect's part of the gap per axis over sigma, the calibration's share taken out;
+positive coefficients have the positive half of their prior. Strengths are averaged over a grid, even in their
+logarithm; none makes a coefficient's prior wider than the largest size that its law allows.
 
-The parameters of a law's shape, such as a time constant, may be off the grid on which they were tried: each has a coefficient N(0, 1) on
-`Linear.laws`.
+The parameters of a law's shape, such as a time constant, may be off the grid on which they were tried: each has a
+coefficient N(0, 1) on `Linear.laws`.
 """
 
 from dataclasses import dataclass
@@ -23,7 +25,7 @@ from scipy.fft import dct
 from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
 
-from rrru.gap import kernels
+from rrru.gap import evidence_kernels as kernels
 from rrru.gap.terms import spread
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
@@ -67,7 +69,9 @@ class Evidence:
 
     @cached_property
     def _offsets(self):
-        """First column of each (effect, shape), and of each ("law", effect), among all columns but the calibration's."""
+        """First column of each (effect, shape), and of each ("law", effect), among all columns but the
+        calibration's.
+        """
         sizes = [columns.shape[-1] for columns in self._blocks.values()]
         return dict(zip(self._blocks, np.cumsum([0, *sizes[:-1]]), strict=True))
 
@@ -78,8 +82,9 @@ class Evidence:
 
     @cached_property
     def _grams(self):
-        """Gram matrices (levels, K, K) of the whitened effects' columns and the data, the calibration projected out, constants (levels,), and
-        the Gram matrix (K, K) of the same columns with the calibration's part, without discrepancy.
+        """Gram matrices (levels, K, K) of the whitened effects' columns and the data, the calibration projected out,
+        constants (levels,), and the Gram matrix (K, K) of the same columns with the calibration's part, without
+        discrepancy.
         """
         linear = self.linear
         p = linear.base.shape[-1]
@@ -94,7 +99,9 @@ class Evidence:
             basis, triangle = np.linalg.qr(white[:, :p])
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
             grams.append(rest.T @ rest)
-            constants.append(-1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * grams[-1][-1, -1])
+            constants.append(
+                -1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * grams[-1][-1, -1]
+            )
         return np.array(grams), np.array(constants), whole.T @ whole
 
     @property
@@ -103,8 +110,9 @@ class Evidence:
         return self._grams[1]
 
     def projected(self, terms):
-        """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), largest size (k,), positive (k,), owner (k,)
-        of each coefficient; the coefficients of the terms come first, those of their shapes, owned by nobody, last.
+        """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), largest size (k,),
+        positive (k,), owner (k,) of each coefficient; the coefficients of the terms come first, those of their shapes,
+        owned by nobody, last.
         """
         maps, index, sizes, largest, positive, owner = [], [], [], [], [], []
         for number, term in enumerate(terms):
@@ -140,12 +148,14 @@ class Evidence:
         for number in range(len(terms)):
             own = owner == number
             power, total = ((np.diag(g)[own] * size[own] ** 2).sum() / (3.0 * len(self)) for g in (gram[0], raw))
-            # of what the calibration takes up, rounding is all that is left: it must not be blown up to the size of an effect
+            # of what the calibration takes up, rounding is all that is left: it must not be blown up to the size of an
+            # effect
             size[own] /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
         return gram, moment, size, np.concatenate(largest), np.concatenate(positive), owner
 
     def over_strengths(self, terms, strengths=None, levels=slice(None)):
-        """Log evidence (levels, combinations) over every combination of the terms' strengths, and the combinations (m, terms).
+        """Log evidence (levels, combinations) over every combination of the terms' strengths, and the combinations (m,
+        terms).
 
         strengths: grids, one per term, by default STRENGTHS for each.
         """
@@ -153,7 +163,10 @@ class Evidence:
         combinations = np.array(list(product(*(strengths or (STRENGTHS,) * len(terms)))))
         scale = np.minimum(_with_laws(combinations)[:, owner] * size, largest)
         gained = kernels.log_evidence(
-            np.ascontiguousarray(gram[levels]), np.ascontiguousarray(moment[levels]), np.ascontiguousarray(scale), positive
+            np.ascontiguousarray(gram[levels]),
+            np.ascontiguousarray(moment[levels]),
+            np.ascontiguousarray(scale),
+            positive,
         )
         return self.none[levels, None] + gained, combinations
 
@@ -173,7 +186,9 @@ class Evidence:
         return np.minimum(np.asarray(strengths)[owner[own]] * size[own], largest[own])
 
     def explained(self, hypothesis):
-        """Rms per axis, over sigma, of what a hypothesis explains at its best level and strengths, the calibration's share taken out."""
+        """Rms per axis, over sigma, of what a hypothesis explains at its best level and strengths, the calibration's
+        share taken out.
+        """
         if not hypothesis.terms:
             return 0.0
         level = int(hypothesis.evidence.argmax())
@@ -182,7 +197,8 @@ class Evidence:
         return float(np.sqrt(max(mean @ gram @ mean, 0.0) / (3.0 * len(self))))
 
     def posterior(self, terms, strengths, level):
-        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at given strengths and discrepancy level (an index).
+        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at given strengths and discrepancy
+        level (an index).
 
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
@@ -197,7 +213,8 @@ class Evidence:
 
 
 def averaged(value, terms):
-    """Log evidence (levels,) averaged over the strengths of a number of terms from that of every combination (levels, m) of them.
+    """Log evidence (levels,) averaged over the strengths of a number of terms from that of every combination (levels,
+    m) of them.
 
     A grid that was cut short counts as the whole one.
     """
@@ -210,7 +227,9 @@ def _with_laws(strengths):
 
 
 def _not_negative(precision, moment, positive):
-    """The point (k,) of highest posterior density with no negative positive coefficient: bounded least squares on the Cholesky factor."""
+    """The point (k,) of highest posterior density with no negative positive coefficient: bounded least squares on the
+    Cholesky factor.
+    """
     factor = np.linalg.cholesky(precision)
     low = np.where(positive, 0.0, -np.inf)
     return lsq_linear(factor.T, np.linalg.solve(factor, moment), bounds=(low, np.inf), method="bvls").x

@@ -7,12 +7,14 @@ import numpy as np
 from rrru.gap.evidence import LEVELS, along_runs, spectrum
 from rrru.gap.terms import spread
 
-# where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every so-manieth is left out
+# where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
+# so-manieth is left out
 _STRETCH, _FOLDS = 5, 5
 
 
 def folds(case):
-    """Fold numbers (n,): one fold per run where every trajectory was driven more than once, else five of interleaved stretches.
+    """Fold numbers (n,): one fold per run where every trajectory was driven more than once, else five of interleaved
+    stretches.
 
     Leaving out the only run of a kind would ask for extrapolation, which says nothing about the effect.
     """
@@ -29,8 +31,8 @@ def folds(case):
 
 @dataclass(frozen=True)
 class Prediction:
-    """Residuals (n, 3) in mm of predictions of left-out points, and the part (n, 3, k) of them that one standard deviation of each of k
-    independent combinations of the fitted numbers makes: the prediction's own uncertainty.
+    """Residuals (n, 3) in mm of predictions of left-out points, and the part (n, 3, k) of them that one standard
+    deviation of each of k independent combinations of the fitted numbers makes: the prediction's own uncertainty.
     """
 
     residual_mm: np.ndarray
@@ -45,7 +47,8 @@ class Prediction:
 def predict(case, evidence, terms, strengths, level, fold):
     """Prediction of every used point from the other folds (n,) by the calibration together with a set of terms.
 
-    The fit is that of `Evidence.posterior` at given strengths and discrepancy level (an index), with the laws as they are.
+    The fit is that of `Evidence.posterior` at given strengths and discrepancy level (an index), with the laws as they
+    are.
     """
     linear = evidence.linear
     columns = np.concatenate([linear.base, *_chosen(evidence, terms)], axis=-1)
@@ -68,18 +71,25 @@ def predict(case, evidence, terms, strengths, level, fold):
 
 
 def log_score(prediction, case):
-    """Log predictive score (n,) of left-out points under the instrument's noise and the prediction's own uncertainty."""
+    """Log predictive score (n,) of left-out points under the instrument's noise and the prediction's own
+    uncertainty.
+    """
     variance = case.noise_mm**2 + prediction.uncertainty_mm2 / 3.0
     return -0.5 * (prediction.residual_mm**2).sum(axis=1) / variance - 1.5 * np.log(variance)
 
 
 def _chosen(evidence, terms):
     """Columns of the terms' free numbers."""
-    return [evidence.linear.columns[t.effect, t.shape] @ spread(evidence.library[t.effect].coordinates, t.legs) for t in terms]
+    return [
+        evidence.linear.columns[t.effect, t.shape] @ spread(evidence.library[t.effect].coordinates, t.legs)
+        for t in terms
+    ]
 
 
 def _weighted(case, evidence, columns, level, fold):
-    """Weights (n,), columns and data in which the fit is an ordinary weighted one: along the runs' cosines if folds are whole runs."""
+    """Weights (n,), columns and data in which the fit is an ordinary weighted one: along the runs' cosines if folds are
+    whole runs.
+    """
     data = evidence.linear.data
     whole = all(len(np.unique(fold[case.run == run])) == 1 for run in np.unique(case.run))
     if not whole:
@@ -90,7 +100,9 @@ def _weighted(case, evidence, columns, level, fold):
 
 
 def resampled_rows(run, generator, draws):
-    """Rows (draws, n) of points resampled by runs (n,), or by stretches of five points where there are fewer than ten runs."""
+    """Rows (draws, n) of points resampled by runs (n,), or by stretches of five points where there are fewer than ten
+    runs.
+    """
     block = run
     if len(np.unique(run)) < 10:
         within = np.concatenate([np.arange(np.count_nonzero(run == label)) for label in dict.fromkeys(run.tolist())])

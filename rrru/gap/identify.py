@@ -1,5 +1,5 @@
-"""What a campaign can show of each effect, before anything is fitted: how much of it the calibration leaves, from what size on it is found, and
-which other effect could stand in for it.
+"""What a campaign can show of each effect, before anything is fitted: how much of it the calibration leaves, from what
+size on it is found, and which other effect could stand in for it.
 """
 
 import numpy as np
@@ -35,7 +35,11 @@ def _visible(case, linear, name):
     """Columns of an effect (all its shapes) per typical size, before and after the calibration's part is taken out."""
     coordinates = case.library[name].coordinates
     raw = np.concatenate(
-        [linear.columns[name, shape].reshape(3 * len(case), -1) * coordinates.typical for shape in range(len(coordinates.shapes))], axis=1
+        [
+            linear.columns[name, shape].reshape(3 * len(case), -1) * coordinates.typical
+            for shape in range(len(coordinates.shapes))
+        ],
+        axis=1,
     )
     base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
     return raw, raw - base @ (base.T @ raw)

@@ -1,4 +1,6 @@
-"""Where the gap lies: its variance split over trajectory, region, direction, leg, sense of motion, speed, payload and time."""
+"""Where the gap lies: its variance split over trajectory, region, direction, leg, sense of motion, speed, payload and
+time.
+"""
 
 import numpy as np
 import pandas as pd
@@ -15,8 +17,9 @@ _MOST_LEVELS = 12
 def locate(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
-    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the actuator values. Shares are of the
-    mean square with the noise taken off; their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
+    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the actuator
+    values. Shares are of the mean square with the noise taken off; their 95 % intervals come from resampled runs
+    (stretches where there are fewer than ten).
     """
     frame = case.measurements.iloc[np.flatnonzero(case.used)].reset_index(drop=True)
     squares = (residual_mm**2).sum(axis=1)
@@ -28,17 +31,45 @@ def locate(case, residual_mm, drive, generator, draws=200):
         for level in pd.unique(levels[levels != ""]):
             here = levels == level
             rows.append(
-                _row(factor, level, np.where(here, squares, 0.0), squares, 3.0 * here, np.full(len(here), 3.0), variance, resampled)
+                _row(
+                    factor,
+                    level,
+                    np.where(here, squares, 0.0),
+                    squares,
+                    3.0 * here,
+                    np.full(len(here), 3.0),
+                    variance,
+                    resampled,
+                )
             )
             if factor == "region":
                 centre = case.motion.position_mm[case.used][here].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
     for k, axis in enumerate("xyz"):
         rows.append(
-            _row("direction", axis, residual_mm[:, k] ** 2, squares, np.ones(len(squares)), np.full(len(squares), 3.0), variance, resampled)
+            _row(
+                "direction",
+                axis,
+                residual_mm[:, k] ** 2,
+                squares,
+                np.ones(len(squares)),
+                np.full(len(squares), 3.0),
+                variance,
+                resampled,
+            )
         )
     rows.extend(_leg_rows(case, residual_mm, drive, resampled))
-    columns = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_high", "share_of_noise", "noise_could")
+    columns = (
+        "factor",
+        "level",
+        "points",
+        "rms_mm",
+        "share",
+        "share_low",
+        "share_high",
+        "share_of_noise",
+        "noise_could",
+    )
     return pd.DataFrame(rows).reindex(columns=[*columns, "drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm"])
 
 
@@ -56,7 +87,9 @@ def drive_errors(residual_mm, drive):
 
 
 def _row(factor, level, part, whole, part_freedom, whole_freedom, variance, resampled):
-    """One row: share of `part` (n,) in `whole` (n,), both sums of squares with their numbers of components (n,) of a variance."""
+    """One row: share of `part` (n,) in `whole` (n,), both sums of squares with their numbers of components (n,) of a
+    variance.
+    """
     excess, total = part - part_freedom * variance, whole - whole_freedom * variance
     drawn_total = total[resampled].sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -91,13 +124,16 @@ def _levels(case, frame):
     if np.isfinite(time).any():
         edges = np.nanquantile(time, [0.25, 0.5, 0.75])
         quarter = np.searchsorted(edges, time, side="right") + 1
-        result["time"] = np.array([f"quarter {q}" if np.isfinite(t) else "" for q, t in zip(quarter, time, strict=True)], dtype=object)
+        result["time"] = np.array(
+            [f"quarter {q}" if np.isfinite(t) else "" for q, t in zip(quarter, time, strict=True)], dtype=object
+        )
     if np.isfinite(rate).any():
         more, less = ("down", "up") if case.mechanism.drive_unit == "rad" else ("out", "in")
         for leg in range(3):
             sense = np.where(rate[:, leg] > 1e-6, more, np.where(rate[:, leg] < -1e-6, less, "at rest"))
             result[f"motion_direction {leg + 1}"] = np.array(
-                [f"leg {leg + 1} {s}" if np.isfinite(r) else "" for s, r in zip(sense, rate[:, leg], strict=True)], dtype=object
+                [f"leg {leg + 1} {s}" if np.isfinite(r) else "" for s, r in zip(sense, rate[:, leg], strict=True)],
+                dtype=object,
             )
     return result
 

@@ -12,8 +12,8 @@ _SPOILT, _MOST = 8.0, 0.1
 def estimate_noise(case, linear):
     """Noise per axis in mm and where it is from: "high_frequency", or "repeats" where these say clearly less.
 
-    High frequency: what no effect of the library can fit, in the upper half of the half-wave numbers along each run; a gap that is smooth
-    along the path leaves it alone, as time and hysteresis, which spoil repeats, do.
+    High frequency: what no effect of the library can fit, in the upper half of the half-wave numbers along each run; a
+    gap that is smooth along the path leaves it alone, as time and hysteresis, which spoil repeats, do.
     """
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
     if columns.shape[-1] > len(case):
@@ -35,7 +35,8 @@ def estimate_noise(case, linear):
 
 
 def spoilt(case, residual_mm, floor_mm):
-    """Used points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run, where such jumps are rare.
+    """Used points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run, where such
+    jumps are rare.
 
     floor_mm: noise per axis below which no jump counts, 0 where nobody knows it.
     """

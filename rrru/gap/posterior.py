@@ -1,4 +1,6 @@
-"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of something that no effect explains."""
+"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of something that no effect
+explains.
+"""
 
 from dataclasses import dataclass
 from math import comb
@@ -18,7 +20,8 @@ _NEGLIGIBLE = 25.0
 class Prior:
     """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
 
-    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own inaccuracy.
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    inaccuracy.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
@@ -28,7 +31,9 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Hypotheses with weights (h, levels) that sum to one, and which of these levels count as unexplained (h, levels)."""
+    """Hypotheses with weights (h, levels) that sum to one, and which of these levels count as unexplained (h,
+    levels).
+    """
 
     hypotheses: tuple
     weights: np.ndarray
@@ -92,7 +97,9 @@ def posterior(evidence, hypotheses, prior):
     library = evidence.library
     log_weight = np.array([h.evidence + _log_prior_terms(library, h.terms, prior) for h in hypotheses])
     # single effects stay, however improbable: tables show what each does alone
-    worth = (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE) | np.array([len(h.terms) <= 1 for h in hypotheses])
+    worth = (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE) | np.array(
+        [len(h.terms) <= 1 for h in hypotheses]
+    )
     kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
     log_weight = log_weight[worth]
     unexplained = np.zeros(log_weight.shape, dtype=bool)

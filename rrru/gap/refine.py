@@ -13,7 +13,8 @@ _ENOUGH = 1e-4
 
 
 def refine(case, state, hypothesis, level):
-    """State of the hypothesis fitted from a start: Gauss-Newton with renewed linearisation and halved steps where the exact sim gets worse.
+    """State of the hypothesis fitted from a start: Gauss-Newton with renewed linearisation and halved steps where the
+    exact sim gets worse.
 
     Returns (state, covariance (k, k) of the terms' coefficients). Raises FitError where the sim loses its pose.
     """
@@ -57,7 +58,9 @@ def _coordinates(library, terms, coefficients):
 
 
 def _target(linear, state, hypothesis, mean, library):
-    """The state that the linearisation asks for: the terms' coefficients, their shapes, and the calibration that goes with them."""
+    """The state that the linearisation asks for: the terms' coefficients, their shapes, and the calibration that goes
+    with them.
+    """
     effects = _coordinates(library, hypothesis.terms, mean)
     rest = linear.data - sum(linear.columns[key] @ value for key, value in effects.items())
     shapes, start = dict(state.shapes), len(mean) - sum(columns.shape[-1] for columns in linear.laws.values())

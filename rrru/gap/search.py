@@ -73,8 +73,8 @@ def search(evidence, most=3):
 def _score(evidence, terms, strengths, levels, leader):
     """The hypothesis of a set of terms at the chosen levels, -inf at the others.
 
-    leader: level and evidence of the best hypothesis so far. A larger set is tried at that level first; where it is hopeless there, the
-    other levels are left out.
+    leader: level and evidence of the best hypothesis so far. A larger set is tried at that level first; where it is
+    hopeless there, the other levels are left out.
     """
     full = np.full(len(LEVELS), -np.inf)
     best = np.ones((len(LEVELS), len(terms)))
@@ -82,7 +82,9 @@ def _score(evidence, terms, strengths, levels, leader):
         return Hypothesis((), evidence.none.copy(), best)
     if len(terms) > 1:
         probe = leader[0]
-        coarse = tuple(grid[1::2] if len(grid) == len(STRENGTHS) else grid for grid in strengths or (STRENGTHS,) * len(terms))
+        coarse = tuple(
+            grid[1::2] if len(grid) == len(STRENGTHS) else grid for grid in strengths or (STRENGTHS,) * len(terms)
+        )
         value, grid = evidence.over_strengths(terms, coarse, [probe])
         full[probe] = averaged(value, len(terms))[0]
         best[probe] = grid[value[0].argmax()]

@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass, field, replace
 
-from rrru.effects.registry import EFFECTS, SLIDER_EFFECTS, find
+from rrru.effects.library import EFFECTS, SLIDER_EFFECTS, find
 from rrru.errors import ConfigError
 from rrru.gap.posterior import Prior
 
 
 @dataclass(frozen=True)
 class GapSettings:
-    """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known, such as a gear ratio;
-    prior; draws: resamplings for intervals; seed.
+    """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known,
+    such as a gear ratio; prior; draws: resamplings for intervals; seed.
     """
 
     effects: tuple = tuple(EFFECTS | SLIDER_EFFECTS)
@@ -47,11 +47,16 @@ class GapSettings:
 
 
 def _with_known(effect, values):
-    """The effect with parameters of its shapes fixed to known values; raises ConfigError for a parameter that no shape holds."""
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError for a parameter that no shape
+    holds.
+    """
     coordinates = effect.coordinates
     unknown = [key for key in values if key not in coordinates.shapes[0]]
     if unknown:
         allowed = ", ".join(coordinates.shapes[0]) or "none"
         raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
-    shapes = tuple(dict(pairs) for pairs in dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes))
+    shapes = tuple(
+        dict(pairs)
+        for pairs in dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
+    )
     return replace(effect, coordinates=replace(coordinates, shapes=shapes))

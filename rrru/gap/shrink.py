@@ -1,4 +1,6 @@
-"""How far the gap shrinks as effects are added: on points that were left out of the fit, and once more on the re-simulated campaign."""
+"""How far the gap shrinks as effects are added: on points that were left out of the fit, and once more on the
+re-simulated campaign.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +12,9 @@ from rrru.gap.heldout import folds, predict, resampled_rows
 
 @dataclass(frozen=True)
 class Step:
-    """The gap after some effects are added: squared gap (n,) in mm^2 at each point, noise taken off, and its draws (b, n) for intervals."""
+    """The gap after some effects are added: squared gap (n,) in mm^2 at each point, noise taken off, and its draws (b,
+    n) for intervals.
+    """
 
     added: str
     effects: tuple
@@ -25,7 +29,9 @@ def gap_rms(squares):
 
 
 def order_by_share(case, evidence, hypothesis, level):
-    """(effect, share of the gap's mean square that it removes when it comes next) from the largest on, on left-out points."""
+    """(effect, share of the gap's mean square that it removes when it comes next) from the largest on, on left-out
+    points.
+    """
     fold, left, chosen, result = folds(case), list(hypothesis.terms), [], []
     noise = 3.0 * case.noise_mm**2
 
@@ -47,9 +53,10 @@ def order_by_share(case, evidence, hypothesis, level):
 def steps(attribution, ordered, unexplained, generator, draws=200):
     """Steps from the calibration alone to all effects, one after another.
 
-    ordered: terms in the order in which they are added; unexplained: probability that something is left. What the last step leaves is
-    the uncertainty of its numbers where it explains all, what the residuals show beyond the noise where it does not, and the two are
-    mixed by that probability. The draws resample runs (stretches where there are fewer than ten) and redraw the fitted numbers.
+    ordered: terms in the order in which they are added; unexplained: probability that something is left. What the last
+    step leaves is the uncertainty of its numbers where it explains all, what the residuals show beyond the noise where
+    it does not, and the two are mixed by that probability. The draws resample runs (stretches where there are fewer
+    than ten) and redraw the fitted numbers.
     """
     case, evidence, level = attribution.case, attribution.evidence, attribution.level
     fold = folds(case)
@@ -63,9 +70,17 @@ def steps(attribution, ordered, unexplained, generator, draws=200):
         last = count == len(ordered)
         weight = unexplained if last else 1.0
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
-        moved = ((prediction.spread.reshape(-1, numbers.shape[1]) @ numbers.T) ** 2).reshape(len(shown), 3, draws).sum(axis=1).T
+        moved = (
+            ((prediction.spread.reshape(-1, numbers.shape[1]) @ numbers.T) ** 2)
+            .reshape(len(shown), 3, draws)
+            .sum(axis=1)
+            .T
+        )
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
-        drawn = weight * np.take_along_axis(np.broadcast_to(shown, (draws, len(shown))), picks, axis=1) + (1.0 - weight) * moved
+        drawn = (
+            weight * np.take_along_axis(np.broadcast_to(shown, (draws, len(shown))), picks, axis=1)
+            + (1.0 - weight) * moved
+        )
         added = ordered[count - 1].effect if count else ""
         result.append(Step(added, tuple(t.effect for t in terms), prediction.residual_mm, squares, drawn))
     return tuple(result)
@@ -81,7 +96,9 @@ def share_closed(before, after):
 
 
 def table(case, found, resimulated_mm):
-    """Rows of `gap_shrink` without the campaign; resimulated_mm: residuals (n, 3) of the corrected simulator, or None without effects."""
+    """Rows of `gap_shrink` without the campaign; resimulated_mm: residuals (n, 3) of the corrected simulator, or None
+    without effects.
+    """
     trajectory = case.measurements["trajectory"].to_numpy()[case.used]
     noise = float(np.sqrt(3.0) * case.noise_mm)
     rows = []
@@ -89,7 +106,9 @@ def table(case, found, resimulated_mm):
         for name in ("*", *pd.unique(trajectory)):
             here = np.ones(len(trajectory), dtype=bool) if name == "*" else trajectory == name
             share = share_closed(_part(found[0], here), _part(step, here)) if number else (np.nan,) * 3
-            rows.append(_row(number, step, name, "held_out", step.residual_mm[here], noise, gap_rms(step.gap_mm2[here]), share))
+            rows.append(
+                _row(number, step, name, "held_out", step.residual_mm[here], noise, gap_rms(step.gap_mm2[here]), share)
+            )
     if resimulated_mm is not None:
         before, step = gap_rms(found[0].gap_mm2), found[-1]
         after = gap_rms((resimulated_mm**2).sum(axis=1) - noise**2)

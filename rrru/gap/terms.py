@@ -10,7 +10,9 @@ EACH, SAME = "each", "same"
 
 @dataclass(frozen=True)
 class Term:
-    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg that it acts on."""
+    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg that it acts
+    on.
+    """
 
     effect: str
     shape: int = 0
@@ -36,7 +38,8 @@ def per_leg(effect):
 def variants(effect):
     """All terms of an effect: each shape with each choice of legs that makes a difference.
 
-    One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed errors of an assembly.
+    One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
+    errors of an assembly.
     """
     coordinates, legs = effect.coordinates, per_leg(effect)
     choices = (EACH, *((SAME,) if legs and coordinates.positive.all() else ()), *((1, 2, 3) if legs else ()))

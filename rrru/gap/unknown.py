@@ -1,7 +1,9 @@
-"""What a gap may look like that no law of the library makes: smooth functions, with a fair number of free coefficients each.
+"""What a gap may look like that no law of the library makes: smooth functions, with a fair number of free coefficients
+each.
 
-They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the gap follows the
-drives, the time, the place or the load in a way that the library does not hold, and the verdict says "unexplained".
+They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the
+gap follows the drives, the time, the place or the load in a way that the library does not hold, and the verdict says
+"unexplained".
 """
 
 from dataclasses import dataclass, replace
@@ -9,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rrru.effects.protocol import Contribution, Coordinates
+from rrru.effects.effect import Contribution, Coordinates
 
 _DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each actuator value, else to each axis.
+    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each actuator value,
+    else to each axis.
 
     typical: size of its coefficients in the drive's unit or mm.
     """
@@ -33,7 +36,12 @@ class Unknown:
     def coordinates(self):
         """One coefficient per function and leg or axis, in the drive's unit or mm."""
         total = 3 * self.count
-        return Coordinates(np.full(total, self.typical), np.zeros(total, dtype=int), np.zeros(total, dtype=bool), lambda values, _: values)
+        return Coordinates(
+            np.full(total, self.typical),
+            np.zeros(total, dtype=int),
+            np.zeros(total, dtype=bool),
+            lambda values, _: values,
+        )
 
     def contribute(self, motion, values):
         """Changes under coefficients (3 k,)."""
@@ -96,4 +104,7 @@ def unknown_functions(drive_unit):
     """UNKNOWN for a robot with drives in "rad" or "mm"."""
     if drive_unit == "rad":
         return UNKNOWN
-    return {name: replace(function, typical=_SLIDER_TYPICAL_MM) if function.per_leg else function for name, function in UNKNOWN.items()}
+    return {
+        name: replace(function, typical=_SLIDER_TYPICAL_MM) if function.per_leg else function
+        for name, function in UNKNOWN.items()
+    }

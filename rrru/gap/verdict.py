@@ -12,8 +12,9 @@ _NOTHING = 0.2
 
 @dataclass(frozen=True)
 class Verdict:
-    """effects: names in order of share, () for none; unexplained: something is left that no effect explains; probability of both together;
-    leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the data leave open, each (names, probability).
+    """effects: names in order of share, () for none; unexplained: something is left that no effect explains;
+    probability of both together; leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the
+    data leave open, each (names, probability).
     """
 
     effects: tuple
@@ -29,7 +30,9 @@ class Verdict:
 
     @property
     def confusable_with(self):
-        """Effects outside the verdict that appear in a rival, most probable first; "unexplained" and "none" count as such."""
+        """Effects outside the verdict that appear in a rival, most probable first; "unexplained" and "none" count as
+        such.
+        """
         names = []
         for effects, unexplained, _ in self.rivals:
             others = [name for name in sorted(effects) if name not in self.effects]
@@ -49,10 +52,11 @@ def label(effects, unexplained):
 def decide(attribution, shares):
     """Verdict of an attribution; shares: effect to the share of the gap that it explains, for the order.
 
-    Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to matter.
+    Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
+    matter.
 
-    Beside something unexplained effects are named only where they act with a probability of 0.9 each and explain half of the gap together;
-    else they are what could be mistaken for a part of it.
+    Beside something unexplained effects are named only where they act with a probability of 0.9 each and explain half
+    of the gap together; else they are what could be mistaken for a part of it.
     """
     beliefs = attribution.posterior
     sets = beliefs.sets()
@@ -65,7 +69,9 @@ def decide(attribution, shares):
     if unknown > known.get(best, 0.0):
         within = {key: p for key, p in sets.items() if key[1]}
         everywhere = {name for effects, _ in within for name in effects}
-        sure = frozenset(n for n in everywhere if sum(p for (effects, _), p in within.items() if n in effects) > _SURE * unknown)
+        sure = frozenset(
+            n for n in everywhere if sum(p for (effects, _), p in within.items() if n in effects) > _SURE * unknown
+        )
         named = sure if sum(shares.get(name, 0.0) for name in sure) >= _HALF else frozenset()
         effects, probability = named, sum(p for (names, _), p in within.items() if named <= names)
         # what imitates a part of the unknown, and what would do without it
@@ -76,10 +82,16 @@ def decide(attribution, shares):
         rivals[frozenset(), True] = sum(p for (_, flag), p in sets.items() if flag)
     named = tuple(sorted(effects, key=lambda name: (-shares.get(name, 0.0), name)))
     rivals = tuple(
-        (names, flag, p) for (names, flag), p in sorted(rivals.items(), key=lambda r: (-r[1], sorted(r[0][0]))) if p > _RIVAL * probability
+        (names, flag, p)
+        for (names, flag), p in sorted(rivals.items(), key=lambda r: (-r[1], sorted(r[0][0])))
+        if p > _RIVAL * probability
     )
     return Verdict(
-        named, unknown > known.get(best, 0.0), float(min(probability, 1.0)), _leg(beliefs, effects, attribution.case.library), rivals
+        named,
+        unknown > known.get(best, 0.0),
+        float(min(probability, 1.0)),
+        _leg(beliefs, effects, attribution.case.library),
+        rivals,
     )
 
 

@@ -1,11 +1,15 @@
-"""The real camera of paper C, 2.1: a dot target seen by a pinhole camera with lens distortion, blur, pixel noise and 8 bits.
+"""The real camera of paper C, 2.1: a dot target seen by a pinhole camera with lens distortion, blur, pixel noise and 8
+bits.
 
-Camera frame: x along the rows of pixels, y down the columns, z along the optical axis; the first pixel's centre is (0, 0). A point (X, Y, Z) of
-it has the normalised coordinates x = X / Z, y = Y / Z, which the lens moves (Brown, "Close-range camera calibration", 1971) to
+Camera frame: x along the rows of pixels, y down the columns, z along the optical axis; the first pixel's centre is (0,
+0). A point (X, Y, Z) of it has the normalised coordinates x = X / Z, y = Y / Z, which the lens moves (Brown,
+"Close-range camera calibration", 1971) to
 
-    x_d = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2),   y_d = y (1 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2 p2 x y
+    x_d = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2),   y_d = y (1 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2
+    p2 x y
 
-and the chip turns into pixels. The target's dots lie in the plane z = 0 of its own frame. Lengths in mm, greys 0 to 255.
+and the chip turns into pixels. The target's dots lie in the plane z = 0 of its own frame. Lengths in mm, greys 0 to
+255.
 """
 
 from dataclasses import dataclass
@@ -24,7 +28,8 @@ _CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-7)
 
 @dataclass(frozen=True)
 class Target:
-    """A plate with columns x rows of dots; the first dot is the origin of its frame, x along the columns' numbers, y along the rows'.
+    """A plate with columns x rows of dots; the first dot is the origin of its frame, x along the columns' numbers, y
+    along the rows'.
 
     offsets_mm (rows, columns, 2): how far each dot lies off its place in the lattice.
     """
@@ -45,8 +50,8 @@ class Target:
 class Camera:
     """A camera as it really is: nobody but the renderer may know it.
 
-    distortion: k1, k2, p1, p2; centre_offset_px: optical axis off the chip's middle; blur_px: 1 sigma of the lens's point spread;
-    noise_grey: 1 sigma per pixel.
+    distortion: k1, k2, p1, p2; centre_offset_px: optical axis off the chip's middle; blur_px: 1 sigma of the lens's
+    point spread; noise_grey: 1 sigma per pixel.
     """
 
     focal_mm: float
@@ -87,7 +92,9 @@ class Camera:
         across = (np.arange(self.width_px)[:, None] + offset).ravel()
         down = (np.arange(self.height_px)[:, None] + offset).ravel()
         pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 1, 2)
-        matrix = np.array([[self.focal_px, 0.0, self.centre_px[0]], [0.0, self.focal_px, self.centre_px[1]], [0.0, 0.0, 1.0]])
+        matrix = np.array(
+            [[self.focal_px, 0.0, self.centre_px[0]], [0.0, self.focal_px, self.centre_px[1]], [0.0, 0.0, 1.0]]
+        )
         rays = cv2.undistortPoints(pixels, matrix, np.array(self.distortion), criteria=_CRITERIA)
         return np.ascontiguousarray(rays.reshape(len(down), len(across), 2).transpose(2, 0, 1))
 
@@ -95,7 +102,8 @@ class Camera:
 def render(camera, target, rotation, translation_mm, generator):
     """Image (height, width) of 8 bits that the camera takes of the target.
 
-    rotation (3, 3), translation_mm (3,): from the target's frame to the camera's. generator: numpy Generator of the pixel noise.
+    rotation (3, 3), translation_mm (3,): from the target's frame to the camera's. generator: numpy Generator of the
+    pixel noise.
     """
     to_plane = np.linalg.inv(np.column_stack([rotation[:, 0], rotation[:, 1], translation_mm]))
     x, y = camera.rays

@@ -1,18 +1,17 @@
 """Any robot's chains closed exactly, with errors of its numbers and under what effects contribute.
 
-Virtual robots and the diagnosis' corrected sims stand on this.
-The 3-RRRU closes in space, with a platform that may turn (`rrru.plant.spatial`); the platform of a tripod only translates. Lengths in mm, angles
-in rad.
+Virtual robots and the diagnosis' corrected sims stand on this. The 3-RRRU closes in space, with a platform that may
+turn (`rrru.plant.spatial`); the platform of a tripod only translates. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import PLACES
-from rrru.mechanisms.first_order_tripod import base_shift
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.effects.effect import PLACES
 from rrru.plant.spatial import SpatialGeometry, into_frame
+from rrru.robots.first_order_tripod import base_shift
+from rrru.robots.rrru3 import Rrru3
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,9 @@ class TripodGeometry:
     legs: np.ndarray
 
     def solve_under(self, actuators, change):
-        """Platform centres (n, 3) in the tracker's frame at actuator values (n, 3) under a Contribution; NaN where the links do not meet."""
+        """Platform centres (n, 3) in the tracker's frame at actuator values (n, 3) under a Contribution; NaN where the
+        links do not meet.
+        """
         robot, legs, actuators = self.mechanism, self.legs, np.asarray(actuators, dtype=float)
         shift = np.zeros((len(actuators), 3, 3)) + change.joint_mm
         if np.ndim(change.displacement):
@@ -35,7 +36,9 @@ class TripodGeometry:
 
 
 def corrected_sim(mechanism, errors, actuators, command_mm, change):
-    """Positions (n, 3) in mm of a mechanism with errors (p,) at actuator values (n, 3) near commands (n, 3), under a Contribution."""
+    """Positions (n, 3) in mm of a mechanism with errors (p,) at actuator values (n, 3) near commands (n, 3), under a
+    Contribution.
+    """
     legs = mechanism.legs(errors)
     if not isinstance(mechanism, Rrru3):
         return TripodGeometry(mechanism, legs).solve_under(actuators, change)

@@ -1,21 +1,25 @@
-"""Bench of a screw: one slider turned forwards, back and forwards again, a linear encoder beside it (paper B, 3.1.1, Fig. 7). Lengths in mm."""
+"""Bench of a screw: one slider turned forwards, back and forwards again, a linear encoder beside it (paper B, 3.1.1,
+Fig. 7). Lengths in mm.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
+from rrru.effects.effect import Contribution
 from rrru.effects.motion import make_motion
-from rrru.effects.protocol import Contribution
 from rrru.errors import UnreachableError
-from rrru.mechanisms.dynamics import Masses
+from rrru.robots.dynamics import Masses
 
 PASSES = ("forward_1", "reverse", "forward_2")
 
 
 @dataclass(frozen=True)
 class Bench:
-    """turns of the motor per pass, lead of the screw in mm per turn, samples per turn, the encoder's noise (1 sigma) and resolution in mm."""
+    """turns of the motor per pass, lead of the screw in mm per turn, samples per turn, the encoder's noise (1 sigma)
+    and resolution in mm.
+    """
 
     turns: int
     lead_mm: float
@@ -24,9 +28,11 @@ class Bench:
     resolution_mm: float
 
     def path(self):
-        """Commanded travel (3 n + 1,) in mm from the start, and the pass (3 n + 1,) that each sample belongs to, 0 to 2.
+        """Commanded travel (3 n + 1,) in mm from the start, and the pass (3 n + 1,) that each sample belongs to, 0 to
+        2.
 
-        All passes stop at the same places, so that readings can be compared one by one; the turning points belong to the pass that ends there.
+        All passes stop at the same places, so that readings can be compared one by one; the turning points belong to
+        the pass that ends there.
         """
         count = self.turns * self.samples_per_turn
         forward = np.arange(1, count + 1) * (self.lead_mm / self.samples_per_turn)
@@ -35,17 +41,20 @@ class Bench:
 
 
 def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
-    """Record of one slider: pass, commanded_mm and encoder_mm per sample, robot standing about `place_mm` (3,) under a payload.
+    """Record of one slider: pass, commanded_mm and encoder_mm per sample, robot standing about `place_mm` (3,) under a
+    payload.
 
-    The other two sliders stand still. The encoder sees the carriage, with all that the robot's effects do to its drive. leg: 1 to 3. Raises
-    UnreachableError where the travel leaves the reach.
+    The other two sliders stand still. The encoder sees the carriage, with all that the robot's effects do to its drive.
+    leg: 1 to 3. Raises UnreachableError where the travel leaves the reach.
     """
     mechanism, (travel, number) = robot.mechanism, bench.path()
     sliders = np.repeat(mechanism.require_reachable(np.reshape(place_mm, (1, 3))), len(travel), axis=0)
     sliders[:, leg - 1] += travel - 0.5 * travel.max()
     position = mechanism.forward(sliders)
     if not np.isfinite(position).all():
-        raise UnreachableError(f"screw {leg}: {travel.max():g} mm of travel about {tuple(place_mm)} leave the reach; allowed: less")
+        raise UnreachableError(
+            f"screw {leg}: {travel.max():g} mm of travel about {tuple(place_mm)} leave the reach; allowed: less"
+        )
     still = np.zeros_like(position)
     motion = make_motion(
         mechanism,

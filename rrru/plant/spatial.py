@@ -4,8 +4,8 @@ Leg i, from the base's centre to the platform's, in the leg's frame (x radial, y
 
     T_i = Rz(phi) Tx(R) D0 Ry(-q1) Tx(L1) D1 Ry(-q2) Tx(L2) D2 Rz(q3) Tx(L3) D3 Rz(q4) D4 Ry(-q5) Tx(-r) D5 Rz(-phi)
 
-with a small rigid displacement D after every fixed part. T_1 = T_2 = T_3 gives 12 equations for the 12 passive angles; the platform may
-turn. Nothing here uses eq. (8), which the calibration solves. Lengths in mm, angles in rad.
+with a small rigid displacement D after every fixed part. T_1 = T_2 = T_3 gives 12 equations for the 12 passive angles;
+the platform may turn. Nothing here uses eq. (8), which the calibration solves. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.effects.protocol import PLACES
+from rrru.effects.effect import PLACES
 
 # The rotation part of a closure residual counts as the distance it makes at this arm.
 _ARM_MM = 500.0
@@ -31,7 +31,9 @@ def into_frame(position_mm, frame):
 
 @dataclass(frozen=True)
 class SpatialSolution:
-    """Solved points: platform centre (n, 3), platform rotation vector (n, 3), closure residual (n,) in mm, converged (n,)."""
+    """Solved points: platform centre (n, 3), platform rotation vector (n, 3), closure residual (n,) in mm, converged
+    (n,).
+    """
 
     position_mm: np.ndarray
     rotation_rad: np.ndarray
@@ -41,7 +43,8 @@ class SpatialSolution:
 
 @dataclass(frozen=True)
 class SpatialGeometry:
-    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) where they change from point to point, and displacements.
+    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) where they change from point to point, and
+    displacements.
 
     deviations: (3 legs, 6 PLACES, 6) = shift in mm, rotation vector in rad, in the leg's frame at that place.
     """
@@ -53,12 +56,15 @@ class SpatialGeometry:
     def solve(self, theta_rad, passive_guess_rad, joint_shift_mm=None):
         """Close the chains at drive angles (n, 3).
 
-        passive_guess_rad: (n, 3, 4) of the ideal robot; joint_shift_mm: (n, 3, 3), displacement of the platform's joint centre against
-        the forearm, robot frame. Points are solved in their order, each warm-started with the correction that the last one needed.
+        passive_guess_rad: (n, 3, 4) of the ideal robot; joint_shift_mm: (n, 3, 3), displacement of the platform's joint
+        centre against the forearm, robot frame. Points are solved in their order, each warm-started with the correction
+        that the last one needed.
         """
         n = len(theta_rad)
         shift = np.zeros((n, 3, 3)) if joint_shift_mm is None else np.broadcast_to(joint_shift_mm, (n, 3, 3))
-        rotations = Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+        rotations = (
+            Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+        )
         position, turned, residual = _solve_points(
             np.ascontiguousarray(self.azimuth_rad, dtype=float),
             np.ascontiguousarray(np.broadcast_to(self.lengths_mm, (n, 3, 5)), dtype=float),
@@ -73,15 +79,26 @@ class SpatialGeometry:
     def solve_under(self, theta_rad, passive_guess_rad, change):
         """Close the chains as `solve` does under what effects contribute; positions are in the tracker's frame.
 
-        Displacements of effects and the geometry's own at one place are added, which holds to first order in their angles.
+        Displacements of effects and the geometry's own at one place are added, which holds to first order in their
+        angles.
         """
-        changed = replace(self, lengths_mm=self.lengths_mm + change.length_mm, deviations=self.deviations + change.displacement)
+        changed = replace(
+            self, lengths_mm=self.lengths_mm + change.length_mm, deviations=self.deviations + change.displacement
+        )
         solution = changed.solve(theta_rad + change.drive, passive_guess_rad, change.joint_mm)
-        return solution if not np.ndim(change.frame) else replace(solution, position_mm=into_frame(solution.position_mm, change.frame))
+        return (
+            solution
+            if not np.ndim(change.frame)
+            else replace(solution, position_mm=into_frame(solution.position_mm, change.frame))
+        )
 
     def closure_determinant(self, theta_rad, passive_rad):
-        """Determinant (n,) of the 12 x 12 closure Jacobian at drive angles (n, 3) and passive angles (n, 3, 4), lengths in units of 500 mm."""
-        rotations = Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+        """Determinant (n,) of the 12 x 12 closure Jacobian at drive angles (n, 3) and passive angles (n, 3, 4), lengths
+        in units of 500 mm.
+        """
+        rotations = (
+            Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+        )
         jacobian, residual = np.empty((12, 12)), np.empty(12)
         result = []
         lengths_mm = np.broadcast_to(self.lengths_mm, (len(theta_rad), 3, 5))
@@ -123,7 +140,9 @@ def _turn_z(matrix, angle):
 
 @_compiled
 def _displace(matrix, point, length, shift, rotation):
-    """Go `length` along the local x, then the displacement: shift (3,) and rotation (3, 3) in the local frame, in place."""
+    """Go `length` along the local x, then the displacement: shift (3,) and rotation (3, 3) in the local frame, in
+    place.
+    """
     for k in range(3):
         point[k] += matrix[k, 0] * (length + shift[0]) + matrix[k, 1] * shift[1] + matrix[k, 2] * shift[2]
     matrix[:] = matrix @ rotation
@@ -131,7 +150,9 @@ def _displace(matrix, point, length, shift, rotation):
 
 @_compiled
 def _chain(azimuth, lengths, shifts, rotations, angles, joint_shift, axes, points, matrix, point):
-    """One leg: joint axes (5, 3) and points (5, 3) on them, platform rotation (3, 3) and position (3,), all written in place."""
+    """One leg: joint axes (5, 3) and points (5, 3) on them, platform rotation (3, 3) and position (3,), all written in
+    place.
+    """
     matrix[:] = np.eye(3)
     point[:] = 0.0
     _turn_z(matrix, azimuth)
@@ -155,7 +176,9 @@ def _chain(azimuth, lengths, shifts, rotations, angles, joint_shift, axes, point
 
 @_compiled
 def _closure(azimuth, lengths, shifts, rotations, theta, passive, joint_shift, jacobian, residual):
-    """Closure residual (12,) and its Jacobian (12, 12) by the passive angles, in place; returns the platform pose of leg 1."""
+    """Closure residual (12,) and its Jacobian (12, 12) by the passive angles, in place; returns the platform pose of
+    leg 1.
+    """
     axes, points = np.empty((5, 3)), np.empty((5, 3))
     first_matrix, first_point = np.empty((3, 3)), np.empty(3)
     matrix, point, angles = np.empty((3, 3)), np.empty(3), np.empty(5)
@@ -163,7 +186,18 @@ def _closure(azimuth, lengths, shifts, rotations, theta, passive, joint_shift, j
     for leg in range(3):
         angles[0] = theta[leg]
         angles[1:] = passive[4 * leg : 4 * leg + 4]
-        _chain(azimuth[leg], lengths[leg], shifts[leg], rotations[leg], angles, joint_shift[leg], axes, points, matrix, point)
+        _chain(
+            azimuth[leg],
+            lengths[leg],
+            shifts[leg],
+            rotations[leg],
+            angles,
+            joint_shift[leg],
+            axes,
+            points,
+            matrix,
+            point,
+        )
         if leg == 0:
             first_matrix[:], first_point[:] = matrix, point
         else:
@@ -199,7 +233,9 @@ def _solve_points(azimuth, lengths, shifts, rotations, theta, guess, joint_shift
             continue
         passive = guess[j] + correction
         for _ in range(_MOST_STEPS):
-            matrix, point = _closure(azimuth, lengths[j], shifts, rotations, theta[j], passive, joint_shift[j], jacobian, residual)
+            matrix, point = _closure(
+                azimuth, lengths[j], shifts, rotations, theta[j], passive, joint_shift[j], jacobian, residual
+            )
             largest = np.abs(residual).max()
             residuals[j] = largest
             if not largest > _TOLERANCE_MM:

@@ -1,30 +1,34 @@
-"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
+"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside.
+Lengths mm, angles rad.
+"""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rrru.campaign.measurements import actuator_columns
+from rrru.effects.effect import PLACES, Contribution
+from rrru.effects.library import active_effects
 from rrru.effects.motion import make_motion
-from rrru.effects.protocol import PLACES, Contribution
-from rrru.effects.registry import active_effects
 from rrru.errors import ConfigError
-from rrru.mechanisms.dynamics import Masses
-from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3
 from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
+from rrru.robots.dynamics import Masses
+from rrru.robots.rrru3 import ERROR_NAMES, Rrru3
 
 
 class DrivenRobot:
-    """What virtual robots share: they drive plans and are measured. They add mechanism, wobble_mm, the three masses and `positions`."""
+    """What virtual robots share: they drive plans and are measured. They add mechanism, wobble_mm, the three masses and
+    `positions`.
+    """
 
     def run(self, plan, noise_mm, generator, controller=None):
         """Drive a plan; returns (measurements, truth) as frames.
 
-        controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse kinematics. `measurements`
-        fits the schema of that name with the commanded positions of the plan and the values that the controller sent; `truth` holds the
-        exact position in the tracker's frame and the platform's rotation. Noise is drawn for every row, solved or not, so that one lost
-        point does not change the others.
+        controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse
+        kinematics. `measurements` fits the schema of that name with the commanded positions of the plan and the values
+        that the controller sent; `truth` holds the exact position in the tracker's frame and the platform's rotation.
+        Noise is drawn for every row, solved or not, so that one lost point does not change the others.
         """
         controller = controller or self.mechanism.inverse
         commands = plan.commands(self.mechanism)
@@ -46,7 +50,9 @@ class DrivenRobot:
         return measurements, truth
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan driven through a controller; the loads are those of the nominal mechanism."""
+        """What the effects may know about a plan driven through a controller; the loads are those of the nominal
+        mechanism.
+        """
         path, index = plan.path()
         along = controller(path)
         return make_motion(
@@ -67,9 +73,9 @@ class DrivenRobot:
 class VirtualRobot(DrivenRobot):
     """A 3-RRRU whose truth is known.
 
-    errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6): displacements of every axis;
-    effects: active effects; wobble_mm: radius of the ball in which the platform lies at random, see `wobble`; masses in kg;
-    rotation_limit_rad: a larger platform rotation counts as unsolved.
+    errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6):
+    displacements of every axis; effects: active effects; wobble_mm: radius of the ball in which the platform lies at
+    random, see `wobble`; masses in kg; rotation_limit_rad: a larger platform rotation counts as unsolved.
     """
 
     mechanism: Rrru3 = field(default_factory=Rrru3)
@@ -101,7 +107,8 @@ class VirtualRobot(DrivenRobot):
         return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.deviations)
 
     def positions(self, motion, target):
-        """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion near `target` (n, 3).
+        """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion
+        near `target` (n, 3).
 
         NaN where the chains do not close near the target or the platform would turn by more than the limit.
         """
@@ -114,7 +121,9 @@ class VirtualRobot(DrivenRobot):
 
 
 def wobble(generator, count):
-    """Points (count, 3) uniform in the unit ball: what clearance lets the platform do from stop to stop, bounded unlike instrument noise."""
+    """Points (count, 3) uniform in the unit ball: what clearance lets the platform do from stop to stop, bounded unlike
+    instrument noise.
+    """
     direction = generator.standard_normal((count, 3))
     radius = generator.random((count, 1)) ** (1.0 / 3.0)
     return radius * direction / np.linalg.norm(direction, axis=1, keepdims=True)

@@ -1,11 +1,13 @@
-"""The virtual 3-PTT or Delta: nominal controller in front, exact closure with its effects behind, a tracker beside. Lengths mm, angles rad."""
+"""The virtual 3-PTT or Delta: nominal controller in front, exact closure with its effects behind, a tracker beside.
+Lengths mm, angles rad.
+"""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution
-from rrru.effects.registry import active_effects
+from rrru.effects.effect import Contribution
+from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
 from rrru.plant.closure import TripodGeometry
 from rrru.plant.virtual_robot import DrivenRobot
@@ -18,8 +20,9 @@ _TRUTH = {"ptt3": "rails", "delta": "legs"}
 class VirtualTripod(DrivenRobot):
     """A tripod whose truth is known.
 
-    mechanism: the nominal robot; errors: names of its richest error set ("rails" of the 3-PTT, "legs" of the Delta) to values; effects: active
-    effects; wobble_mm: radius of the ball in which the platform lies at random; masses in kg, the arm's being the 3-PTT's carriage.
+    mechanism: the nominal robot; errors: names of its richest error set ("rails" of the 3-PTT, "legs" of the Delta) to
+    values; effects: active effects; wobble_mm: radius of the ball in which the platform lies at random; masses in kg,
+    the arm's being the 3-PTT's carriage.
     """
 
     mechanism: object
@@ -37,7 +40,8 @@ class VirtualTripod(DrivenRobot):
         return TripodGeometry(rich, rich.legs(rich.parameters.vector(self.errors)))
 
     def positions(self, motion, target=None):
-        """Platform centres (n, 3) in the tracker's frame and its rotations (n,), zero, at the points of a motion; NaN where links do not meet.
+        """Platform centres (n, 3) in the tracker's frame and its rotations (n,), zero, at the points of a motion; NaN
+        where links do not meet.
 
         target is not needed: of the two assemblies the platform is in the lower one.
         """
@@ -46,7 +50,9 @@ class VirtualTripod(DrivenRobot):
 
 
 def from_config(mechanism, section):
-    """The virtual robot of one `virtual_robots:` entry; raises ConfigError for an unknown error and for axis errors, which these do not have."""
+    """The virtual robot of one `virtual_robots:` entry; raises ConfigError for an unknown error and for axis errors,
+    which these do not have.
+    """
     if section["axis_errors"]["position_mm"] or section["axis_errors"]["angle_rad"]:
         raise ConfigError(
             f"virtual robot: axis_errors on a {mechanism.name}; allowed: none, its platform does not turn; see errors and effects"

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from rrru.campaign.motion import Trapezoid
 from rrru.campaign.plan import make_plan, make_run
+from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import Line, Spiral, line_groups, sample
 from rrru.errors import ConfigError, UnreachableError
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.robots.rrru3 import Rrru3
 
 _SPIRAL = Spiral("spiral", (-300.0, 20.0), (50.0, 200.0), (600.0, 750.0), 3.0, 40, 30.0)
 
@@ -21,7 +21,9 @@ def test_trapezoid_is_the_integral_of_its_acceleration(length):
     distance = cumulative_trapezoid(speed, time, initial=0.0)
     np.testing.assert_allclose(profile.speed(time), speed, atol=0.01)
     assert distance[-1] == pytest.approx(length, rel=1e-3) and speed.max() <= 80.0 + 0.01
-    np.testing.assert_allclose(profile.time(np.linspace(0, length, 50)), np.interp(np.linspace(0, length, 50), distance, time), atol=0.05)
+    np.testing.assert_allclose(
+        profile.time(np.linspace(0, length, 50)), np.interp(np.linspace(0, length, 50), distance, time), atol=0.05
+    )
 
 
 def test_paper_profile_by_hand():
@@ -53,7 +55,10 @@ def test_reverse_runs_pass_the_same_points_backwards():
 def test_the_path_holds_the_sampled_points_and_the_transfers():
     plan = make_plan(
         (*line_groups((-600.0, 0.0, 600.0), (-300.0, 0.0, 600.0), (0.0, 40.0), 11), _SPIRAL),
-        [{"reverse": False, "payload_kg": 0.0}, {"reverse": True, "payload_kg": 2.0, "trajectories": ["line_2"], "speed_mm_s": 300.0}],
+        [
+            {"reverse": False, "payload_kg": 0.0},
+            {"reverse": True, "payload_kg": 2.0, "trajectories": ["line_2"], "speed_mm_s": 300.0},
+        ],
         80.0,
         40.0,
         60.0,
@@ -64,7 +69,11 @@ def test_the_path_holds_the_sampled_points_and_the_transfers():
     table = plan.commands(Rrru3())
     assert table["trajectory"].drop_duplicates().tolist() == ["line_1", "line_2", "spiral"]
     assert table.groupby("run").size().tolist() == [11, 11, 40, 11]
-    assert (np.diff(table["time_s"]) > 0.0).all() and table["payload_kg"].iloc[-1] == 2.0 and table["speed_mm_s"].iloc[-1] == 300.0
+    assert (
+        (np.diff(table["time_s"]) > 0.0).all()
+        and table["payload_kg"].iloc[-1] == 2.0
+        and table["speed_mm_s"].iloc[-1] == 300.0
+    )
     starts = table.groupby("run")["time_s"].first().to_numpy()
     ends = table.groupby("run")["time_s"].last().to_numpy()
     np.testing.assert_allclose(starts[1:] - ends[:-1], 60.0)
@@ -84,6 +93,12 @@ def test_impossible_plans_are_refused():
         Spiral("spiral", (0.0, 0.0), (50.0, 100.0), (600.0, 700.0), 3.0, 1)
     with pytest.raises(ConfigError, match="start_mm and end_mm are the same point"):
         Line("line_1", (1.0, 2.0, 3.0), (1.0, 2.0, 3.0), 5)
-    far = make_plan((Line("line_1", (0.0, 0.0, 600.0), (0.0, 2000.0, 600.0), 5),), [{"reverse": False, "payload_kg": 0.0}], 80.0, 40.0, 0.0)
+    far = make_plan(
+        (Line("line_1", (0.0, 0.0, 600.0), (0.0, 2000.0, 600.0), 5),),
+        [{"reverse": False, "payload_kg": 0.0}],
+        80.0,
+        40.0,
+        0.0,
+    )
     with pytest.raises(UnreachableError, match="out of reach"):
         far.commands(Rrru3())

@@ -4,14 +4,19 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
 
-from rrru.campaign.motion import Trapezoid
+from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 
 
 def test_points_fill_their_cylinder_evenly():
     points = cylinder_points((10.0, -20.0), 50.0, (300.0, 100.0), 256, np.random.default_rng(0))
     radius = np.hypot(points[:, 0] - 10.0, points[:, 1] + 20.0)
-    assert points.shape == (256, 3) and radius.max() <= 50.0 and points[:, 2].min() >= 100.0 and points[:, 2].max() <= 300.0
+    assert (
+        points.shape == (256, 3)
+        and radius.max() <= 50.0
+        and points[:, 2].min() >= 100.0
+        and points[:, 2].max() <= 300.0
+    )
     # half the area lies within 1 / sqrt(2) of the radius, half the volume in each half of the height and of the turn
     for half in (radius < 50.0 / np.sqrt(2.0), points[:, 2] < 200.0, points[:, 0] < 10.0):
         assert abs(half.mean() - 0.5) < 0.02
@@ -22,7 +27,9 @@ def test_points_fill_their_cylinder_evenly():
 
 def test_a_shorter_campaign_is_the_beginning_of_a_longer_one():
     long = cylinder_points((0.0, 0.0), 50.0, (0.0, 10.0), 100, np.random.default_rng(3))
-    np.testing.assert_array_equal(long[:64], cylinder_points((0.0, 0.0), 50.0, (0.0, 10.0), 128, np.random.default_rng(3))[:64])
+    np.testing.assert_array_equal(
+        long[:64], cylinder_points((0.0, 0.0), 50.0, (0.0, 10.0), 128, np.random.default_rng(3))[:64]
+    )
 
 
 def test_the_order_visits_every_point_once_on_shorter_ways():

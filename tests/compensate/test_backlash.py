@@ -40,7 +40,10 @@ def test_the_width_is_the_mean_difference_of_the_directions_away_from_the_turns(
     inner = (places > 2.0) & (places < 8.0)
     passes = {"forward_1": -0.03 * inner, "reverse": 0.0 * places, "forward_2": -0.05 * inner}
     record = pd.concat(
-        [pd.DataFrame({"pass": name, "commanded_mm": places, "encoder_mm": places + shift}) for name, shift in passes.items()],
+        [
+            pd.DataFrame({"pass": name, "commanded_mm": places, "encoder_mm": places + shift})
+            for name, shift in passes.items()
+        ],
         ignore_index=True,
     )
     width = measured_width(record, 2.0)

@@ -4,14 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.calibrate.campaign_fit import errors_vector, fit_sets, tables
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.compensate import evaluate
 from rrru.errors import ConfigError, FitError
-from rrru.mechanisms.protocol import identifiable_truth
+from rrru.fit.campaign_fit import errors_vector, fit_sets, tables
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.protocol import identifiable_truth
 
 _ERRORS = {"dtheta1": 0.002, "dtheta2": -0.001, "dL1": 0.4, "dL3": -0.2, "dR": -1.2, "dr": 0.9}
 _SETTINGS = {
@@ -40,7 +40,9 @@ def test_calibrated_commands_land_on_target(campaign):
     before = evaluate.before(measurements)["error_mm"]
     frame = tables("c", fits, identifiable_truth(robot.mechanism, _ERRORS))["parameters"]
     vector = errors_vector(frame, "lines", "least_squares", robot.mechanism)
-    after = evaluate.closed_loop(robot, plan, vector, 0.0, np.random.default_rng(1), "lines", "least_squares")["error_mm"]
+    after = evaluate.closed_loop(robot, plan, vector, 0.0, np.random.default_rng(1), "lines", "least_squares")[
+        "error_mm"
+    ]
     model = evaluate.model_residual(measurements, robot.mechanism, vector, "lines", "least_squares")["error_mm"]
     assert before.min() > 1.0 and after.max() < 0.05 and model.max() < 0.06
     truth = frame.set_index(["calibration", "method", "parameter"])["true_value"]["lines", "least_squares", "da"]
@@ -51,7 +53,9 @@ def test_calibrated_commands_land_on_target(campaign):
 
 def test_a_campaign_without_any_set_is_refused(campaign):
     robot, _, measurements = campaign
-    with pytest.raises(ConfigError, match=r"no set matches the campaign's trajectories \(line_1, line_2, line_3, spiral\)"):
+    with pytest.raises(
+        ConfigError, match=r"no set matches the campaign's trajectories \(line_1, line_2, line_3, spiral\)"
+    ):
         fit_sets(measurements, robot.mechanism, _SETTINGS | {"sets": {"x": ["circle"]}})
 
 
@@ -62,18 +66,24 @@ def test_summary_equals_the_plain_statistics(campaign):
     chosen = errors.loc[errors["trajectory"] == "line_2", "error_mm"]
     row = summary.loc["line_2"]
     assert (row["min_mm"], row["max_mm"]) == (chosen.min(), chosen.max())
-    assert row["mean_mm"] == pytest.approx(chosen.mean()) and row["rms_mm"] == pytest.approx(np.sqrt(np.mean(chosen**2)))
+    assert row["mean_mm"] == pytest.approx(chosen.mean()) and row["rms_mm"] == pytest.approx(
+        np.sqrt(np.mean(chosen**2))
+    )
     assert summary.loc["all_lines", "points"] == 180 and summary.loc["all", "points"] == 300
     assert (summary["repeats"] == 3).all()
 
 
 def test_iso_9283_by_hand():
-    """Four passes along x, two and two alike: barycentre errors known, the along-path part of the error is no path error."""
+    """Four passes along x, two and two alike: barycentre errors known, the along-path part of the error is no path
+    error.
+    """
     position = np.array([[-300.0, 0.0, 600.0], [-290.0, 0.0, 600.0], [-280.0, 0.0, 600.0]])
     error = np.zeros((4, 3, 3))
     error[:2], error[2:] = [0.3, 0.1, 0.0], [0.3, 0.3, 0.0]
     error[:2, 1], error[2:, 1] = [0.0, 0.0, 1.0], [0.0, 0.0, 1.4]
-    frame = pd.DataFrame({"run": np.repeat([1, 2, 3, 4], 3), "trajectory": "line_1", "point": np.tile([1, 2, 3], 4), "status": "ok"})
+    frame = pd.DataFrame(
+        {"run": np.repeat([1, 2, 3, 4], 3), "trajectory": "line_1", "point": np.tile([1, 2, 3], 4), "status": "ok"}
+    )
     for k, axis in enumerate("xyz"):
         frame[f"command_{axis}_mm"] = np.tile(position[:, k], 4)
         frame[f"measured_{axis}_mm"] = np.tile(position[:, k], 4) + error[..., k].ravel()
@@ -85,7 +95,9 @@ def test_iso_9283_by_hand():
     assert row["repeatability_mm"] == pytest.approx(0.2)
     only = frame[frame["point"] != 2].reset_index(drop=True)
     row = evaluate.summarise(evaluate.before(only), only).iloc[0]
-    assert row["pose_accuracy_mm"] == pytest.approx(np.hypot(0.3, 0.2)) and row["path_accuracy_mm"] == pytest.approx(0.2)
+    assert row["pose_accuracy_mm"] == pytest.approx(np.hypot(0.3, 0.2)) and row["path_accuracy_mm"] == pytest.approx(
+        0.2
+    )
 
 
 def test_reverse_passes_are_told_apart_on_open_and_closed_paths():
@@ -101,7 +113,11 @@ def test_names_with_pattern_characters_are_names(campaign):
     _, _, measurements = campaign
     named = measurements.assign(trajectory=measurements["trajectory"].replace({"line_1": "path[1]", "line_2": "all"}))
     summary = evaluate.summarise(evaluate.before(named), named).set_index("trajectory")
-    assert summary.loc["path[1]", "points"] == 60 and summary.loc["all", "points"] == 60 and summary.loc["all_lines", "points"] == 60
+    assert (
+        summary.loc["path[1]", "points"] == 60
+        and summary.loc["all", "points"] == 60
+        and summary.loc["all_lines", "points"] == 60
+    )
 
 
 def test_outliers_are_kept_but_not_counted(campaign):

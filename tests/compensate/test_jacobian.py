@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.mechanisms.ptt3 import Ptt3
+from rrru.robots.ptt3 import Ptt3
 
 ROBOT = Ptt3(errors="rails")
 
@@ -30,7 +30,9 @@ def test_the_jacobian_s_sliders_differ_from_the_exact_ones_by_the_second_order(p
     direction *= 0.3 / np.linalg.norm(direction, axis=1, keepdims=True)
     sizes = []
     for share in (1.0, 0.5, 0.25):
-        difference = through_inverse(ROBOT, positions, share * direction) - through_jacobian(ROBOT, positions, share * direction)
+        difference = through_inverse(ROBOT, positions, share * direction) - through_jacobian(
+            ROBOT, positions, share * direction
+        )
         sizes.append(np.linalg.norm(difference))
     np.testing.assert_allclose(np.array(sizes[:2]) / sizes[1:], 4.0, rtol=0.01)
     first = through_inverse(ROBOT, positions, direction) - through_jacobian(ROBOT, positions, direction)

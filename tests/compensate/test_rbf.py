@@ -50,7 +50,9 @@ def test_the_followed_error_is_that_of_the_network_with_so_many_neurons(curve):
 
 
 def test_with_all_neurons_it_is_the_gaussian_interpolator_of_scipy(curve):
-    """The threshold stands for one neuron; without it there is one sum of Gaussians through all points, which scipy finds by itself."""
+    """The threshold stands for one neuron; without it there is one sum of Gaussians through all points, which scipy
+    finds by itself.
+    """
     points, targets = curve
     spread = 8.0
     order = grow(points, targets, spread, len(points)).order
@@ -78,7 +80,9 @@ def test_a_network_of_the_same_kind_is_recovered(curve, seed):
 
 
 def test_what_is_hardly_new_is_refused_and_weights_stay_small(curve):
-    """A spread as wide as the curve: with rounding as the only limit the weights are huge, and so is the answer off the curve."""
+    """A spread as wide as the curve: with rounding as the only limit the weights are huge, and so is the answer off the
+    curve.
+    """
     points, targets = curve
     noisy = targets + 0.01 * np.random.default_rng(1).standard_normal(targets.shape)
     free, held = (fit(points, noisy, 150.0, grow(points, noisy, 150.0, 60, share).order) for share in (1e-12, 1e-4))

@@ -4,9 +4,9 @@ import numpy as np
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.registry import active_effects
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.effects.library import active_effects
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.rrru3 import Rrru3
 
 ROBOT = Rrru3()
 LINE = Line("line", (-450.0, -100.0, 600.0), (350.0, 150.0, 700.0), 60)
@@ -22,7 +22,9 @@ def plan_of(*passes, trajectories=(LINE,)):
 
 
 def drive(effects, plan, **options):
-    """Motion, true positions (n, 3) without noise, and the platform's rotation (n,) under {effect: {parameter: value}}."""
+    """Motion, true positions (n, 3) without noise, and the platform's rotation (n,) under {effect: {parameter:
+    value}}.
+    """
     robot = VirtualRobot(effects=active_effects(effects), **options)
     motion = robot.motion(plan, ROBOT.inverse)
     position, turned = robot.positions(motion, plan.targets())

@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
-from rrru.campaign.motion import Trapezoid
 from rrru.campaign.plan import make_run
+from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import sample
 from rrru.effects.backlash import play
 from tests.effects.robots import FORWARD, LINE, LOADED, REVERSE, ROBOT, SPIRAL, drive, drive_error, per_leg, plan_of
 
 
 def _steady(motion, margin_rad):
-    """Flags (n, 3): drives that have moved by more than the margin since they last turned, within the last points' steps."""
+    """Flags (n, 3): drives that have moved by more than the margin since they last turned, within the last points'
+    steps.
+    """
     moved = np.diff(motion.drive, axis=0)
     result = np.zeros(motion.drive.shape, dtype=bool)
     result[2:] = (np.abs(moved[1:]) > margin_rad) & (np.sign(moved[1:]) == np.sign(moved[:-1]))
@@ -79,7 +81,9 @@ def test_drive_compliance_acts_on_the_leg_that_has_it():
     assert np.abs(error[:, [0, 2]]).max() < 1e-10 and np.abs(error[:, 1]).min() > 1e-5
 
 
-@pytest.mark.parametrize(("name", "periods", "shape"), [("encoder_eccentricity", 1.0, {}), ("transmission_error", 50.0, {"ratio": 50.0})])
+@pytest.mark.parametrize(
+    ("name", "periods", "shape"), [("encoder_eccentricity", 1.0, {}), ("transmission_error", 50.0, {"ratio": 50.0})]
+)
 def test_periodic_errors_follow_the_drive_angle_alone(name, periods, shape):
     """A sine in the drive angle, the same whatever trajectory, direction and payload."""
     amplitude, phase = np.array([1e-3, 5e-4, 2e-4]), np.array([0.3, -1.0, 2.0])

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from rrru.effects.backlash import play
-from rrru.effects.protocol import ActiveEffect, Contribution, Motion
-from rrru.effects.registry import EFFECTS, active_effects
-from rrru.mechanisms.rrru3 import Rrru3
+from rrru.effects.effect import ActiveEffect, Contribution, Motion
+from rrru.effects.library import EFFECTS, active_effects
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, REVERSE, SPIRAL, plan_of
 
 _NAMES = (
@@ -39,7 +39,9 @@ _SHAPES = {
 
 def _flat(contribution):
     """All that an effect changes, in one row."""
-    return np.concatenate([np.broadcast_to(getattr(contribution, key), shape).ravel() for key, shape in _SHAPES.items()])
+    return np.concatenate(
+        [np.broadcast_to(getattr(contribution, key), shape).ravel() for key, shape in _SHAPES.items()]
+    )
 
 
 def _under(effect, coordinates, shape=None):
@@ -55,7 +57,10 @@ def test_the_library_holds_the_twelve_effects_in_their_order():
 def test_an_effect_says_what_it_is(name):
     effect = EFFECTS[name]
     assert effect.name == name
-    assert all(p.unit and p.source for p in effect.parameters) and np.isfinite([effect.parameters.low, effect.parameters.high]).all()
+    assert (
+        all(p.unit and p.source for p in effect.parameters)
+        and np.isfinite([effect.parameters.low, effect.parameters.high]).all()
+    )
     assert set(effect.needs) <= set(Motion.__dataclass_fields__)
     c = effect.coordinates
     assert len(c) == len(c.typical) == len(c.legs) == len(c.positive)
@@ -71,7 +76,9 @@ def test_nominal_parameters_change_nothing(name):
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_contribution_names_its_place_in_the_full_shape(name):
     effect = EFFECTS[name]
-    result = effect.contribute(_MOTION, effect.coordinates.to_values(effect.coordinates.typical, effect.coordinates.shapes[0]))
+    result = effect.contribute(
+        _MOTION, effect.coordinates.to_values(effect.coordinates.typical, effect.coordinates.shapes[0])
+    )
     acting = {key for key in _SHAPES if np.any(getattr(result, key))}
     assert len(acting) == 1
     assert all(np.shape(getattr(result, key)) == (shape if key in acting else ()) for key, shape in _SHAPES.items())
@@ -118,7 +125,9 @@ def test_each_coordinate_does_something_of_its_own(name):
 def test_a_legs_coordinate_leaves_the_other_legs_alone(name):
     effect = EFFECTS[name]
     for k, leg in enumerate(effect.coordinates.legs):
-        values = effect.coordinates.to_values(np.eye(len(effect.coordinates))[k] * effect.coordinates.typical, effect.coordinates.shapes[0])
+        values = effect.coordinates.to_values(
+            np.eye(len(effect.coordinates))[k] * effect.coordinates.typical, effect.coordinates.shapes[0]
+        )
         result = effect.contribute(_MOTION, values)
         by_leg = {"drive": 1, "length_mm": 1, "joint_mm": 1, "displacement": 0}
         for key, axis in by_leg.items():
@@ -140,12 +149,16 @@ def test_sine_and_cosine_parts_give_back_amplitude_and_phase(parts):
         np.testing.assert_allclose(effect.contribute(_MOTION, values).drive, expected, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["backlash", "joint_clearance", "transmission_error", "thermal_growth", "servo_lag", "base_placement"])
+@pytest.mark.parametrize(
+    "name", ["backlash", "joint_clearance", "transmission_error", "thermal_growth", "servo_lag", "base_placement"]
+)
 def test_parameters_are_recovered_from_what_they_do(name):
     effect = EFFECTS[name]
     generator = np.random.default_rng(8)
     shape = effect.coordinates.shapes[0]
-    truth = effect.coordinates.to_values(generator.uniform(0.5, 2.0, len(effect.coordinates)) * effect.coordinates.typical, shape)
+    truth = effect.coordinates.to_values(
+        generator.uniform(0.5, 2.0, len(effect.coordinates)) * effect.coordinates.typical, shape
+    )
     seen = _flat(effect.contribute(_MOTION, truth))
     # a design number and, of a hard contact, how soft it is, are not fitted
     free = [k for k, n in enumerate(effect.parameters.names) if n not in ("ratio", "transition", "held")]
@@ -161,7 +174,10 @@ def test_parameters_are_recovered_from_what_they_do(name):
 
 
 def test_contributions_add_up_place_by_place():
-    parts = [ActiveEffect(e, e.parameters.mapping(e.coordinates.to_values(e.coordinates.typical, {}))) for e in EFFECTS.values()]
+    parts = [
+        ActiveEffect(e, e.parameters.mapping(e.coordinates.to_values(e.coordinates.typical, {})))
+        for e in EFFECTS.values()
+    ]
     total = sum((part.contribute(_MOTION) for part in parts), Contribution())
     np.testing.assert_allclose(_flat(total), sum(_flat(part.contribute(_MOTION)) for part in parts), atol=1e-15)
 
@@ -194,7 +210,9 @@ def test_play_stays_within_its_width_and_forgets_the_sampling(path, half):
 
 
 def test_play_remembers_the_path_and_ignores_the_speed():
-    """A small turn-back inside the play does not move the arm; the same path at half the sampling gives the same end."""
+    """A small turn-back inside the play does not move the arm; the same path at half the sampling gives the same
+    end.
+    """
     path = np.array([0.0, 5.0, 4.5, 4.8])[:, None]
     arm = path + play(path, np.array([1.0]))
     assert arm[1:, 0].tolist() == [4.0, 4.0, 4.0]
@@ -228,4 +246,6 @@ def test_periodic_errors_repeat_after_their_period(name, periods):
     effect = EFFECTS[name]
     values = effect.coordinates.to_values(np.linspace(-3e-4, 3e-4, 6), effect.coordinates.shapes[0])
     later = Motion(**{**_MOTION.__dict__, "drive": _MOTION.drive + 2.0 * np.pi / periods})
-    np.testing.assert_allclose(effect.contribute(later, values).drive, effect.contribute(_MOTION, values).drive, atol=1e-15)
+    np.testing.assert_allclose(
+        effect.contribute(later, values).drive, effect.contribute(_MOTION, values).drive, atol=1e-15
+    )

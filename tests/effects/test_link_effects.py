@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.mechanisms.rrru3 import ERROR_NAMES, Rrru3
+from rrru.robots.rrru3 import ERROR_NAMES, Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, drive, per_leg, plan_of
 
 
@@ -15,7 +15,9 @@ def test_link_flexure_shortens_the_forearms_by_their_force():
     flexure = np.array([2e-4, 4e-4, 1e-4])
     plan = plan_of(FORWARD, LOADED)
     motion, position, turned = drive({"link_flexure": per_leg("flexure", flexure)}, plan)
-    np.testing.assert_allclose(_along_legs(motion, position - plan.targets()), -flexure * motion.force_n, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(
+        _along_legs(motion, position - plan.targets()), -flexure * motion.force_n, rtol=1e-3, atol=1e-5
+    )
     assert turned.max() < 1e-12
 
 
@@ -55,7 +57,9 @@ def test_leg_asymmetry_is_the_papers_robot_with_fourteen_errors():
 
 
 def test_a_warm_robot_is_the_cold_one_enlarged():
-    """All angles stay, so that the position grows by the strain itself, e (1 - exp(-t / tau)), and later passes end further out."""
+    """All angles stay, so that the position grows by the strain itself, e (1 - exp(-t / tau)), and later passes end
+    further out.
+    """
     plan = plan_of(FORWARD, FORWARD, FORWARD)
     motion, position, _ = drive({"thermal_growth": {"strain": 2e-3, "time_constant": 100.0}}, plan)
     np.testing.assert_allclose(motion.time_s, plan.commands(ROBOT)["time_s"].to_numpy())

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from rrru.effects.library import EFFECTS
 from rrru.effects.motion import make_motion
-from rrru.effects.registry import EFFECTS
-from rrru.mechanisms.dynamics import Masses
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.dynamics import Masses
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
 
 _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))

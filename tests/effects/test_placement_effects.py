@@ -1,11 +1,13 @@
-"""Effects of axes, seats and frames against rigid motions of the whole robot and against the chain built in another way."""
+"""Effects of axes, seats and frames against rigid motions of the whole robot and against the chain built in another
+way.
+"""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.spatial import PLACES, SpatialGeometry
+from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, ROBOT, SPIRAL, drive, per_leg, plan_of
 
 _PLAN = plan_of(FORWARD, trajectories=(LINE, SPIRAL))
@@ -42,14 +44,18 @@ def test_an_axis_swung_about_the_vertical_is_a_leg_at_another_azimuth_on_the_sam
 
 
 def test_seats_on_a_leaning_base_lean_the_whole_robot():
-    """A base turned by a small angle about x is three tilted axes, three heights and three drive errors; the robot turns as one."""
+    """A base turned by a small angle about x is three tilted axes, three heights and three drive errors; the robot
+    turns as one.
+    """
     lean = 1e-4
     cosine, sine = np.cos(ROBOT.azimuth_rad), np.sin(ROBOT.azimuth_rad)
     effects = {"axis_tilt": per_leg("tilt_x", lean * cosine), "base_placement": per_leg("height", 400.0 * lean * sine)}
     # about the leg's own y the base turns by -lean sin(azimuth), the drive by -theta about the same axis
     errors = {f"dtheta{k + 1}": lean * sine[k] for k in range(3)}
     _, position, turned = drive(effects, _PLAN, errors=errors)
-    np.testing.assert_allclose(position, _PLAN.targets() @ Rotation.from_rotvec([lean, 0.0, 0.0]).as_matrix().T, atol=2e-5)
+    np.testing.assert_allclose(
+        position, _PLAN.targets() @ Rotation.from_rotvec([lean, 0.0, 0.0]).as_matrix().T, atol=2e-5
+    )
     np.testing.assert_allclose(turned, lean, rtol=1e-3)
 
 
@@ -61,7 +67,9 @@ def test_a_common_height_lifts_the_whole_robot():
 
 def test_a_common_azimuth_turns_the_whole_robot_about_the_vertical():
     _, position, turned = drive({"base_placement": per_leg("azimuth", 0.003)}, _PLAN)
-    np.testing.assert_allclose(position, _PLAN.targets() @ Rotation.from_rotvec([0.0, 0.0, 0.003]).as_matrix().T, atol=1e-8)
+    np.testing.assert_allclose(
+        position, _PLAN.targets() @ Rotation.from_rotvec([0.0, 0.0, 0.003]).as_matrix().T, atol=1e-8
+    )
     # the rotation is reported as the sine of its angle
     np.testing.assert_allclose(turned, np.sin(0.003), rtol=1e-9)
 
@@ -75,7 +83,9 @@ def test_a_common_radius_is_the_papers_error_of_the_base():
 
 @pytest.mark.parametrize("leg", [1, 2, 3])
 def test_one_legs_place_is_the_chain_built_there(leg):
-    """Azimuth, radius and height of one leg as a chain that starts at another azimuth, with the platform's side left as it was."""
+    """Azimuth, radius and height of one leg as a chain that starts at another azimuth, with the platform's side left as
+    it was.
+    """
     turn, radius, height = 0.01, 2.0, -3.0
     azimuth, deviations = np.array(ROBOT.azimuth_rad), np.zeros((3, len(PLACES), 6))
     azimuth[leg - 1] += turn
@@ -90,13 +100,19 @@ def test_one_legs_place_is_the_chain_built_there(leg):
 
 def test_a_wrong_frame_is_a_rigid_motion_of_all_points():
     shift, turn = np.array([1.0, -2.0, 0.5]), np.array([2e-3, 1e-3, -3e-3])
-    section = {f"shift_{a}": s for a, s in zip("xyz", shift, strict=True)} | {f"turn_{a}": w for a, w in zip("xyz", turn, strict=True)}
+    section = {f"shift_{a}": s for a, s in zip("xyz", shift, strict=True)} | {
+        f"turn_{a}": w for a, w in zip("xyz", turn, strict=True)
+    }
     _, position, turned = drive({"frame_misregistration": section}, _PLAN)
     angle = np.linalg.norm(turn)
     axis = turn / angle
     target = _PLAN.targets()
     # Rodrigues' formula
-    rotated = target * np.cos(angle) + np.cross(axis, target) * np.sin(angle) + np.outer(target @ axis, axis) * (1.0 - np.cos(angle))
+    rotated = (
+        target * np.cos(angle)
+        + np.cross(axis, target) * np.sin(angle)
+        + np.outer(target @ axis, axis) * (1.0 - np.cos(angle))
+    )
     np.testing.assert_allclose(position, rotated + shift, atol=1e-8)
     assert turned.max() < 1e-12
 
@@ -106,4 +122,6 @@ def test_the_frame_comes_after_everything_else():
     section = {"shift_y": 3.0, "turn_z": 0.002}
     _, plain, _ = drive(other, _PLAN)
     _, moved, _ = drive(other | {"frame_misregistration": section}, _PLAN)
-    np.testing.assert_allclose(moved, plain @ Rotation.from_rotvec([0.0, 0.0, 0.002]).as_matrix().T + np.array([0.0, 3.0, 0.0]), atol=1e-9)
+    np.testing.assert_allclose(
+        moved, plain @ Rotation.from_rotvec([0.0, 0.0, 0.002]).as_matrix().T + np.array([0.0, 3.0, 0.0]), atol=1e-9
+    )

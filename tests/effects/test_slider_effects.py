@@ -1,17 +1,19 @@
-"""The laws of robots with sliders: what they have in common, their first order, and each against a slow reading of its docstring."""
+"""The laws of robots with sliders: what they have in common, their first order, and each against a slow reading of its
+docstring.
+"""
 
 import numpy as np
 import pytest
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
-from rrru.effects.protocol import Motion
-from rrru.effects.registry import LIBRARY, SLIDER_EFFECTS, active_effects, find
+from rrru.effects.effect import Motion
+from rrru.effects.library import LIBRARY, SLIDER_EFFECTS, active_effects, find
 from rrru.errors import ConfigError
-from rrru.mechanisms.first_order import first_order
-from rrru.mechanisms.ptt3 import Ptt3
 from rrru.plant.closure import corrected_sim
 from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.robots.first_order import first_order
+from rrru.robots.ptt3 import Ptt3
 
 ROBOTS = {
     "level": (Ptt3(), -250.0),
@@ -22,7 +24,9 @@ ROBOTS = {
 
 def _motion(robot, height):
     curve = Spiral("curve", (5.0, -3.0), (60.0, 80.0), (height - 20.0, height + 20.0), 2.0, 60)
-    plan = make_plan([curve], [{"payload_kg": 0.0, "reverse": False}, {"payload_kg": 4.0, "reverse": True}], 80.0, 400.0, 10.0)
+    plan = make_plan(
+        [curve], [{"payload_kg": 0.0, "reverse": False}, {"payload_kg": 4.0, "reverse": True}], 80.0, 400.0, 10.0
+    )
     return VirtualTripod(robot).motion(plan, robot.inverse)
 
 
@@ -37,7 +41,9 @@ def _values(effect, share=1.0, shape=-1):
 def test_robots_with_sliders_have_rails_instead_of_axes():
     assert set(SLIDER_EFFECTS) - set(LIBRARY["rad"]) == {"rail_tilt"}
     assert set(LIBRARY["rad"]) - set(SLIDER_EFFECTS) == {"axis_tilt", "encoder_eccentricity"}
-    assert find("backlash", "mm").parameters["width1"].unit == "mm" and find("backlash").parameters["width1"].unit == "rad"
+    assert (
+        find("backlash", "mm").parameters["width1"].unit == "mm" and find("backlash").parameters["width1"].unit == "rad"
+    )
     assert find("rail_tilt") is None and find("axis_tilt", "mm") is None
     with pytest.raises(ConfigError, match="'axis_tilt' is none of a robot with drives in mm; known: backlash"):
         active_effects({"axis_tilt": {"tilt_x1": 0.001}}, "mm")
@@ -47,7 +53,10 @@ def test_robots_with_sliders_have_rails_instead_of_axes():
 def test_an_effect_says_what_it_is_and_is_nothing_at_its_nominal_parameters(name):
     effect, motion = SLIDER_EFFECTS[name], MOTIONS["level"]
     assert effect.name == name and set(effect.needs) <= set(Motion.__dataclass_fields__)
-    assert all(p.unit and p.source for p in effect.parameters) and np.isfinite([effect.parameters.low, effect.parameters.high]).all()
+    assert (
+        all(p.unit and p.source for p in effect.parameters)
+        and np.isfinite([effect.parameters.low, effect.parameters.high]).all()
+    )
     assert effect.parameters.hold(_values(effect))
     nothing = effect.contribute(motion, effect.parameters.nominal)
     assert not any(np.any(part) for part in vars(nothing).values())
@@ -62,7 +71,10 @@ def test_the_first_order_is_the_exact_closures(name, robot):
 
     def remainder(share):
         change = effect.contribute(motion, _values(effect, share))
-        exact = corrected_sim(mechanism, np.zeros(len(mechanism.parameters)), motion.drive, motion.position_mm, change) - motion.position_mm
+        exact = (
+            corrected_sim(mechanism, np.zeros(len(mechanism.parameters)), motion.drive, motion.position_mm, change)
+            - motion.position_mm
+        )
         return np.abs(exact - at.move(change)).max(), np.abs(exact).max()
 
     # a sideways turn of an upright rail has no lever that the sliders could show
@@ -74,10 +86,14 @@ def test_the_first_order_is_the_exact_closures(name, robot):
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_the_loads_on_the_carriages_are_the_slopes_of_the_potential_energy(robot):
-    """At rest: the force along rail i is minus the derivative of the weight's potential by b_i, all masses at their places."""
+    """At rest: the force along rail i is minus the derivative of the weight's potential by b_i, all masses at their
+    places.
+    """
     mechanism, motion = ROBOTS[robot][0], MOTIONS[robot]
     still = VirtualTripod(mechanism, platform_mass_kg=2.0, forearm_mass_kg=0.8, arm_mass_kg=1.5)
-    curve = Spiral("curve", (5.0, -3.0), (60.0, 80.0), (motion.position_mm[0, 2], motion.position_mm[0, 2] + 30.0), 1.0, 30)
+    curve = Spiral(
+        "curve", (5.0, -3.0), (60.0, 80.0), (motion.position_mm[0, 2], motion.position_mm[0, 2] + 30.0), 1.0, 30
+    )
     slow = still.motion(make_plan([curve], [{"payload_kg": 3.0, "reverse": False}], 1e-3, 1e-3, 0.0), mechanism.inverse)
 
     def energy(slider):

@@ -1,22 +1,24 @@
-"""Virtual campaigns small enough to be diagnosed in a second or two: what the tests of the gap share. Lengths mm, angles rad."""
+"""Virtual campaigns small enough to be diagnosed in a second or two: what the tests of the gap share. Lengths mm,
+angles rad.
+"""
 
 from functools import cache
 
 import numpy as np
 
-from rrru.calibrate.least_squares import least_squares
-from rrru.calibrate.residuals import Residuals
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.protocol import ActiveEffect
-from rrru.effects.registry import EFFECTS
+from rrru.effects.effect import ActiveEffect
+from rrru.effects.library import EFFECTS
+from rrru.fit.least_squares import least_squares
+from rrru.fit.residuals import Residuals
 from rrru.gap.case import make_case
 from rrru.gap.diagnose import diagnose, sim
 from rrru.gap.settings import GapSettings
-from rrru.mechanisms.dynamics import Masses
-from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.dynamics import Masses
+from rrru.robots.rrru3 import Rrru3
 
 ROBOT = Rrru3()
 SIM = sim(ROBOT)
@@ -25,7 +27,9 @@ NOISE_MM = 0.02
 NOISE_RMS_MM = NOISE_MM * np.sqrt(3.0)
 ERRORS = {"dtheta1": 2e-3, "dtheta2": -1e-3, "dtheta3": 1.5e-3, "dL1": 0.4, "dL2": -0.3, "dL3": 0.5, "dr": 0.2}
 
-LINES = tuple(Line(f"line_{k}", (-600.0, y, 650.0), (0.0, y, 650.0), 16) for k, y in enumerate((0.0, 110.0, -110.0), start=1))
+LINES = tuple(
+    Line(f"line_{k}", (-600.0, y, 650.0), (0.0, y, 650.0), 16) for k, y in enumerate((0.0, 110.0, -110.0), start=1)
+)
 SPIRAL = Spiral("spiral", (0.0, 0.0), (50.0, 280.0), (560.0, 760.0), 4.5, 30)
 TRAJECTORIES = (*LINES, SPIRAL)
 FORWARD = {"reverse": False, "payload_kg": 0.0}
@@ -75,7 +79,9 @@ def drawn(name, seed, leg=0):
 
 @cache
 def strong(name, strength, seed=0, leg=0, shape=0):
-    """An effect scaled so that the gap after the calibration is `strength` times the noise, rms distance over rms distance."""
+    """An effect scaled so that the gap after the calibration is `strength` times the noise, rms distance over rms
+    distance.
+    """
     coordinates = drawn(name, seed, leg)
     for _ in range(3):
         coordinates = coordinates * strength * NOISE_RMS_MM / gap_mm((active(name, coordinates, shape),))

@@ -1,4 +1,6 @@
-"""The campaign as the diagnosis sees it: its motion, its exact corrected sim and its signatures, by independent routes."""
+"""The campaign as the diagnosis sees it: its motion, its exact corrected sim and its signatures, by independent
+routes.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -7,11 +9,11 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.effects.registry import EFFECTS
+from rrru.effects.library import EFFECTS
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import State
-from rrru.gap.motion import at_turn_back, starts_of_runs
+from rrru.gap.driven_path import at_turn_back, starts_of_runs
 from tests.gap import campaigns
 from tests.gap.campaigns import ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 
@@ -53,7 +55,9 @@ def test_points_dropped_later_stay_dropped(case):
 
 
 def test_the_motion_read_from_the_columns_is_the_one_that_was_driven(case):
-    """Rates, loads and drive path of the table against those of the plan, which knows them in closed form; away from a run's ends."""
+    """Rates, loads and drive path of the table against those of the plan, which knows them in closed form; away from a
+    run's ends.
+    """
     driven = robot_of().motion(plan_of(), ROBOT.inverse)
     inner = case.used & np.append(~starts_of_runs(case.measurements["run"].to_numpy())[1:], False)
     for name, share in (("drive_rate", 0.04), ("drive_load", 0.01), ("force_n", 0.01), ("held_force_n", 0.01)):
@@ -123,7 +127,9 @@ def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, na
     state = _state(name, 1 if len(EFFECTS[name].coordinates.shapes) > 1 else 0, size=4.0)
     linear = case.linearise(state)
     (key, coordinates), *_ = state.effects.items()
-    np.testing.assert_allclose(linear.data - linear.columns[key] @ coordinates, case.measured_mm - case.exact(state), atol=1e-9)
+    np.testing.assert_allclose(
+        linear.data - linear.columns[key] @ coordinates, case.measured_mm - case.exact(state), atol=1e-9
+    )
     steps = {step[0] for step in linear.reshaped[name]}
     assert steps <= set(EFFECTS[name].coordinates.shapes[0])
     assert linear.laws[name].shape[-1] == len(linear.reshaped[name]) and np.isfinite(linear.laws[name]).all()

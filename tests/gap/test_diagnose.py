@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.protocol import ActiveEffect, Contribution
-from rrru.effects.registry import EFFECTS, find
+from rrru.effects.effect import ActiveEffect, Contribution
+from rrru.effects.library import EFFECTS, find
 from rrru.errors import ConfigError, FitError
 from rrru.gap.settings import GapSettings
 from rrru.parameters import Parameter, ParameterSet
-from rrru.report import tables
+from rrru.store import tables
 from tests.gap import campaigns
 from tests.gap.campaigns import NOISE_MM, NOISE_RMS_MM, active, diagnosed, drawn, measure, plan_of, strong
 
@@ -82,7 +82,9 @@ def test_noise_alone_is_no_gap(seed):
     assert verdict["share_closed"] == 0.0 and verdict["leg"] == 0 and not found.state.effects
 
 
-@pytest.mark.parametrize(("first", "second"), [("backlash", "thermal_growth"), ("drive_compliance", "frame_misregistration")])
+@pytest.mark.parametrize(
+    ("first", "second"), [("backlash", "thermal_growth"), ("drive_compliance", "frame_misregistration")]
+)
 def test_two_effects_are_both_named(first, second):
     found = diagnosed(measure((strong(first, 4.0), strong(second, 4.0))))
     assert set(found.verdict["effects"].split("+")) == {first, second}
@@ -119,7 +121,9 @@ def test_a_users_own_effect_takes_part():
     found = _checked(diagnosed(measure(robot), details=True, settings=settings))
     assert found.verdict["effects"] == "ripple"
     fitted = found.tables["gap_parameters"].query("effect != 'calibration'").iloc[0]
-    assert fitted["value"] == pytest.approx(0.15, abs=4.0 * fitted["standard_error"]) and fitted["standard_error"] < 0.01
+    assert (
+        fitted["value"] == pytest.approx(0.15, abs=4.0 * fitted["standard_error"]) and fitted["standard_error"] < 0.01
+    )
     without = diagnosed(measure(robot)).verdict
     assert without["effects"] == "unexplained"
 
@@ -146,7 +150,9 @@ def test_angles_recomputed_from_the_commands_give_the_same_answer(lagging):
     again = diagnosed(lagging.assign(**{f"theta{k + 1}_rad": theta[:, k] for k in range(3)}))
     verdict = diagnosed(lagging).verdict
     numbers = [key for key, value in verdict.items() if isinstance(value, float)]
-    assert {key: again.verdict[key] for key in numbers} == pytest.approx({key: verdict[key] for key in numbers}, rel=1e-6, nan_ok=True)
+    assert {key: again.verdict[key] for key in numbers} == pytest.approx(
+        {key: verdict[key] for key in numbers}, rel=1e-6, nan_ok=True
+    )
     assert {key: again.verdict[key] for key in verdict if key not in numbers} == {
         key: verdict[key] for key in verdict if key not in numbers
     }
@@ -189,7 +195,9 @@ def test_an_unknown_noise_is_estimated_and_the_verdict_stays(name):
 
 
 def test_the_same_seed_gives_identical_tables_and_another_other_intervals(lagging):
-    first, second, other = (diagnosed(lagging, details=True, settings=GapSettings(draws=30, seed=seed)) for seed in (5, 5, 6))
+    first, second, other = (
+        diagnosed(lagging, details=True, settings=GapSettings(draws=30, seed=seed)) for seed in (5, 5, 6)
+    )
     assert first.verdict == second.verdict and first.verdict["effects"] == other.verdict["effects"]
     for name in DETAILS:
         pd.testing.assert_frame_equal(first.tables[name], second.tables[name])
@@ -210,7 +218,9 @@ def test_tables_agree_with_the_verdict():
     assert again["rms_mm"] == pytest.approx(NOISE_RMS_MM, rel=0.1)
     sets = found.tables["gap_sets"]
     assert set(sets["effects"].iloc[0].split("+")) == set(verdict["effects"].split("+"))
-    assert sets["probability"].iloc[0] == pytest.approx(verdict["probability"]) and sets["probability"].sum() <= 1.0 + 1e-9
+    assert (
+        sets["probability"].iloc[0] == pytest.approx(verdict["probability"]) and sets["probability"].sum() <= 1.0 + 1e-9
+    )
 
 
 def test_too_few_points_are_refused():
@@ -252,4 +262,6 @@ def test_a_time_constant_between_those_of_the_grid_is_fitted(time_constant):
     found = diagnosed(measure((grown,)), details=True)
     assert found.verdict["effects"] == "thermal_growth"
     numbers = found.tables["gap_parameters"].query("effect != 'calibration'").set_index("parameter")["value"]
-    assert numbers["time_constant"] == pytest.approx(time_constant, rel=0.1) and numbers["strain"] == pytest.approx(8e-4, rel=0.05)
+    assert numbers["time_constant"] == pytest.approx(time_constant, rel=0.1) and numbers["strain"] == pytest.approx(
+        8e-4, rel=0.05
+    )

@@ -13,8 +13,8 @@ from scipy.fft import dct
 from scipy.special import log_ndtr, logsumexp
 from scipy.stats import multivariate_normal, norm
 
-from rrru.effects.protocol import Coordinates
-from rrru.gap import kernels
+from rrru.effects.effect import Coordinates
+from rrru.gap import evidence_kernels as kernels
 from rrru.gap.case import Linear
 from rrru.gap.evidence import LEVELS, STRENGTHS, Evidence, along_runs, spectrum
 from rrru.gap.terms import EACH, SAME, Term
@@ -33,7 +33,9 @@ PULLS = {"pull": _effect([1.0], [0], True), "pair": _effect([1.0, 1.0], [0, 0], 
 
 
 def _evidence(seed=0, with_law=False):
-    """Evidence on random numbers: three calibration columns, two effects, one of them with two columns of its law's doubt."""
+    """Evidence on random numbers: three calibration columns, two effects, one of them with two columns of its law's
+    doubt.
+    """
     generator = np.random.default_rng(seed)
     shape = (len(RUN), 3)
     columns = {("free", 0): generator.normal(size=(*shape, 2)), ("legged", 0): generator.normal(size=(*shape, 3))}
@@ -56,7 +58,9 @@ def _discrepancy():
 
 
 def _marginal(evidence, columns, prior_covariance, level):
-    """Log density of the data with a flat prior on the calibration's errors (restricted likelihood), its constants as in `Evidence`."""
+    """Log density of the data with a flat prior on the calibration's errors (restricted likelihood), its constants as
+    in `Evidence`.
+    """
     data, base = evidence.linear.data.ravel() / NOISE_MM, evidence.linear.base.reshape(-1, 3) / NOISE_MM
     covariance = np.eye(len(data)) + LEVELS[level] ** 2 * _discrepancy()
     if columns is not None:
@@ -68,7 +72,9 @@ def _marginal(evidence, columns, prior_covariance, level):
 
 
 def _unit_size(evidence, columns, typical):
-    """Prior standard deviations (k,) for which the columns' part beyond the calibration has an rms of one noise per axis."""
+    """Prior standard deviations (k,) for which the columns' part beyond the calibration has an rms of one noise per
+    axis.
+    """
     basis, _ = np.linalg.qr(evidence.linear.base.reshape(-1, 3))
     beyond = columns - basis @ (basis.T @ columns)
     return typical / np.sqrt((beyond**2 * typical**2).sum() / columns.shape[0]) * NOISE_MM
@@ -100,7 +106,10 @@ def test_two_terms_and_a_laws_doubt_equal_a_dense_marginal_likelihood(level):
         linear.columns["legged", 0].reshape(-1, 3),
         linear.laws["free"].reshape(-1, 2),
     )
-    sizes = _unit_size(evidence, free, LIBRARY["free"].coordinates.typical), _unit_size(evidence, legged, np.array([1.0, 1.0, 1.5]))
+    sizes = (
+        _unit_size(evidence, free, LIBRARY["free"].coordinates.typical),
+        _unit_size(evidence, legged, np.array([1.0, 1.0, 1.5])),
+    )
     together = np.concatenate([free, legged, law], axis=1)
     expected = []
     for first, second in product(STRENGTHS, STRENGTHS):
@@ -127,7 +136,9 @@ def test_coefficients_are_the_generalised_ridge_solution(level):
 
 def _kernel(design, data, scale, positive):
     gram, moment = design.T @ design, design.T @ data
-    return kernels.log_evidence(gram[None], moment[None], np.asarray(scale, dtype=float)[None], np.asarray(positive))[0, 0]
+    return kernels.log_evidence(gram[None], moment[None], np.asarray(scale, dtype=float)[None], np.asarray(positive))[
+        0, 0
+    ]
 
 
 @settings(max_examples=40, deadline=None)
@@ -207,7 +218,9 @@ def test_no_effect_explains_nothing_and_a_strong_one_what_it_made():
     linear = evidence.linear
     made = linear.columns["free", 0] @ np.array([2.0, -1.0])
     strong = Evidence(LIBRARY, Linear(made, linear.base, linear.columns, {}, {}, None), RUN, NOISE_MM)
-    hypothesis = SimpleNamespace(terms=(Term("free"),), evidence=np.eye(len(LEVELS))[0], strengths=np.full((len(LEVELS), 1), 300.0))
+    hypothesis = SimpleNamespace(
+        terms=(Term("free"),), evidence=np.eye(len(LEVELS))[0], strengths=np.full((len(LEVELS), 1), 300.0)
+    )
     basis, _ = np.linalg.qr(linear.base.reshape(-1, 3))
     beyond = made.ravel() - basis @ (basis.T @ made.ravel())
     assert strong.explained(hypothesis) == pytest.approx(np.sqrt((beyond**2).mean()) / NOISE_MM, rel=1e-3)

@@ -1,4 +1,6 @@
-"""Predictions of left-out points, how far the gap shrinks, and the measuring noise, against slow and obvious computations."""
+"""Predictions of left-out points, how far the gap shrinks, and the measuring noise, against slow and obvious
+computations.
+"""
 
 from dataclasses import replace
 
@@ -12,14 +14,28 @@ from rrru.gap.evidence import LEVELS, Evidence
 from rrru.gap.heldout import folds, predict, resampled_rows
 from rrru.gap.noise import estimate_noise, spoilt
 from rrru.gap.terms import Term
-from tests.gap.campaigns import EFFECTS, FORWARD, FULL, LINES, NOISE_MM, SPIRAL, case_of, diagnosed, measure, plan_of, strong
+from tests.gap.campaigns import (
+    EFFECTS,
+    FORWARD,
+    FULL,
+    LINES,
+    NOISE_MM,
+    SPIRAL,
+    case_of,
+    diagnosed,
+    measure,
+    plan_of,
+    strong,
+)
 
 TERMS = (Term("servo_lag", 0, 2), Term("leg_asymmetry"))
 STRENGTHS = [1.0, 3.0]
 
 
 def _setting(passes, effects=()):
-    case = case_of(measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")})
+    case = case_of(
+        measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")}
+    )
     return case, Evidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
 
 
@@ -31,16 +47,25 @@ def full():
 def _refitted(case, evidence, level, fold, smooth):
     """Residuals and covariances of predictions of each fold by a dense fit of all others."""
     linear, n = evidence.linear, len(case)
-    columns = np.concatenate([linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1)
+    columns = np.concatenate(
+        [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1
+    )
     prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, STRENGTHS) ** -2.0])
     weight = np.eye(n) / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2))
     if smooth:
         transform, wave = np.zeros((n, n)), np.zeros(n)
         for run in np.unique(case.run):
             rows = np.flatnonzero(case.run == run)
-            transform[np.ix_(rows, rows)], wave[rows] = dct(np.eye(len(rows)), axis=0, norm="ortho"), np.arange(len(rows))
+            transform[np.ix_(rows, rows)], wave[rows] = (
+                dct(np.eye(len(rows)), axis=0, norm="ortho"),
+                np.arange(len(rows)),
+            )
         density = 1.0 / (1.0 + (wave / 3.0) ** 2) + 0.01
-        weight = transform.T @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * density / density.mean()))) @ transform
+        weight = (
+            transform.T
+            @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * density / density.mean())))
+            @ transform
+        )
     residual, uncertain = np.empty((n, 3)), np.empty(n)
     for number in np.unique(fold):
         out, fitted = fold == number, fold != number
@@ -72,7 +97,9 @@ def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(f
     assert np.unique(fold).tolist() == [0, 1, 2, 3, 4]
     for run in np.unique(once.run):
         own = fold[once.run == run]
-        assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * ((len(own) - 1) // 5)
+        assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * (
+            (len(own) - 1) // 5
+        )
 
 
 def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
@@ -88,12 +115,17 @@ def test_rows_are_resampled_by_runs_or_by_stretches():
     run = np.repeat(np.arange(12), 5)
     drawn = resampled_rows(run, generator, 20)
     assert drawn.shape == (20, 60) and set(drawn.ravel()) <= set(range(60))
-    assert (drawn.reshape(20, 12, 5) == drawn.reshape(20, 12, 5)[..., :1] + np.arange(5)).all() and (drawn[:, ::5] % 5 == 0).all()
+    assert (drawn.reshape(20, 12, 5) == drawn.reshape(20, 12, 5)[..., :1] + np.arange(5)).all() and (
+        drawn[:, ::5] % 5 == 0
+    ).all()
     few = resampled_rows(np.repeat([3, 1], 10), generator, 20).reshape(20, 4, 5)
     assert (few == few[..., :1] + np.arange(5)).all() and set(few[..., 0].ravel()) == {0, 5, 10, 15}
 
 
-OTHER = (replace(LINES[0], start_mm=(-500.0, -200.0, 600.0), end_mm=(50.0, 180.0, 720.0)), replace(SPIRAL, start_deg=40.0, turns=3.0))
+OTHER = (
+    replace(LINES[0], start_mm=(-500.0, -200.0, 600.0), end_mm=(50.0, 180.0, 720.0)),
+    replace(SPIRAL, start_deg=40.0, turns=3.0),
+)
 
 
 @pytest.mark.parametrize("name", ["leg_asymmetry", "servo_lag", "encoder_eccentricity"])
@@ -119,7 +151,9 @@ def test_shares_of_made_up_steps():
     generator = np.random.default_rng(1)
     residual = generator.normal(size=(50, 3))
     for factor, share in ((0.25, 0.75), (0.0, 1.0), (1.0, 0.0), (1.5, -0.5), (5.0, -1.0)):
-        np.testing.assert_allclose(shrink.share_closed(_step(residual), _step(factor * residual)), [share] * 3, atol=1e-12)
+        np.testing.assert_allclose(
+            shrink.share_closed(_step(residual), _step(factor * residual)), [share] * 3, atol=1e-12
+        )
     assert shrink.share_closed(_step(0.0 * residual), _step(residual)) == (0.0, 0.0, 0.0)
     assert shrink.gap_rms(np.array([4.0, -1.0, 0.0])) == 1.0 and shrink.gap_rms(np.array([-4.0])) == 0.0
 
@@ -149,7 +183,9 @@ def test_single_spikes_are_spoilt_and_smooth_gaps_and_noise_are_not(full):
     noise = NOISE_MM * generator.standard_normal((len(case), 3))
     assert not spoilt(case, noise, NOISE_MM).any()
     smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
-    assert not spoilt(case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise, NOISE_MM).any()
+    assert not spoilt(
+        case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise, NOISE_MM
+    ).any()
     assert not spoilt(case, smooth * 0.05 + noise, NOISE_MM).any()
     spiked = noise.copy()
     at = [4, 40, 100, 200]

@@ -7,14 +7,14 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from rrru.effects.protocol import Contribution, Coordinates, plain_coordinates
-from rrru.effects.registry import EFFECTS
+from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
+from rrru.effects.library import EFFECTS
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import State
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate, worst_spot
 from rrru.parameters import Parameter, ParameterSet
-from rrru.report import tables
+from rrru.store import tables
 from tests.gap.campaigns import NOISE_MM, case_of, measure
 
 FACTORS = {"trajectory", "region", "direction", "leg", "motion_direction", "speed", "payload", "time"}
@@ -43,7 +43,12 @@ def test_shares_of_a_factor_add_up_to_the_whole(case, linear):
     quiet = replace(case, noise_mm=1e-9)
     table = _located(quiet, _noise(case, 0), linear)
     assert set(table["factor"]) == FACTORS
-    leg = table["level"].where(table["factor"] == "motion_direction", "").str.extract(r"(leg \d)", expand=False).fillna("")
+    leg = (
+        table["level"]
+        .where(table["factor"] == "motion_direction", "")
+        .str.extract(r"(leg \d)", expand=False)
+        .fillna("")
+    )
     for (factor, _), share in table.groupby([table["factor"], leg])["share"]:
         assert share.sum() == pytest.approx(1.0, abs=1e-6), factor
     assert (table["share_low"] <= table["share"]).all() and (table["share"] <= table["share_high"]).all()
@@ -157,7 +162,9 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
 @pytest.fixture(scope="module")
 def identified(case):
     plain = case.linearise(State(calibrate(case).errors, {}))
-    return plain, tables.check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index("effect")
+    return plain, tables.check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index(
+        "effect"
+    )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -201,4 +208,8 @@ def test_effects_that_cannot_be_tested_say_why():
     case = case_of(measure().assign(time_s=np.nan))
     table = identify(case, case.linearise(calibrate(case)))
     table = tables.check("gap_identifiability", table.assign(campaign="made up")).set_index("effect")
-    assert set(table.index) == set(EFFECTS) and not table.loc["servo_lag", "testable"] and "needs" in table.loc["servo_lag", "note"]
+    assert (
+        set(table.index) == set(EFFECTS)
+        and not table.loc["servo_lag", "testable"]
+        and "needs" in table.loc["servo_lag", "note"]
+    )

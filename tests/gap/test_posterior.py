@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from rrru.effects.registry import EFFECTS
+from rrru.effects.library import EFFECTS
 from rrru.gap.evidence import LEVELS
 from rrru.gap.posterior import Posterior, Prior, posterior
 from rrru.gap.search import Hypothesis
@@ -57,7 +57,9 @@ def test_a_terms_numbers_spread_over_its_legs(name):
 
 
 def test_without_data_the_probabilities_are_the_prior():
-    """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and pairs."""
+    """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and
+    pairs.
+    """
     prior = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1)
     beliefs = posterior(_stub(1.5), [_hypothesis(*terms) for size in range(3) for terms in _all(size)], prior)
     assert beliefs.weights.sum() == pytest.approx(1.0)
@@ -74,7 +76,9 @@ def test_without_data_the_probabilities_are_the_prior():
 
 def test_legs_have_the_prior_of_their_kinds():
     beliefs = posterior(_stub(), [_hypothesis(*terms) for size in range(2) for terms in _all(size)], Prior())
-    np.testing.assert_allclose([beliefs.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9])
+    np.testing.assert_allclose(
+        [beliefs.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9]
+    )
     np.testing.assert_allclose([beliefs.legs("axis_tilt")[k] for k in (EACH, 1, 2, 3)], [1 / 2, 1 / 6, 1 / 6, 1 / 6])
     assert beliefs.legs("unknown") == {}
     assert sum(beliefs.legs("axis_tilt").values()) == pytest.approx(1.0)
@@ -82,7 +86,11 @@ def test_legs_have_the_prior_of_their_kinds():
 
 def test_evidence_multiplies_the_prior():
     generator = np.random.default_rng(0)
-    hypotheses = [_hypothesis(*terms, evidence=generator.normal(0.0, 3.0, len(LEVELS))) for size in range(2) for terms in _all(size)]
+    hypotheses = [
+        _hypothesis(*terms, evidence=generator.normal(0.0, 3.0, len(LEVELS)))
+        for size in range(2)
+        for terms in _all(size)
+    ]
     flat = posterior(_stub(20.0), [_hypothesis(*h.terms) for h in hypotheses], Prior())
     beliefs = posterior(_stub(20.0), hypotheses, Prior())
     log_weight = np.log(flat.weights) + np.array([h.evidence for h in hypotheses])
@@ -125,7 +133,8 @@ def _decided(*entries, shares=None):
     for row, (_, probability, flag) in enumerate(entries):
         weights[row, int(flag)] = probability
     return decide(
-        SimpleNamespace(posterior=Posterior(hypotheses, weights, unexplained), case=SimpleNamespace(library=EFFECTS)), shares or {}
+        SimpleNamespace(posterior=Posterior(hypotheses, weights, unexplained), case=SimpleNamespace(library=EFFECTS)),
+        shares or {},
     )
 
 
@@ -140,7 +149,9 @@ def test_nothing_is_decided_where_nothing_is_most_probable():
 
 
 def test_the_most_probable_set_is_named_in_the_order_of_its_shares():
-    verdict = _decided(((LAG, PLAY), 0.7, False), ((PLAY,), 0.26, False), ((), 0.01, False), shares={"servo_lag": 0.2, "backlash": 0.7})
+    verdict = _decided(
+        ((LAG, PLAY), 0.7, False), ((PLAY,), 0.26, False), ((), 0.01, False), shares={"servo_lag": 0.2, "backlash": 0.7}
+    )
     assert verdict.label == "backlash+servo_lag" and verdict.confusable_with == ()
     assert [names for names, _, _ in verdict.rivals] == [frozenset({"backlash"})]
 
@@ -148,7 +159,11 @@ def test_the_most_probable_set_is_named_in_the_order_of_its_shares():
 def test_hypotheses_of_one_set_add_up():
     legs = [Term("servo_lag", 0, leg) for leg in (1, 2, 3)]
     verdict = _decided(*(((leg,), 0.2, False) for leg in legs), ((PLAY,), 0.4, False))
-    assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.6) and verdict.confusable_with == ("backlash",)
+    assert (
+        verdict.label == "servo_lag"
+        and verdict.probability == pytest.approx(0.6)
+        and verdict.confusable_with == ("backlash",)
+    )
 
 
 def test_unexplained_wins_where_all_of_it_together_beats_the_best_set():

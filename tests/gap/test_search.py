@@ -1,4 +1,6 @@
-"""The search against an enumeration of everything, the exact fit against known truth, and advice against brute force."""
+"""The search against an enumeration of everything, the exact fit against known truth, and advice against brute
+force.
+"""
 
 from dataclasses import dataclass, replace
 from itertools import combinations, product
@@ -7,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.protocol import Contribution, Coordinates
-from rrru.effects.registry import EFFECTS
+from rrru.effects.effect import Contribution, Coordinates
+from rrru.effects.library import EFFECTS
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
@@ -106,12 +108,16 @@ class FakeCompliance:
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""
-        return Contribution(drive=np.asarray(values) * motion.drive_load / (1.0 + np.nan_to_num(motion.payload_kg))[:, None])
+        return Contribution(
+            drive=np.asarray(values) * motion.drive_load / (1.0 + np.nan_to_num(motion.payload_kg))[:, None]
+        )
 
 
 @pytest.fixture(scope="module")
 def twins():
-    """Attribution, about the calibration alone, of a campaign without payloads between two effects that differ under payload only."""
+    """Attribution, about the calibration alone, of a campaign without payloads between two effects that differ under
+    payload only.
+    """
     case, calibrated = _twins()
     evidence = Evidence(case.library, case.linearise(calibrated), case.run, case.noise_mm)
     beliefs = posterior(evidence, search(evidence), Prior())
@@ -121,14 +127,18 @@ def twins():
 
 
 def _twins():
-    library = _library("drive_compliance", "servo_lag", "thermal_growth", "transmission_error") | {"own_weight": FakeCompliance()}
+    library = _library("drive_compliance", "servo_lag", "thermal_growth", "transmission_error") | {
+        "own_weight": FakeCompliance()
+    }
     case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of((FORWARD, REVERSE))), library)
     return case, calibrate(case)
 
 
 def test_what_no_run_tells_apart_shares_the_probability(twins):
     found, verdict, _ = twins
-    assert found.posterior.marginal("own_weight") == pytest.approx(found.posterior.marginal("drive_compliance"), rel=1e-2)
+    assert found.posterior.marginal("own_weight") == pytest.approx(
+        found.posterior.marginal("drive_compliance"), rel=1e-2
+    )
     assert verdict.probability < 0.6 and {*verdict.effects, *verdict.confusable_with} >= TWINS
 
 
@@ -150,7 +160,9 @@ def _columns(library, linear, hypothesis):
 
 
 def test_the_best_runs_gain_is_what_appending_it_brings(twins):
-    """The run is driven once more at the end of the campaign's table and both sums of squares are made anew by least squares."""
+    """The run is driven once more at the end of the campaign's table and both sums of squares are made anew by least
+    squares.
+    """
     found, verdict, table = twins
     best, case = table.iloc[0], found.case
     frame = case.measurements
@@ -183,14 +195,19 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
         penalty = np.concatenate([np.zeros((len(prior), 7)), np.diag(1.0 / prior)], axis=1)
         matrix, target = np.concatenate([matrix, penalty]), np.concatenate([target, np.zeros(len(prior))])
         unit = np.linalg.norm(matrix, axis=0)
-        costs.append(0.5 * ((target - matrix @ (np.linalg.lstsq(matrix / unit, target, rcond=None)[0] / unit)) ** 2).sum())
+        costs.append(
+            0.5 * ((target - matrix @ (np.linalg.lstsq(matrix / unit, target, rcond=None)[0] / unit)) ** 2).sum()
+        )
     assert best["now_nats"] == pytest.approx(costs[0], abs=1e-3)
     assert best["gain_nats"] == pytest.approx(costs[1] - costs[0], rel=0.02)
 
 
 def test_nothing_is_advised_where_nothing_rivals():
     found = attribute(
-        case_of(measure((strong("frame_misregistration", 10.0),), plan=plan_of(FULL)), _library("frame_misregistration")), Prior()
+        case_of(
+            measure((strong("frame_misregistration", 10.0),), plan=plan_of(FULL)), _library("frame_misregistration")
+        ),
+        Prior(),
     )
     verdict = decide(found, {})
     assert verdict.label == "frame_misregistration"

@@ -5,20 +5,22 @@ import pytest
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
-from rrru.effects.registry import active_effects
+from rrru.effects.library import active_effects
 from rrru.gap.diagnose import diagnose
-from rrru.mechanisms.delta import Delta
-from rrru.mechanisms.dynamics import Masses
-from rrru.mechanisms.ptt3 import Ptt3
 from rrru.plant.virtual_tripod import VirtualTripod
-from rrru.report import tables
+from rrru.robots.delta import Delta
+from rrru.robots.dynamics import Masses
+from rrru.robots.ptt3 import Ptt3
+from rrru.store import tables
 
 NOISE_MM = 0.005
 
 
 def _diagnosed(mechanism, height, errors, effects, payloads=(0.0, 2.0, 5.0), seed=1):
     curve = Spiral("curve", (0.0, 0.0), (80.0, 80.0), (height - 20.0, height + 20.0), 1.0, 120)
-    plan = make_plan([curve], [{"payload_kg": load, "reverse": k % 2 == 1} for k, load in enumerate(payloads)], 80.0, 400.0, 5.0)
+    plan = make_plan(
+        [curve], [{"payload_kg": load, "reverse": k % 2 == 1} for k, load in enumerate(payloads)], 80.0, 400.0, 5.0
+    )
     robot = VirtualTripod(mechanism, errors, active_effects(effects, mechanism.drive_unit))
     measurements, _ = robot.run(plan, NOISE_MM, np.random.default_rng(seed))
     return diagnose(measurements, mechanism, Masses(), noise_mm=NOISE_MM, name="test")
@@ -62,7 +64,9 @@ def test_a_deltas_cause_is_named():
 
 
 def test_what_the_calibration_takes_up_entirely_is_no_evidence():
-    """On a helix about the axis some functions of the place are the calibration's own: rounding must not pass for evidence."""
+    """On a helix about the axis some functions of the place are the calibration's own: rounding must not pass for
+    evidence.
+    """
     found = _diagnosed(Ptt3(), -250.0, GEOMETRY, {"backlash": _each("width", 0.02, 0.01, 0.02)}, payloads=(0.0, 0.0))
     evidence = found.tables["gap_sets"]["log_evidence"]
     assert np.isfinite(evidence).all() and evidence.max() < 1e5

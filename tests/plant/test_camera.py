@@ -7,7 +7,14 @@ import pytest
 from rrru.plant.camera import Camera, Target, render
 
 FACING = np.diag([1.0, -1.0, -1.0])
-QUIET = {"focal_mm": 16.0, "pixel_mm": 0.0099, "width_px": 320, "height_px": 240, "centre_offset_px": (3.0, -2.0), "noise_grey": 0.0}
+QUIET = {
+    "focal_mm": 16.0,
+    "pixel_mm": 0.0099,
+    "width_px": 320,
+    "height_px": 240,
+    "centre_offset_px": (3.0, -2.0),
+    "noise_grey": 0.0,
+}
 BROWN = (-0.3, 0.2, 2e-3, -1e-3)
 
 
@@ -35,7 +42,9 @@ def test_a_dot_s_image_is_centred_where_its_centre_is_projected(blur_px):
 
 
 def test_a_dot_covers_its_area_and_has_the_plate_s_grey_around_it():
-    image = render(Camera(**QUIET), one_dot(), FACING, np.array([0.0, 0.0, 400.0]), np.random.default_rng(0)).astype(float)
+    image = render(Camera(**QUIET), one_dot(), FACING, np.array([0.0, 0.0, 400.0]), np.random.default_rng(0)).astype(
+        float
+    )
     plate, dot = image[0, 0], image.min()
     radius = 2.5 * 1616.1616161616 / 400.0
     assert ((plate - image) / (plate - dot)).sum() == pytest.approx(np.pi * radius**2, rel=5e-3)
@@ -44,7 +53,9 @@ def test_a_dot_covers_its_area_and_has_the_plate_s_grey_around_it():
 def test_projection_is_opencv_s_and_rays_are_its_inverse():
     camera = Camera(**QUIET, distortion=BROWN)
     points = np.random.default_rng(1).uniform([-80.0, -60.0, 400.0], [80.0, 60.0, 700.0], (50, 3))
-    matrix = np.array([[camera.focal_px, 0.0, camera.centre_px[0]], [0.0, camera.focal_px, camera.centre_px[1]], [0.0, 0.0, 1.0]])
+    matrix = np.array(
+        [[camera.focal_px, 0.0, camera.centre_px[0]], [0.0, camera.focal_px, camera.centre_px[1]], [0.0, 0.0, 1.0]]
+    )
     expected, _ = cv2.projectPoints(points, np.zeros(3), np.zeros(3), matrix, np.array(BROWN))
     np.testing.assert_allclose(camera.project(points), expected[:, 0], atol=1e-9)
     x, y = (axis.ravel() for axis in camera.rays)
@@ -56,7 +67,8 @@ def test_projection_is_opencv_s_and_rays_are_its_inverse():
 def test_a_dot_off_its_lattice_place_is_seen_off_it():
     camera, shift = Camera(**QUIET), np.array([0.4, -0.25])
     images = [
-        render(camera, one_dot(offset), FACING, np.array([0.0, 0.0, 500.0]), np.random.default_rng(0)) for offset in ((0.0, 0.0), shift)
+        render(camera, one_dot(offset), FACING, np.array([0.0, 0.0, 500.0]), np.random.default_rng(0))
+        for offset in ((0.0, 0.0), shift)
     ]
     moved = centroid(images[1]) - centroid(images[0])
     np.testing.assert_allclose(moved, camera.focal_px / 500.0 * shift * [1.0, -1.0], atol=0.02)
@@ -65,7 +77,8 @@ def test_a_dot_off_its_lattice_place_is_seen_off_it():
 def test_noise_has_the_stated_size_and_comes_from_the_generator_only():
     camera = Camera(**QUIET | {"noise_grey": 2.0})
     first, again, other = (
-        render(camera, one_dot(), FACING, np.array([500.0, 0.0, 500.0]), np.random.default_rng(seed)) for seed in (5, 5, 6)
+        render(camera, one_dot(), FACING, np.array([500.0, 0.0, 500.0]), np.random.default_rng(seed))
+        for seed in (5, 5, 6)
     )
     assert first.dtype == np.uint8 and (first == again).all() and (first != other).any()
     # whole greys add a twelfth to the variance; four standard deviations of the estimate

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from rrru.compensate.backlash import measured_width
-from rrru.effects.registry import active_effects
+from rrru.effects.library import active_effects
 from rrru.errors import UnreachableError
-from rrru.mechanisms.ptt3 import Ptt3
 from rrru.plant.screw import Bench, encoder_record
 from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.robots.ptt3 import Ptt3
 
 PLACE = (0.0, 0.0, -250.0)
 EXACT = Bench(turns=10, lead_mm=5.0, samples_per_turn=8, noise_mm=0.0, resolution_mm=1e-9)
@@ -50,14 +50,18 @@ def test_eq_19_finds_the_play_within_its_standard_error_under_any_load(leg, payl
 
 
 def test_a_screw_without_play_has_none():
-    width = measured_width(encoder_record(robot((0.0, 0.0, 0.0)), 2, 0.0, REAL, PLACE, np.random.default_rng(4)), REAL.lead_mm)
+    width = measured_width(
+        encoder_record(robot((0.0, 0.0, 0.0)), 2, 0.0, REAL, PLACE, np.random.default_rng(4)), REAL.lead_mm
+    )
     assert abs(width.mean_mm) < 4.0 * width.standard_error_mm
 
 
 def test_a_load_shifts_the_reading_by_the_compliance():
     """8 kg on three legs: the carriage's force by virtual work, from finite differences of the height."""
     light, heavy = (
-        encoder_record(robot((0.0, 0.0, 0.0), 1e-3), 1, load, EXACT, PLACE, np.random.default_rng(0))["encoder_mm"].to_numpy()
+        encoder_record(robot((0.0, 0.0, 0.0), 1e-3), 1, load, EXACT, PLACE, np.random.default_rng(0))[
+            "encoder_mm"
+        ].to_numpy()
         for load in (0.0, 8.0)
     )
     mechanism, step = Ptt3(), 1e-4

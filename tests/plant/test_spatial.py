@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant.spatial import SpatialGeometry
+from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 
 _LENGTHS = np.tile([400.0, 400.0, 100.0, 800.0, 400.0], (3, 1))
@@ -11,7 +11,9 @@ _LENGTHS = np.tile([400.0, 400.0, 100.0, 800.0, 400.0], (3, 1))
 
 def _solve(points, theta, lengths=_LENGTHS, deviations=None, **options):
     robot = Rrru3()
-    geometry = SpatialGeometry(np.array(robot.azimuth_rad), lengths, np.zeros((3, 6, 6)) if deviations is None else deviations)
+    geometry = SpatialGeometry(
+        np.array(robot.azimuth_rad), lengths, np.zeros((3, 6, 6)) if deviations is None else deviations
+    )
     return geometry.solve(theta, robot.passive_angles(points, robot.inverse(points)), **options)
 
 
@@ -41,7 +43,9 @@ def test_crooked_axes_equal_a_general_solver(rich_poses):
         guess = np.concatenate([passive[k].ravel(), np.zeros(3), points[k]])
         pose = rrru3_slow.close(theta[k], _LENGTHS, deviations, guess, shift[k])
         np.testing.assert_allclose(solution.position_mm[k], pose[:3, 3], atol=1e-7)
-        np.testing.assert_allclose(solution.rotation_rad[k], (pose[[2, 0, 1], [1, 2, 0]] - pose[[1, 2, 0], [2, 0, 1]]) / 2, atol=1e-9)
+        np.testing.assert_allclose(
+            solution.rotation_rad[k], (pose[[2, 0, 1], [1, 2, 0]] - pose[[1, 2, 0], [2, 0, 1]]) / 2, atol=1e-9
+        )
     assert np.linalg.norm(solution.rotation_rad, axis=1).min() > 1e-5
 
 
@@ -87,7 +91,9 @@ def test_turning_the_whole_base_turns_the_whole_robot(rich_poses):
     geometry = SpatialGeometry(np.array(Rrru3().azimuth_rad) + turn, _LENGTHS, np.zeros((3, 6, 6)))
     solution = geometry.solve(theta, Rrru3().passive_angles(points, theta))
     c, s = np.cos(turn), np.sin(turn)
-    np.testing.assert_allclose(solution.position_mm, points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), atol=1e-8)
+    np.testing.assert_allclose(
+        solution.position_mm, points @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), atol=1e-8
+    )
 
 
 def test_points_without_solution_are_said_so(rich_poses):

@@ -8,14 +8,14 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.protocol import Contribution
-from rrru.effects.registry import active_effects
+from rrru.effects.effect import Contribution
+from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
-from rrru.mechanisms import singularity
-from rrru.mechanisms.dynamics import GRAVITY_MM_S2
-from rrru.mechanisms.rrru3 import Rrru3
 from rrru.plant import virtual_robot
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots import singularity
+from rrru.robots.dynamics import GRAVITY_MM_S2
+from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 
 _ONCE = ({"reverse": False, "payload_kg": 0.0},)
@@ -44,13 +44,18 @@ def _section(**changes):
 
 def test_a_perfect_robot_goes_where_it_is_told():
     measurements, truth = VirtualRobot().run(_plan(), 0.0, np.random.default_rng(0))
-    error = measurements[[f"measured_{a}_mm" for a in "xyz"]].to_numpy() - measurements[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
+    error = (
+        measurements[[f"measured_{a}_mm" for a in "xyz"]].to_numpy()
+        - measurements[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
+    )
     assert np.abs(error).max() < 1e-8
     assert truth["platform_rotation_rad"].max() < 1e-12
 
 
 def test_leg_forces_do_the_work_of_the_load():
-    """Virtual work with the drives' Jacobian: tau = -J^T W equals the leg forces' moments, f_i dF_i/dtheta_i / |grad F_i|."""
+    """Virtual work with the drives' Jacobian: tau = -J^T W equals the leg forces' moments, f_i dF_i/dtheta_i / |grad
+    F_i|.
+    """
     robot, plan = VirtualRobot(), _plan()
     target = plan.targets()
     motion = robot.motion(plan, robot.mechanism.inverse)
@@ -79,7 +84,9 @@ def test_commands_near_the_constraint_singularity_are_reported():
 
 
 def test_crooked_axes_near_the_singularity_are_unsolved_not_guessed():
-    crooked = virtual_robot.from_config(Rrru3(), _section(axis_errors={"position_mm": 0.2, "angle_rad": 5e-4, "seed": 3}))
+    crooked = virtual_robot.from_config(
+        Rrru3(), _section(axis_errors={"position_mm": 0.2, "angle_rad": 5e-4, "seed": 3})
+    )
     measurements, truth = crooked.run(_plan(), 0.02, np.random.default_rng(0))
     lost = measurements["status"] == "unsolved"
     assert lost.any()
@@ -121,7 +128,9 @@ def test_payload_reaches_the_effects():
 
 
 def test_clearance_moves_the_platform_down_under_its_weight():
-    """The bores lag behind the pins, so that gravity is followed: the platform's shift does positive work on the load."""
+    """The bores lag behind the pins, so that gravity is followed: the platform's shift does positive work on the
+    load.
+    """
     plan = _plan()
     loose = VirtualRobot(effects=active_effects({"joint_clearance": {f"clearance{k}": 0.5 for k in (1, 2, 3)}}))
     measurements, _ = loose.run(plan, 0.0, np.random.default_rng(0))
@@ -166,7 +175,10 @@ def test_every_part_of_a_contribution_reaches_the_loop_closure():
 
 def test_a_heavier_arm_loads_its_drive_only():
     plan = _plan()
-    light, heavy = (virtual_robot.from_config(Rrru3(), _section(arm_mass_kg=mass)).motion(plan, Rrru3().inverse) for mass in (2.0, 5.0))
+    light, heavy = (
+        virtual_robot.from_config(Rrru3(), _section(arm_mass_kg=mass)).motion(plan, Rrru3().inverse)
+        for mass in (2.0, 5.0)
+    )
     np.testing.assert_array_equal(light.force_n, heavy.force_n)
     more = 3.0 * (GRAVITY_MM_S2 * 200.0 * np.cos(light.drive) - light.drive_acceleration * 400.0**2 / 3.0) / 1000.0
     np.testing.assert_allclose(heavy.drive_load - light.drive_load, more, rtol=1e-9)

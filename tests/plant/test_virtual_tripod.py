@@ -5,11 +5,11 @@ import pytest
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
-from rrru.effects.registry import active_effects
+from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
-from rrru.mechanisms.delta import Delta
-from rrru.mechanisms.ptt3 import Ptt3
 from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
 
 ERRORS = {
     "ptt3": (Ptt3(), -250.0, {"db1": 0.3, "dL2": -0.4, "rise3": 1e-3, "swing1": -2e-3}),
@@ -18,7 +18,9 @@ ERRORS = {
 
 
 def _plan(height, passes=({"payload_kg": 0.0, "reverse": False},)):
-    return make_plan([Spiral("curve", (0.0, 0.0), (80.0, 80.0), (height - 20.0, height + 20.0), 1.0, 45)], passes, 80.0, 400.0, 5.0)
+    return make_plan(
+        [Spiral("curve", (0.0, 0.0), (80.0, 80.0), (height - 20.0, height + 20.0), 1.0, 45)], passes, 80.0, 400.0, 5.0
+    )
 
 
 @pytest.mark.parametrize("name", ERRORS)
@@ -28,7 +30,9 @@ def test_a_robot_with_errors_stands_where_the_three_links_are_as_long_as_they_ar
     columns = [f"slider{k}_mm" if name == "ptt3" else f"theta{k}_rad" for k in (1, 2, 3)]
     actuators = measurements[columns].to_numpy()
     position = truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()
-    np.testing.assert_allclose(actuators, mechanism.inverse(measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()))
+    np.testing.assert_allclose(
+        actuators, mechanism.inverse(measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy())
+    )
     rich = VirtualTripod(mechanism, errors).geometry
     lengths = np.linalg.norm(position[:, None] - rich.mechanism.ends(actuators, rich.legs), axis=-1)
     np.testing.assert_allclose(lengths, np.broadcast_to(rich.legs[:, mechanism.LINK], lengths.shape), atol=1e-9)
@@ -42,7 +46,9 @@ def test_an_unknown_error_is_refused():
 
 def test_play_holds_a_slider_back_by_half_of_it_in_the_sense_of_its_motion():
     robot = VirtualTripod(Ptt3(), effects=active_effects({"backlash": {"width2": 0.08}}, "mm"))
-    measurements, truth = robot.run(_plan(-250.0, ({"payload_kg": 0.0, "reverse": False},) * 2), 0.0, np.random.default_rng(0))
+    measurements, truth = robot.run(
+        _plan(-250.0, ({"payload_kg": 0.0, "reverse": False},) * 2), 0.0, np.random.default_rng(0)
+    )
     true = truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()
     slider = measurements[[f"slider{k}_mm" for k in (1, 2, 3)]].to_numpy()
     lag = Ptt3().inverse(true) - slider

@@ -1,7 +1,8 @@
 """One generation of MATLAB's `ga`, and a whole run of it, written as slowly and obviously as possible.
 
-Scaling is done in exact fractions and by the textbook formula; everything else is loops over lists. The random numbers are taken one by
-one from iterators, in the order: offset, shuffle, coins of the crossover children (uniform), steps of the mutants (normal).
+Scaling is done in exact fractions and by the textbook formula; everything else is loops over lists. The random numbers
+are taken one by one from iterators, in the order: offset, shuffle, coins of the crossover children (uniform), steps of
+the mutants (normal).
 """
 
 import math
@@ -95,7 +96,9 @@ def migrate(people, scores, fraction):
 
 
 def run(objective, low, high, settings, seed):
-    """Best objective of the initial population and after every generation; `settings` has the fields of GeneticSettings, no early stop."""
+    """Best objective of the initial population and after every generation; `settings` has the fields of
+    GeneticSettings, no early stop.
+    """
     random = np.random.RandomState(seed)
     genes = len(low)
     start = random.uniform(0.0, 1.0, size=(sum(settings.populations), genes)).tolist()
@@ -116,7 +119,13 @@ def run(objective, low, high, settings, seed):
         sigma = settings.mutation_scale * (1.0 - settings.mutation_shrink * number / settings.generations)
         for island in range(len(people)):
             people[island], known = generation(
-                people[island], scores[island], settings.crossover_fraction, settings.elite_share, sigma, uniforms, normals
+                people[island],
+                scores[island],
+                settings.crossover_fraction,
+                settings.elite_share,
+                sigma,
+                uniforms,
+                normals,
             )
             scores[island] = [score_of(p) if k is None else k for p, k in zip(people[island], known, strict=True)]
         assert next(uniforms, None) is None

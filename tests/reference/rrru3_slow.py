@@ -1,4 +1,6 @@
-"""The 3-RRRU written out leg by leg, with scipy's general solver and homogeneous matrices: nothing is shared with the package."""
+"""The 3-RRRU written out leg by leg, with scipy's general solver and homogeneous matrices: nothing is shared with the
+package.
+"""
 
 import numpy as np
 from scipy.optimize import fsolve

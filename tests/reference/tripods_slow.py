@@ -1,4 +1,6 @@
-"""The 3-PTT and the rotary Delta written out from their vector loops with scipy's general solvers: nothing is shared with the package."""
+"""The 3-PTT and the rotary Delta written out from their vector loops with scipy's general solvers: nothing is shared
+with the package.
+"""
 
 import numpy as np
 from scipy.optimize import root
@@ -6,9 +8,11 @@ from scipy.spatial.transform import Rotation
 
 
 def trilaterate(centres, radii):
-    """Lower of the two points (3,) at the distances `radii` (3,) from `centres` (3, 3), z up; raises ValueError where there is none.
+    """Lower of the two points (3,) at the distances `radii` (3,) from `centres` (3, 3), z up; raises ValueError where
+    there is none.
 
-    Differences of the sphere equations are linear: their solution of least norm plus a multiple of the null direction meets the first sphere.
+    Differences of the sphere equations are linear: their solution of least norm plus a multiple of the null direction
+    meets the first sphere.
     """
     centres, radii = np.asarray(centres, dtype=float), np.asarray(radii, dtype=float)
     rows = 2.0 * (centres[1:] - centres[0])
@@ -23,7 +27,9 @@ def trilaterate(centres, radii):
 
 
 def ptt3_forward(slider, length, radius_difference, inclination, guess):
-    """Position (3,) of a 3-PTT: scipy's root on the three link lengths, each leg drawn in its own plane and turned by its azimuth."""
+    """Position (3,) of a 3-PTT: scipy's root on the three link lengths, each leg drawn in its own plane and turned by
+    its azimuth.
+    """
     ends = []
     for leg in range(3):
         in_plane = [radius_difference + slider[leg] * np.cos(inclination), 0.0, slider[leg] * np.sin(inclination)]
@@ -34,7 +40,9 @@ def ptt3_forward(slider, length, radius_difference, inclination, guess):
 
 
 def upright_carriages(position, length, radius):
-    """Carriage heights (3,) of a linear delta: each stands above the platform by the upright side of its link's triangle."""
+    """Carriage heights (3,) of a linear delta: each stands above the platform by the upright side of its link's
+    triangle.
+    """
     azimuth = np.radians([0.0, 120.0, 240.0])
     across = np.hypot(radius * np.cos(azimuth) - position[0], radius * np.sin(azimuth) - position[1])
     return position[2] + np.sqrt(length**2 - across**2)

@@ -10,10 +10,11 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from rrru.calibrate import vision
-from rrru.delta_study import draws, fits, robot, search, views
 from rrru.errors import ConfigError
-from rrru.mechanisms.delta import Delta
+from rrru.robots.delta import Delta
+from rrru.studies.delta import draws, fits, views, vision
+from rrru.studies.delta import robot_search as search
+from rrru.studies.delta import twin as robot
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 _OVERLAY = (
@@ -61,12 +62,18 @@ def test_images_lead_to_smaller_errors_and_every_variant_stands_in_the_tables(fi
     assert calibrations.loc["paper", "plane_mean_mm"] < calibrations.loc["none", "plane_mean_mm"]
     poses = _table(finished, "poses")
     assert len(poses) == 9 + 5 and (poses["dots"] > 100).all()
-    assert np.abs(_columns(poses, "one_rotation_error")[:, :2]).max() < np.abs(_columns(poses, "error")[:, :2]).max() < 0.2
-    assert (finished[0] / "figures/delta_errors.png").exists() and (finished[0] / "timings/delta/steps.parquet").exists()
+    assert (
+        np.abs(_columns(poses, "one_rotation_error")[:, :2]).max() < np.abs(_columns(poses, "error")[:, :2]).max() < 0.2
+    )
+    assert (finished[0] / "figures/delta_errors.png").exists() and (
+        finished[0] / "timings/delta/steps.parquet"
+    ).exists()
 
 
 def test_errors_on_the_plane_are_those_of_a_robot_driven_again(finished, config):
-    """By the mechanism alone: the zero errors found are taken off the commands, what is left are lengths, the rest of the zero errors, noise."""
+    """By the mechanism alone: the zero errors found are taken off the commands, what is left are lengths, the rest of
+    the zero errors, noise.
+    """
     points, section = _table(finished, "points"), config["delta"]
     found = _table(finished, "calibrations").set_index("variant")
     truth = Delta(errors="legs")
@@ -81,7 +88,9 @@ def test_errors_on_the_plane_are_those_of_a_robot_driven_again(finished, config)
         assert rows["base_error_mm"].mean() == pytest.approx(found.loc[variant, "base_mean_mm"])
         # frames differ by a motion: distances between points are the same in both
         own, base = _columns(rows, "error") + command, _columns(rows, "base_error") + command
-        np.testing.assert_allclose(np.linalg.norm(own - own[0], axis=1), np.linalg.norm(base - base[0], axis=1), atol=1e-9)
+        np.testing.assert_allclose(
+            np.linalg.norm(own - own[0], axis=1), np.linalg.norm(base - base[0], axis=1), atol=1e-9
+        )
 
 
 def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(finished, config):
@@ -92,7 +101,8 @@ def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(finished,
     assert (robots["plane_median_mm"] <= robots["plane_high_mm"]).all()
     # what knows the base frame is nearest to the truth there, on one robot another may be lucky
     assert large["base_median_mm"].idxmin() in ("tracker_positions", "tracker_heights")
-    # without length errors and noise of the camera every variant is exact but for the tracker's noise and the paper's one step
+    # without length errors and noise of the camera every variant is exact but for the tracker's noise and the paper's
+    # one step
     for name in ("true_centres", "true_centres_two_heights", "tracker_positions"):
         assert small.loc[name, "base_median_mm"] < 4.0 * config["delta"]["tracker_noise_mm"]
 
@@ -126,12 +136,18 @@ def test_dots_that_are_projected_are_those_of_the_rendered_images(finished, conf
     model = vision.CameraModel(matrix, lens[4:8], lens[8], 7)
     view = views.scene(config)
     seen = [draws.seen_dots(view, *place) for place in views.pose_places(view, truth)]
-    exact = np.array([vision.camera_pose(model, dots, target["pitch_mm"], target["diameter_mm"]).centre_mm for dots in seen])
-    rendered, projected = (places - _columns(truth, "true") for places in (_columns(_table(finished, "centres"), "centre"), exact))
+    exact = np.array(
+        [vision.camera_pose(model, dots, target["pitch_mm"], target["diameter_mm"]).centre_mm for dots in seen]
+    )
+    rendered, projected = (
+        places - _columns(truth, "true") for places in (_columns(_table(finished, "centres"), "centre"), exact)
+    )
     rendered, projected = rendered - rendered.mean(axis=0), projected - projected.mean(axis=0)
     # each axis: most of the error is the plate's and the lens's
     assert (((rendered - projected) ** 2).sum(axis=0) < 0.5 * (rendered**2).sum(axis=0)).all()
-    assert np.array([len(dots.number) for dots in seen]) == pytest.approx(_table(finished, "poses")["dots"].to_numpy(), rel=0.1)
+    assert np.array([len(dots.number) for dots in seen]) == pytest.approx(
+        _table(finished, "poses")["dots"].to_numpy(), rel=0.1
+    )
 
 
 def test_draws_differ_and_the_same_label_gives_the_same(config):
@@ -144,14 +160,17 @@ def test_draws_differ_and_the_same_label_gives_the_same(config):
         assert np.abs(one["centre"] - first[0]["centre"]).max() > 1e-3
     exact = {"target": config["delta"]["target"] | {"dot_error_mm": 0.0}}
     none = draws.drawn_errors(config | {"delta": config["delta"] | exact}, truth, 0.0, 1, "a")[0]
-    # an exact plate without noise leaves what single precision does to the lens; under one rotation the origin may shift
+    # an exact plate without noise leaves what single precision does to the lens; under one rotation the origin may
+    # shift
     assert np.abs(none["centre"]).max() < 1e-4
     assert np.ptp(none["one_rotation"], axis=0).max() < 1e-4
 
 
 def test_every_robot_has_its_own_tracker_noise(config):
     one = robot.twin(config)
-    runs = [replace(one, labels=("robots", k)).generator("tracker", "tracker_heights").standard_normal(50) for k in range(2)]
+    runs = [
+        replace(one, labels=("robots", k)).generator("tracker", "tracker_heights").standard_normal(50) for k in range(2)
+    ]
     assert abs(np.corrcoef(runs)[0, 1]) < 4.0 / np.sqrt(50)
 
 

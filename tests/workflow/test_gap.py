@@ -8,14 +8,14 @@ import pytest
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
-from rrru.effects.registry import active_effects
-from rrru.mechanisms.ptt3 import Ptt3
+from rrru.effects.library import active_effects
 from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.robots.ptt3 import Ptt3
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 _DRIFT = """
 import numpy as np
-from rrru.effects.protocol import Contribution
+from rrru.effects.effect import Contribution
 from rrru.parameters import Parameter, ParameterSet
 
 class Drift:
@@ -39,7 +39,7 @@ def _run(folder, overlay, *targets):
 def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tmp_path):
     """A measured campaign that the library cannot explain is explained by ten lines of a user's."""
     (tmp_path / "drift.py").write_text(_DRIFT)
-    campaign = "campaigns: {mine: {robot: rrru3, ingest: tests/data/field_05.csv, noise_mm: 0.02}}\n"
+    campaign = "campaigns: {mine: {robot: rrru3, ingest: data/field_05.csv, noise_mm: 0.02}}\n"
     target = "results/campaigns/mine/gap_verdicts.parquet"
     code, output = _run(tmp_path, campaign, target)
     assert code == 0, output
@@ -55,7 +55,7 @@ def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tm
 
 
 def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not_test(tmp_path):
-    points = pd.read_csv(ROOT / "tests/data/field_02.csv")
+    points = pd.read_csv(ROOT / "data/field_02.csv")
     points.drop(columns=["time_s", "speed_mm_s", "payload_kg", "theta1_rad", "theta2_rad", "theta3_rad"]).to_csv(
         tmp_path / "bare.csv", index=False
     )
@@ -94,31 +94,44 @@ def test_the_check_on_withheld_effects_runs_from_robots_to_figure(tmp_path):
     assert scores.loc[("field", "field_09"), "right"]
     assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
     summary = pd.read_parquet(folder / "withheld_summary.parquet")
-    assert set(summary["check"]) == {"label", "effect", "field"} and (tmp_path / "results/figures/withheld.png").stat().st_size > 10_000
+    assert (
+        set(summary["check"]) == {"label", "effect", "field"}
+        and (tmp_path / "results/figures/withheld.png").stat().st_size > 10_000
+    )
 
 
 def test_a_file_of_a_3_ptt_goes_the_whole_way(tmp_path):
     """Driven by a virtual robot with play, handed over as a file: calibrated, compensated and diagnosed."""
-    robot = VirtualTripod(Ptt3(), {"db1": 0.3}, active_effects({"backlash": {f"width{k}": 0.05 for k in (1, 2, 3)}}, "mm"))
+    robot = VirtualTripod(
+        Ptt3(), {"db1": 0.3}, active_effects({"backlash": {f"width{k}": 0.05 for k in (1, 2, 3)}}, "mm")
+    )
     curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (-270.0, -230.0), 2.0, 80)
     plan = make_plan([curve], [{"payload_kg": 0.0, "reverse": reverse} for reverse in (False, True)], 80.0, 400.0, 5.0)
     measurements, _ = robot.run(plan, 0.005, np.random.default_rng(0))
     measurements.drop(columns="status").to_csv(tmp_path / "sliders.csv", index=False)
     folder = tmp_path / "results/campaigns/mine"
-    overlay = "campaigns: {mine: {robot: ptt3, ingest: sliders.csv, noise_mm: 0.005}}\ngenetic: {seeds: 1, generations: 20}\n"
-    code, output = _run(tmp_path, overlay, *(f"results/campaigns/mine/{name}.parquet" for name in ("gap_verdicts", "error_summary")))
+    overlay = (
+        "campaigns: {mine: {robot: ptt3, ingest: sliders.csv, noise_mm: 0.005}}\ngenetic: {seeds: 1, generations: 20}\n"
+    )
+    code, output = _run(
+        tmp_path, overlay, *(f"results/campaigns/mine/{name}.parquet" for name in ("gap_verdicts", "error_summary"))
+    )
     assert code == 0, output
     assert pd.read_parquet(folder / "gap_verdicts.parquet")["effects"].iloc[0] == "backlash"
     found = pd.read_parquet(folder / "parameters.parquet").query(
         "calibration == 'both' and method == 'least_squares' and parameter == 'db1'"
     )
     assert found["value"].iloc[0] == pytest.approx(0.3, abs=0.05)
-    summary = pd.read_parquet(folder / "error_summary.parquet").set_index(["calibration", "method", "mode", "trajectory"])["mean_mm"]
+    summary = pd.read_parquet(folder / "error_summary.parquet").set_index(
+        ["calibration", "method", "mode", "trajectory"]
+    )["mean_mm"]
     assert summary["both", "least_squares", "model", "curve"] < 0.3 * summary["none", "none", "before", "curve"]
 
 
 def test_a_campaign_may_have_dimensions_of_its_own(tmp_path):
-    """A linear delta's file: with its own dimensions the commands are reached, with those of the level robot they are refused."""
+    """A linear delta's file: with its own dimensions the commands are reached, with those of the level robot they are
+    refused.
+    """
     own = {"L_mm": 290.0, "R_mm": 140.0, "r_mm": 33.0}
     robot = VirtualTripod(Ptt3(**own, rail_inclination_rad=np.pi / 2), {"db2": 0.2})
     curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (0.0, 30.0), 2.0, 60)
@@ -126,9 +139,17 @@ def test_a_campaign_may_have_dimensions_of_its_own(tmp_path):
     robot.run(plan, 0.01, np.random.default_rng(0))[0].drop(columns="status").to_csv(tmp_path / "tall.csv", index=False)
     target = "results/campaigns/mine/parameters.parquet"
     dimensions = ", ".join(f"{key}: {value}" for key, value in (own | {"rail_inclination_deg": 90}).items())
-    code, output = _run(tmp_path, f"campaigns: {{mine: {{robot: ptt3, ingest: tall.csv, dimensions: {{{dimensions}}}}}}}\n", target)
+    code, output = _run(
+        tmp_path, f"campaigns: {{mine: {{robot: ptt3, ingest: tall.csv, dimensions: {{{dimensions}}}}}}}\n", target
+    )
     assert code == 0, output
-    found = pd.read_parquet(tmp_path / target).query("calibration == 'both' and method == 'least_squares'").set_index("parameter")["value"]
+    found = (
+        pd.read_parquet(tmp_path / target)
+        .query("calibration == 'both' and method == 'least_squares'")
+        .set_index("parameter")["value"]
+    )
     assert found["db2"] - found["db1"] == pytest.approx(0.2, abs=0.03)
-    code, output = _run(tmp_path, "campaigns: {mine: {robot: ptt3, ingest: tall.csv, dimensions: {L9_mm: 3.0}}}\n", target)
+    code, output = _run(
+        tmp_path, "campaigns: {mine: {robot: ptt3, ingest: tall.csv, dimensions: {L9_mm: 3.0}}}\n", target
+    )
     assert code != 0 and "robot ptt3: unknown key 'L9_mm'; known: " in output

@@ -18,7 +18,11 @@ ptt:
   starts_deg: [0.0, 180.0]
   bench: {samples_per_turn: 10}
 """
-_TARGETS = ("build/tables/ptt_benefit.parquet", "build/tables/ptt_repeatability.parquet", "build/campaigns/ptt_1/gap_verdicts.parquet")
+_TARGETS = (
+    "build/tables/ptt_benefit.parquet",
+    "build/tables/ptt_repeatability.parquet",
+    "build/campaigns/ptt_1/gap_verdicts.parquet",
+)
 
 
 def _run(folder, *arguments, cores=2):
@@ -40,7 +44,9 @@ def finished(tmp_path_factory):
 
 def test_every_experiment_stands_in_the_tables(finished):
     points = pd.read_parquet(finished / "tables/ptt_points.parquet")
-    benefit = pd.read_parquet(finished / "tables/ptt_benefit.parquet").set_index(["experiment", "method", "set", "axis"])
+    benefit = pd.read_parquet(finished / "tables/ptt_benefit.parquet").set_index(
+        ["experiment", "method", "set", "axis"]
+    )
     assert points.groupby(["experiment", "set"]).size().unstack().to_dict() == {
         "test": {f"ptt_{k}": 20 for k in range(1, 6)},
         "train": {f"ptt_{k}": 160 for k in range(1, 6)},
@@ -49,7 +55,9 @@ def test_every_experiment_stands_in_the_tables(finished):
         for axis in "xyz":
             before, after = (part[f"{when}_{axis}_mm"].abs().mean() for when in ("before", "after"))
             expected = 100.0 * (1.0 - after / before)
-            assert benefit.loc[(name, "rbf_inverse", "test", axis), "benefit_percent"] == pytest.approx(expected, rel=1e-9)
+            assert benefit.loc[(name, "rbf_inverse", "test", axis), "benefit_percent"] == pytest.approx(
+                expected, rel=1e-9
+            )
 
 
 def test_the_diagnosis_names_the_backlash_that_was_not_compensated(finished):
@@ -58,10 +66,15 @@ def test_the_diagnosis_names_the_backlash_that_was_not_compensated(finished):
 
 
 def test_one_core_gives_the_same_bytes(finished, tmp_path):
-    parts = [f"tables/{name}.parquet" for name in ("ptt_backlash", "ptt_points", "ptt_benefit", "ptt_start", "ptt_extrapolation")]
+    parts = [
+        f"tables/{name}.parquet"
+        for name in ("ptt_backlash", "ptt_points", "ptt_benefit", "ptt_start", "ptt_extrapolation")
+    ]
     parts.append("campaigns/ptt_1/measurements.parquet")
     code, output = _run(tmp_path, *(f"build/{part}" for part in parts), cores=1)
     assert code == 0, output
     for part in parts:
-        here, there = (hashlib.sha256((folder / part).read_bytes()).hexdigest() for folder in (finished, tmp_path / "build"))
+        here, there = (
+            hashlib.sha256((folder / part).read_bytes()).hexdigest() for folder in (finished, tmp_path / "build")
+        )
         assert here == there, part

@@ -1,16 +1,22 @@
-"""The code checks: ruff, snakefmt, and snakemake's own, which may only ask for conda environments (README says why there are none)."""
+"""The code checks: ruff, snakefmt, and snakemake's own, which may only ask for conda environments (README says why
+there are none).
+"""
 
 import re
 import subprocess
 import sys
 from pathlib import Path
 
-_ROOT = Path(__file__).resolve().parents[2]
+from tests.places import ROOT
+
+_ROOT = ROOT
 _BIN = Path(sys.executable).parent
 
 
 def _run(*command):
-    return subprocess.run([str(_BIN / command[0]), *command[1:]], cwd=_ROOT, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [str(_BIN / command[0]), *command[1:]], cwd=_ROOT, capture_output=True, text=True, check=False
+    )
 
 
 def test_ruff_has_nothing_to_say():

@@ -50,7 +50,7 @@ def test_no_diagnosis_is_given_an_answer(jobs):
 
 
 def test_the_measurements_hold_no_answer():
-    from rrru.report.schemas import TABLES
+    from rrru.store.schemas import TABLES
 
     given = {column.name for column in TABLES["withheld_measurements"].columns}
     assert given - {column.name for column in TABLES["measurements"].columns} == {"robot", "kind"}
@@ -84,5 +84,9 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     # of the room that draws the robots only how a corrected sim is written down
     assert {file.stem for file in reached if file.parent.name == "withheld"} <= {"states"}
     # and the walk would see them
-    seen = {file.stem for file in _reached(ROOT / "workflow/scripts/withheld_score.py", set()) if file.parent.name == "withheld"}
+    seen = {
+        file.stem
+        for file in _reached(ROOT / "workflow/scripts/withheld_score.py", set())
+        if file.parent.name == "withheld"
+    }
     assert seen >= {"draw", "robots", "outside"}

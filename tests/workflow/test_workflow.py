@@ -9,7 +9,7 @@ import time
 import pandas as pd
 import pytest
 
-from rrru.reproduce import paper_a
+from rrru.studies.rrru3 import paper_a
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 
@@ -19,7 +19,9 @@ def _start(folder, *arguments, cores=2):
     overlay = ["--configfile", "tests/minimal.yaml", *[a for a in arguments if a.endswith(".yaml")]]
     rest = [a for a in arguments if not a.endswith(".yaml")]
     command = [SNAKEMAKE, "--cores", str(cores), *rest, *overlay]
-    return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    return subprocess.Popen(
+        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
 
 
 def _run(folder, *arguments, cores=2):
@@ -32,7 +34,11 @@ def _run(folder, *arguments, cores=2):
 def _digests(folder):
     """Digest of every result file that has to be the same in every run."""
     results = folder / "build" / "minimal"
-    files = [p for p in sorted(results.rglob("*")) if p.is_file() and p.relative_to(results).parts[0] not in ("timings", "logs")]
+    files = [
+        p
+        for p in sorted(results.rglob("*"))
+        if p.is_file() and p.relative_to(results).parts[0] not in ("timings", "logs")
+    ]
     return {str(p.relative_to(results)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
@@ -47,7 +53,9 @@ def finished(tmp_path_factory):
 
 def test_everything_is_there_and_a_second_run_does_nothing(finished):
     digests = _digests(finished)
-    assert {"tables/published.parquet", "tables/audit.parquet", "tables/errors.parquet", "figures/fig09.png"} <= set(digests)
+    assert {"tables/published.parquet", "tables/audit.parquet", "tables/errors.parquet", "figures/fig09.png"} <= set(
+        digests
+    )
     campaigns = pd.read_parquet(finished / "build/minimal/tables/campaigns.parquet")
     assert {"paper", "crooked", "field_01", "field_09"} == set(campaigns["campaign"])
     code, output = _run(finished)
@@ -72,7 +80,10 @@ def test_every_number_of_the_paper_stands_beside_ours(finished):
     # recomputed from the point errors, not through the package
     errors = pd.read_parquet(finished / "build/minimal/tables/errors.parquet").query("campaign == 'paper'")
     first = errors.query("trajectory == 'line_1' and mode == 'before'")["error_mm"]
-    assert by_item.loc["group1_before_max", "here"] == first.max() and by_item.loc["group1_before_min", "here"] == first.min()
+    assert (
+        by_item.loc["group1_before_max", "here"] == first.max()
+        and by_item.loc["group1_before_min", "here"] == first.min()
+    )
     curve = errors.query(
         "trajectory == 'spiral' and calibration == 'group_1' and method == 'least_mean_distance' and mode == 'closed_loop'"
     )
@@ -104,7 +115,9 @@ def test_a_killed_run_ends_with_the_same_bytes(finished, tmp_path):
 
 def test_a_user_campaign_is_added_by_an_overlay(finished, tmp_path):
     """Only the campaign's own part is made: the rest is the same study."""
-    data = pd.read_csv(ROOT / "tests/data/field_01.csv").drop(columns=["theta1_rad", "theta2_rad", "theta3_rad", "payload_kg"])
+    data = pd.read_csv(ROOT / "data/field_01.csv").drop(
+        columns=["theta1_rad", "theta2_rad", "theta3_rad", "payload_kg"]
+    )
     position = [f"{kind}_{axis}_mm" for kind in ("command", "measured") for axis in "xyz"]
     data[position] /= 25.4
     data.to_csv(tmp_path / "mine.csv", index=False)
@@ -115,19 +128,24 @@ def test_a_user_campaign_is_added_by_an_overlay(finished, tmp_path):
     errors = pd.read_parquet(tmp_path / target)
     same = pd.read_parquet(finished / "build/minimal/campaigns/field_01/errors.parquet")
     rows = (errors["mode"] == "before").to_numpy()
-    pd.testing.assert_series_equal(errors["error_mm"][rows], same["error_mm"][(same["mode"] == "before").to_numpy()], atol=1e-5)
+    pd.testing.assert_series_equal(
+        errors["error_mm"][rows], same["error_mm"][(same["mode"] == "before").to_numpy()], atol=1e-5
+    )
     info = pd.read_parquet(tmp_path / "build/minimal/campaigns/mine/campaigns.parquet").iloc[0]
     assert info["noise_from"] in ("repeats", "residuals") and "theta" in info["notes"]
 
 
 def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
-    lines = (ROOT / "tests/data/field_01.csv").read_text().splitlines()
+    lines = (ROOT / "data/field_01.csv").read_text().splitlines()
     lines[17] = lines[17].replace(lines[17].split(",")[11], "oops")
     (tmp_path / "bad.csv").write_text("\n".join(lines))
     (tmp_path / "bad.yaml").write_text("campaigns: {bad: {robot: rrru3, ingest: bad.csv}}\n")
     code, output = _run(tmp_path, "build/minimal/campaigns/bad/measurements.parquet", "bad.yaml")
     assert code != 0
-    assert "bad.csv, row 17, column measured_y_mm: got 'oops'" in output and "Traceback" not in output.split("IngestError")[-1]
+    assert (
+        "bad.csv, row 17, column measured_y_mm: got 'oops'" in output
+        and "Traceback" not in output.split("IngestError")[-1]
+    )
     assert not list((tmp_path / "build").rglob("*.parquet")) and not list((tmp_path / "build").rglob("*.partial"))
 
 
@@ -141,7 +159,10 @@ def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
         ("sweep: {values: [0.1, 0.2]}", "0.1 is not of type 'string'"),
         ("reproduce: {campaign: nosuch}", "reproduce.campaign is 'nosuch'"),
         ("reproduce: {line_calibration: nosuch}", "reproduce.line_calibration is 'nosuch'"),
-        ("campaigns: {crooked: {passes: [{trajectories: [nosuch]}]}}", "campaigns.crooked.passes: no trajectory 'nosuch'"),
+        (
+            "campaigns: {crooked: {passes: [{trajectories: [nosuch]}]}}",
+            "campaigns.crooked.passes: no trajectory 'nosuch'",
+        ),
         ("campaigns: {paper: {unit: inch}}", "unit"),
         ('sweep: {values: ["0.5", "0.50"]}', "sweep.values holds a number twice"),
         ("sweep: {populations: {islands: [30]}}", "sweep.populations.islands is [30]"),

@@ -11,7 +11,7 @@ rule calibrate:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
         settings=settings("robots", "calibration"),
-        code=code_digest(*STUDY_ROOMS),
+        code=script_code("calibrate"),
     script:
         "../scripts/calibrate.py"
 
@@ -30,7 +30,7 @@ rule genetic:
         f"{RESULTS}/logs/genetic/{{campaign}}.log",
     params:
         settings=settings("seed", "robots", "calibration", "genetic"),
-        code=code_digest(*STUDY_ROOMS),
+        code=script_code("genetic"),
     script:
         "../scripts/genetic.py"
 
@@ -45,7 +45,7 @@ rule sweep:
         f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}/{{value}}.log",
     params:
         settings=settings("seed", "robots", "calibration", "genetic", "reproduce", "sweep"),
-        code=code_digest(*STUDY_ROOMS),
+        code=script_code("sweep"),
     script:
         "../scripts/sweep.py"
 
@@ -67,6 +67,6 @@ rule sweep_tables:
         f"{RESULTS}/logs/sweep_tables.log",
     params:
         seed=config["seed"],
-        code=code_digest("calibrate", *TABLE_ROOMS),
+        code=script_code("sweep_tables"),
     script:
         "../scripts/sweep_tables.py"

@@ -14,7 +14,7 @@ rule campaign:
     params:
         section=campaign_settings,
         settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
-        code=code_digest(*STUDY_ROOMS),
+        code=script_code("campaign"),
     script:
         "../scripts/campaign.py"
 
@@ -27,6 +27,6 @@ rule gather:
     log:
         f"{RESULTS}/logs/gather.log",
     params:
-        code=code_digest(*TABLE_ROOMS),
+        code=script_code("gather"),
     script:
         "../scripts/gather.py"

@@ -2,8 +2,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from rrru.report.digest import code_digest
-from rrru.report.figures import FIGURES
+from rrru.store.digest import code_digest
+from rrru.figures.catalogue import FIGURES
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
@@ -47,20 +47,6 @@ GAP_FIGURES = ["gap", "withheld"]
 # figures of paper B's study, drawn in one job
 PTT_FIGURES = sorted(name for name in FIGURES if name.startswith("ptt_"))
 
-# rooms of the package that a stage's results depend on
-TABLE_ROOMS = ("report/tables", "report/schemas")
-STUDY_ROOMS = (
-    *TABLE_ROOMS,
-    "errors",
-    "parameters",
-    "seeds",
-    "study",
-    "mechanisms",
-    "effects",
-    "plant",
-    "campaign",
-    "calibrate",
-)
 SWEPT = ("crossover_fraction", "migration_fraction")
 
 
@@ -76,6 +62,11 @@ def part(name, campaign="{campaign}"):
 def table(name):
     """Path of a table of the whole study."""
     return f"{RESULTS}/tables/{name}.parquet"
+
+
+def script_code(name):
+    """Digest of a script and of all it imports."""
+    return code_digest(f"workflow/scripts/{name}.py")
 
 
 def settings(*keys):

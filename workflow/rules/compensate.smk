@@ -10,6 +10,6 @@ rule compensate:
         f"{RESULTS}/logs/compensate/{{campaign}}.log",
     params:
         settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
-        code=code_digest(*STUDY_ROOMS, "compensate"),
+        code=script_code("compensate"),
     script:
         "../scripts/compensate.py"

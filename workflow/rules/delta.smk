@@ -1,4 +1,4 @@
-from rrru.delta_study import robot
+from rrru.studies.delta import twin as robot
 
 # refuses commands out of reach before anything runs
 robot.twin(config)
@@ -14,17 +14,6 @@ DELTA_TABLES = [
     "delta_robots",
 ]
 DELTA_FIGURES = ["delta_images", "delta_errors", "delta_observability"]
-DELTA_ROOMS = (
-    *TABLE_ROOMS,
-    "errors",
-    "parameters",
-    "seeds",
-    "mechanisms",
-    "plant/tracker",
-    "plant/camera",
-    "calibrate",
-    "delta_study",
-)
 DELTA_SETTINGS = settings("seed", "robots", "delta")
 # parts that one step hands to the next
 DELTA_PARTS = f"{RESULTS}/delta"
@@ -38,7 +27,7 @@ rule delta_images:
         f"{RESULTS}/logs/delta_images.log",
     params:
         settings=DELTA_SETTINGS,
-        code=code_digest(*DELTA_ROOMS),
+        code=script_code("delta_images"),
     script:
         "../scripts/delta_images.py"
 
@@ -55,7 +44,7 @@ rule delta_vision:
         f"{RESULTS}/logs/delta_vision.log",
     params:
         settings=DELTA_SETTINGS,
-        code=code_digest(*DELTA_ROOMS),
+        code=script_code("delta_vision"),
     script:
         "../scripts/delta_vision.py"
 
@@ -72,7 +61,7 @@ rule delta_calibrate:
         f"{RESULTS}/logs/delta_calibrate.log",
     params:
         settings=DELTA_SETTINGS,
-        code=code_digest(*DELTA_ROOMS),
+        code=script_code("delta_calibrate"),
     script:
         "../scripts/delta_calibrate.py"
 
@@ -87,7 +76,7 @@ rule delta_twin:
         f"{RESULTS}/logs/delta_twin.log",
     params:
         settings=DELTA_SETTINGS,
-        code=code_digest(*DELTA_ROOMS),
+        code=script_code("delta_twin"),
     script:
         "../scripts/delta_twin.py"
 

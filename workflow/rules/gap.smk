@@ -20,7 +20,7 @@ rule diagnose:
         seed=config["seed"],
         gap=config["gap"],
         own_effects=own_effects_digest(),
-        code=code_digest(*STUDY_ROOMS, "gap"),
+        code=script_code("diagnose"),
     script:
         "../scripts/diagnose.py"
 
@@ -45,7 +45,7 @@ rule gap_figure:
     params:
         figures=["gap"],
         options=lambda wildcards: {"campaign": wildcards.campaign, "z_down": z_down(wildcards.campaign)},
-        code=code_digest("report"),
+        code=script_code("figure"),
     script:
         "../scripts/figure.py"
 

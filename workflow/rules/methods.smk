@@ -1,4 +1,4 @@
-from rrru.method_study.benches import ROBOTS as METHOD_ROBOTS
+from rrru.studies.methods.benches import ROBOTS as METHOD_ROBOTS
 
 METHOD_TABLES = ["methods", "method_points"]
 
@@ -34,7 +34,7 @@ rule compare_methods:
             "delta",
             "methods",
         ),
-        code=code_digest(*STUDY_ROOMS, "compensate", "ptt_study", "delta_study", "method_study"),
+        code=script_code("methods"),
     script:
         "../scripts/methods.py"
 

@@ -10,7 +10,7 @@ rule calibrate_printers:
         f"{RESULTS}/logs/printers.log",
     params:
         settings={key: value for key, value in config["printers"].items() if key != "file"},
-        code=code_digest(*TABLE_ROOMS, "errors", "parameters", "mechanisms", "campaign", "calibrate"),
+        code=script_code("printers"),
     script:
         "../scripts/printers.py"
 

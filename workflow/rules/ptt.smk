@@ -8,19 +8,6 @@ PTT_STUDY_TABLES = [
     "ptt_corrections",
     "ptt_extrapolation",
 ]
-PTT_ROOMS = (
-    *TABLE_ROOMS,
-    "errors",
-    "parameters",
-    "seeds",
-    "mechanisms",
-    "effects",
-    "plant",
-    "campaign",
-    "calibrate",
-    "compensate",
-    "ptt_study",
-)
 
 
 rule ptt_bench:
@@ -30,7 +17,7 @@ rule ptt_bench:
         f"{RESULTS}/logs/ptt_bench.log",
     params:
         settings=settings("seed", "robots", "loads", "ptt"),
-        code=code_digest(*PTT_ROOMS),
+        code=script_code("ptt_bench"),
     script:
         "../scripts/ptt_bench.py"
 
@@ -45,7 +32,7 @@ rule ptt_measure:
         f"{RESULTS}/logs/ptt_measure.log",
     params:
         settings=settings("seed", "robots", "loads", "ptt"),
-        code=code_digest(*PTT_ROOMS),
+        code=script_code("ptt_measure"),
     script:
         "../scripts/ptt_measure.py"
 
@@ -61,7 +48,7 @@ rule ptt_compensate:
         f"{RESULTS}/logs/ptt_compensate.log",
     params:
         settings=settings("seed", "robots", "loads", "ptt"),
-        code=code_digest(*PTT_ROOMS),
+        code=script_code("ptt_compensate"),
     script:
         "../scripts/ptt_compensate.py"
 
@@ -76,7 +63,7 @@ rule ptt_figures:
     params:
         figures=PTT_FIGURES,
         options={},
-        code=code_digest("report"),
+        code=script_code("figure"),
     script:
         "../scripts/figure.py"
 

@@ -36,7 +36,7 @@ rule published:
             "ptt",
             "delta",
         ),
-        code=code_digest(*STUDY_ROOMS, "reproduce"),
+        code=script_code("published"),
     script:
         "../scripts/published.py"
 
@@ -49,7 +49,7 @@ rule twin:
     threads: 2
     params:
         settings=settings("seed", "robots", "reproduce", "twin"),
-        code=code_digest("mechanisms", "effects", "plant", "campaign", "reproduce"),
+        code=script_code("twin"),
     script:
         "../scripts/twin.py"
 
@@ -66,7 +66,7 @@ rule figure:
     params:
         figures=["{figure}"],
         options=figure_options,
-        code=code_digest("report"),
+        code=script_code("figure"),
     script:
         "../scripts/figure.py"
 
@@ -87,7 +87,7 @@ rule campaign_figures:
     params:
         figures=CAMPAIGN_FIGURES,
         options=figure_options,
-        code=code_digest("report"),
+        code=script_code("figure"),
     script:
         "../scripts/figure.py"
 

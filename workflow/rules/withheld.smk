@@ -6,7 +6,7 @@ rule withheld_answers:
     params:
         robots=chunk_robots,
         settings=settings("seed", "robots"),
-        code=code_digest(*STUDY_ROOMS, *DRAWING_ROOMS),
+        code=script_code("withheld_answers"),
     script:
         "../scripts/withheld_answers.py"
 
@@ -20,7 +20,7 @@ rule withheld_measure:
         f"{RESULTS}/logs/withheld_measure/{{chunk}}.log",
     params:
         settings=settings("seed", "robots"),
-        code=code_digest(*STUDY_ROOMS, *DRAWING_ROOMS),
+        code=script_code("withheld_measure"),
     script:
         "../scripts/withheld_measure.py"
 
@@ -36,7 +36,7 @@ rule withheld_diagnose:
     params:
         without=taken_out,
         settings=settings("seed", "robots", "gap"),
-        code=code_digest(*STUDY_ROOMS, "gap", "withheld/states"),
+        code=script_code("withheld_diagnose"),
     script:
         "../scripts/withheld_diagnose.py"
 
@@ -55,7 +55,7 @@ rule withheld_score:
     params:
         robots=chunk_robots,
         settings=settings("seed", "robots", "gap"),
-        code=code_digest(*STUDY_ROOMS, "gap", "withheld"),
+        code=script_code("withheld_score"),
     script:
         "../scripts/withheld_score.py"
 
@@ -72,7 +72,7 @@ rule withheld_summary:
     log:
         f"{RESULTS}/logs/withheld_summary.log",
     params:
-        code=code_digest(*TABLE_ROOMS, "withheld"),
+        code=script_code("withheld_summary"),
     script:
         "../scripts/withheld_summary.py"
 

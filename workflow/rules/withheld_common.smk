@@ -1,9 +1,8 @@
-from rrru.withheld.chunks import check as check_withheld, chunks
+from rrru.studies.withheld.chunks import check as check_withheld, chunks
 
 check_withheld(config)
 WITHHELD = chunks(config["withheld"])
 # the robots are drawn and driven by these alone
-DRAWING_ROOMS = ("withheld/draw", "withheld/robots", "withheld/outside", "withheld/chunks")
 WITHHELD_TABLES = [
     "withheld_verdicts",
     "withheld_scores",

@@ -1,9 +1,9 @@
 """Calibrations of one campaign on every set of trajectories."""
 
-from rrru import study
-from rrru.calibrate import campaign_fit
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.fit import campaign_fit
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
 
 
 def main(config, campaign, inputs, outputs):

@@ -5,9 +5,9 @@ import sys
 
 import pandas as pd
 
-from rrru import study
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
 
 
 def main(config, campaign, outputs):

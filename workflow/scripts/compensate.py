@@ -2,12 +2,12 @@
 
 import pandas as pd
 
-from rrru import study
-from rrru.calibrate.campaign_fit import errors_vector
-from rrru.calibrate.genetic_study import typical_parameters
 from rrru.compensate import evaluate
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.fit.campaign_fit import errors_vector
+from rrru.genetic.campaign_runs import typical_parameters
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
 
 
 def main(config, campaign, inputs, outputs):
@@ -23,10 +23,16 @@ def main(config, campaign, inputs, outputs):
         if virtual is not None:
             # every calibration is driven with the same draws, so that differences are the calibrations'
             generator = virtual.generator("closed_loop")
-            frames.append(evaluate.closed_loop(virtual.robot, virtual.plan, errors, virtual.noise_mm, generator, calibration, method))
+            frames.append(
+                evaluate.closed_loop(
+                    virtual.robot, virtual.plan, errors, virtual.noise_mm, generator, calibration, method
+                )
+            )
     result = pd.concat(frames, ignore_index=True)
     tables.write("errors", result.assign(campaign=campaign), outputs["errors"])
-    tables.write("error_summary", evaluate.summarise(result, measurements).assign(campaign=campaign), outputs["error_summary"])
+    tables.write(
+        "error_summary", evaluate.summarise(result, measurements).assign(campaign=campaign), outputs["error_summary"]
+    )
 
 
 if __name__ == "__main__":

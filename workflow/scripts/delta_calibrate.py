@@ -1,12 +1,15 @@
 """Every variant of the Delta's zero calibration, fed back and measured again."""
 
-from rrru.delta_study import draws, fits, robot, spread, views
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.delta import draws, fits, spread, views
+from rrru.studies.delta import twin as robot
 
 
 def main(config, inputs, outputs):
-    """Write calibrations, what they see, errors on the plane, of other draws and robots too, and the camera against the true one."""
+    """Write calibrations, what they see, errors on the plane, of other draws and robots too, and the camera against the
+    true one.
+    """
     centres, truth = tables.read(inputs["centres"]), tables.read(inputs["truth"])
     twin, section = robot.twin(config), config["delta"]
     noise = draws.centre_noise_px(config, truth, tables.read(inputs["dots"]))

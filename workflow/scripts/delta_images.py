@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from rrru.delta_study import views
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.delta import views
 
 
 def main(config, outputs):

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import yaml
 
-from rrru.delta_study import draws, robot, search
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.delta import draws
+from rrru.studies.delta import robot_search as search
+from rrru.studies.delta import twin as robot
 
 
 def main(config, inputs, output):
@@ -15,7 +17,9 @@ def main(config, inputs, output):
     twin = robot.twin(config)
     section, truth = config["delta"]["search"], tables.read(inputs["truth"])
     noise = draws.centre_noise_px(config, truth, tables.read(inputs["dots"]))
-    found, misfit = search.search(twin, truth, draws.drawn_errors(config, truth, noise, section["draws"], "search"), section)
+    found, misfit = search.search(
+        twin, truth, draws.drawn_errors(config, truth, noise, section["draws"], "search"), section
+    )
     logging.info("misfit %.4f", misfit)
     errors = {name: round(value, 6) for name, value in twin.truth.parameters.mapping(found).items()}
     partial = Path(f"{output}.partial")

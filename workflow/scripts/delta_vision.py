@@ -5,13 +5,16 @@ import time
 import numpy as np
 import pandas as pd
 
-from rrru.delta_study import fits, robot
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.delta import fits
+from rrru.studies.delta import twin as robot
 
 
 def main(config, images, outputs):
-    """Write centres, dots, the first image, the camera's numbers, and the time of one calibration with the paper's poses."""
+    """Write centres, dots, the first image, the camera's numbers, and the time of one calibration with the paper's
+    poses.
+    """
     section = config["delta"]
     with np.load(images) as taken:
         tilted, poses = taken["tilted"], taken["poses"]
@@ -24,7 +27,11 @@ def main(config, images, outputs):
     fits.paper_fit(robot.twin(config).mechanism, centres)
     started.append(time.perf_counter())
     timings = pd.DataFrame(
-        {"step": ["camera", "centres", "zero_errors"], "images": [len(tilted), int(paper.sum()), 0], "seconds": np.diff(started)}
+        {
+            "step": ["camera", "centres", "zero_errors"],
+            "images": [len(tilted), int(paper.sum()), 0],
+            "seconds": np.diff(started),
+        }
     )
     centres, dots = fits.find_centres(poses, model, section)
     y, x = (axis.ravel() for axis in np.indices(poses[0].shape))

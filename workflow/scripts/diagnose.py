@@ -4,10 +4,10 @@ import pandas as pd
 
 from rrru.gap.diagnose import diagnose
 from rrru.gap.settings import GapSettings
-from rrru.mechanisms.dynamics import Masses
-from rrru.mechanisms.protocol import make_mechanism
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.robots.dynamics import Masses
+from rrru.robots.protocol import make_mechanism
+from rrru.store import tables
+from rrru.store.job import job
 
 
 def main(campaign, measurements, outputs, params):
@@ -30,4 +30,6 @@ def main(campaign, measurements, outputs, params):
 
 if __name__ == "__main__":
     with job(snakemake.log[0]):
-        main(snakemake.wildcards.campaign, snakemake.input.measurements, dict(snakemake.output.items()), snakemake.params)
+        main(
+            snakemake.wildcards.campaign, snakemake.input.measurements, dict(snakemake.output.items()), snakemake.params
+        )

@@ -1,8 +1,9 @@
 """Figures of the study as PDF and PNG."""
 
-from rrru.report import tables
-from rrru.report.figures import FIGURES, style
-from rrru.report.job import job
+from rrru.figures import style
+from rrru.figures.catalogue import FIGURES
+from rrru.store import tables
+from rrru.store.job import job
 
 
 def main(names, inputs, outputs, options):

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
 
 
 def main(inputs, outputs):

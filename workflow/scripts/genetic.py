@@ -3,10 +3,10 @@
 import pandas as pd
 from tqdm import tqdm
 
-from rrru import study
-from rrru.calibrate import genetic_study
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.genetic import campaign_runs as genetic_study
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
 
 
 def main(config, campaign, inputs, outputs):
@@ -39,7 +39,12 @@ def main(config, campaign, inputs, outputs):
     )
     # robots have different parameters, the table has those of all
     runs = runs.reindex(columns=[name for name in tables.columns("genetic") if name != "campaign"])
-    for name, frame in (("genetic", runs), ("genetic_history", history), ("genetic_against_least_squares", compared), ("timings", timings)):
+    for name, frame in (
+        ("genetic", runs),
+        ("genetic_history", history),
+        ("genetic_against_least_squares", compared),
+        ("timings", timings),
+    ):
         tables.write(name, frame.assign(campaign=campaign), outputs[name])
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from rrru.delta_study.robot import pose_commands
-from rrru.method_study import benches, compare
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.delta.twin import pose_commands
+from rrru.studies.methods import benches, compare
 
 
 def main(config, robot, inputs, outputs):

@@ -3,14 +3,16 @@
 import logging
 import sys
 
-from rrru.calibrate import printer_tables
-from rrru.campaign import printers
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.printers import printer_tables
+from rrru.studies.printers import readings as printers
 
 
 def main(file, settings, outputs):
-    """Write the printers, their numbers, readings and possible causes; says which saved answers do not belong to their readings."""
+    """Write the printers, their numbers, readings and possible causes; says which saved answers do not belong to their
+    readings.
+    """
     frames = printer_tables.tables(printers.read(file), settings)
     for name, frame in frames.items():
         tables.write(name, frame.reindex(columns=tables.columns(name)), outputs[name])

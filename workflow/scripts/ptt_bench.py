@@ -1,8 +1,8 @@
 """Kinematics, singularities, backlash and repeatability of paper B's robot."""
 
-from rrru.ptt_study import bench
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.ptt3 import bench
 
 
 def main(config, outputs):

@@ -2,11 +2,13 @@
 
 import pandas as pd
 
-from rrru.ptt_study import bench, methods, redraws, results, robot
-from rrru.ptt_study.driving import driven
-from rrru.ptt_study.extrapolation import extrapolations
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.ptt3 import bench, redraws, results
+from rrru.studies.ptt3 import controllers as methods
+from rrru.studies.ptt3 import experiments as robot
+from rrru.studies.ptt3.driving import driven
+from rrru.studies.ptt3.extrapolation import extrapolations
 
 
 def main(config, backlash, measurements, outputs):

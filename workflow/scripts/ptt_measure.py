@@ -1,12 +1,15 @@
 """Measurements of paper B's experiments."""
 
-from rrru.ptt_study import bench, robot
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.ptt3 import bench
+from rrru.studies.ptt3 import experiments as robot
 
 
 def main(config, backlash, outputs):
-    """Write what the tracker sees in every experiment, and the experiments that are diagnosed together as one campaign."""
+    """Write what the tracker sees in every experiment, and the experiments that are diagnosed together as one
+    campaign.
+    """
     backlash, measured = tables.read(backlash), {}
     for name in config["ptt"]["experiments"]:
         one = robot.experiment(config, name)

@@ -2,14 +2,14 @@
 
 import pandas as pd
 
-from rrru import study
-from rrru.calibrate.genetic_study import typical_parameters
-from rrru.report import tables
-from rrru.report.job import job
-from rrru.reproduce.audit import audit_table
-from rrru.reproduce.published import published_table
-from rrru.reproduce.redraw import spread
-from rrru.reproduce.sisters import spread_c, study_b, study_c
+from rrru.genetic.campaign_runs import typical_parameters
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
+from rrru.studies.rrru3.audit import audit_table
+from rrru.studies.rrru3.published import published_table
+from rrru.studies.rrru3.redraw import spread
+from rrru.studies.rrru3.sisters import spread_c, study_b, study_c
 
 
 def main(config, inputs, outputs):
@@ -24,10 +24,15 @@ def main(config, inputs, outputs):
     typical = typical_parameters(own, (*names, "dR", "dr")).assign(campaign=campaign)
     others = {}
     if study.is_virtual(config, campaign):
-        others = spread(study.virtual_campaign(config, campaign), config["calibration"], reproduce, reproduce["redraws"])
+        others = spread(
+            study.virtual_campaign(config, campaign), config["calibration"], reproduce, reproduce["redraws"]
+        )
     parameters = pd.concat([parameters[typical.columns], typical], ignore_index=True)
     sisters = {
-        "B": study_b(config, *(tables.read(inputs[name]) for name in ("ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"))),
+        "B": study_b(
+            config,
+            *(tables.read(inputs[name]) for name in ("ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability")),
+        ),
         "C": study_c(config, *(tables.read(inputs[name]) for name in ("delta_points", "delta_camera"))),
     }
     sister_spread = {"C": spread_c(tables.read(inputs["delta_draws"]))}

@@ -2,13 +2,13 @@
 
 from tqdm import tqdm
 
-from rrru import study
-from rrru.calibrate.campaign_fit import select
-from rrru.calibrate.genetic_study import settings_from_config
-from rrru.calibrate.sweep import run_sweep
 from rrru.errors import ConfigError
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.fit.campaign_fit import select
+from rrru.genetic.campaign_runs import settings_from_config
+from rrru.genetic.sweep import run_sweep
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies import setup as study
 
 
 def main(config, parameter, population, value, inputs, outputs):
@@ -16,9 +16,13 @@ def main(config, parameter, population, value, inputs, outputs):
     section, reproduce = config["sweep"], config["reproduce"]
     mechanism = study.mechanism(config, reproduce["campaign"], "tied")
     patterns = config["calibration"]["sets"][reproduce["line_calibration"]]
-    residuals = select(tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"])
+    residuals = select(
+        tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"]
+    )
     if residuals is None:
-        raise ConfigError(f"campaign {reproduce['campaign']} has too few points for the set {reproduce['line_calibration']}")
+        raise ConfigError(
+            f"campaign {reproduce['campaign']} has too few points for the set {reproduce['line_calibration']}"
+        )
     settings = settings_from_config(config["genetic"], populations=section["populations"][population])
     runs, history = run_sweep(
         residuals.mean_distance,

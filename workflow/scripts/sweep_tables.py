@@ -2,14 +2,17 @@
 
 import pandas as pd
 
-from rrru.calibrate.sweep import setting_effect, setting_pairs
-from rrru.report import tables
-from rrru.report.job import job
+from rrru.genetic.sweep import setting_effect, setting_pairs
+from rrru.store import tables
+from rrru.store.job import job
 
 
 def main(seed, inputs, outputs):
     """Write the runs and their history, the test over all values and that of every value against the best."""
-    runs, history = (pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True) for name in ("sweep_runs", "sweep_history"))
+    runs, history = (
+        pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
+        for name in ("sweep_runs", "sweep_history")
+    )
     frames = {
         "sweep_runs": runs,
         "sweep_history": history,

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import yaml
 
-from rrru import study
-from rrru.report.job import job
-from rrru.reproduce import twin, twin_search
+from rrru.store.job import job
+from rrru.studies import setup as study
+from rrru.studies.rrru3 import twin, twin_search
 
 
 def main(config, output, workers):
@@ -26,7 +26,9 @@ def main(config, output, workers):
         section["population"],
         twin.from_config(config, reproduce["campaign"]) if section["refine"] else None,
         workers,
-        lambda intermediate_result: logging.info("generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun),
+        lambda intermediate_result: logging.info(
+            "generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun
+        ),
     )
     logging.info("misfit %.3f", misfit)
     partial = Path(f"{output}.partial")

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from rrru.report import tables
-from rrru.report.job import job
-from rrru.withheld import draw
-from rrru.withheld.robots import answer, nominal
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.withheld import draw
+from rrru.studies.withheld.robots import answer, nominal
 
 
 def main(config, robots, output):

@@ -4,11 +4,11 @@ import pandas as pd
 
 from rrru.gap.diagnose import diagnose
 from rrru.gap.settings import GapSettings
-from rrru.mechanisms.dynamics import Masses
-from rrru.mechanisms.protocol import make_mechanism
-from rrru.report import tables
-from rrru.report.job import job
-from rrru.withheld.states import state_row
+from rrru.robots.dynamics import Masses
+from rrru.robots.protocol import make_mechanism
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.withheld.states import state_row
 
 # the tracker's noise is known, as it is for the campaigns
 _NOISE_MM = 0.02

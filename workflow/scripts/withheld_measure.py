@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from rrru.report import tables
-from rrru.report.job import job
-from rrru.withheld.robots import Robot, measure, nominal
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.withheld.robots import Robot, measure, nominal
 
 
 def main(config, answers, output):

@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from rrru.report import tables
-from rrru.report.job import job
-from rrru.withheld import score
-from rrru.withheld.summary import summary
+from rrru.store import tables
+from rrru.store.job import job
+from rrru.studies.withheld import score
+from rrru.studies.withheld.summary import summary
 
 
 def _together(paths):

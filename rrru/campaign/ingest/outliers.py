@@ -1,0 +1,149 @@
+"""Points that the instrument got wrong (a broken beam): found by comparing each with its neighbours along the run.
+
+A play that turns over gives a step, a geometric error a smooth curve, a drive a ripple, a loose joint steps back and
+forth: all of these are the robot's. A broken beam gives one to three points that fit neither side. Lengths in mm.
+"""
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+# Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
+_LONGEST = 3
+_WINDOW = 2 * _LONGEST + 1
+# Median length of a vector of three independent normal numbers of unit variance: from the median of lengths to one
+# sigma per axis.
+_MEDIAN_OF_CHI3 = 1.5382
+# ASSUME the robot's own single spikes stay below threshold x 0.1 mm; below threshold x 0.5 and x 0.75 mm where a loose
+# joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends (at the default
+# threshold 0.6, 3 and 4.5 mm).
+_SPIKE_MM, _FLIP_MM, _END_MM = 0.1, 0.5, 0.75
+# ASSUME at most one block of bad points among ten points: a run that jumps more often has a loose joint, and twice its
+# usual jump is allowed, up to threshold x 1.5 mm: no joint is looser.
+_BAD_SHARE, _JUMP_FACTOR, _LOOSEST_MM = 0.1, 2.0, 1.5
+# A bad end point pulls at its neighbour by a third, a bad neighbour at the end by as much as it is off itself.
+_END_PREFERENCE = 1.5
+
+
+def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
+    """Mark (n,) of the points that do not fit their neighbours in the run; rows in the order driven.
+
+    deviation_mm: measured minus commanded position (n, 3) in mm; rows with a NaN are left out and not marked.
+    run: number of the run (n,). noise_mm: the instrument's noise, one sigma per axis; None takes it as below 0.1 mm.
+    threshold: how many scales of the neighbourhood a point must be off.
+    place: where the points lie along their run (n,), growing; None takes them as equally spaced.
+
+    A block of one to three points is marked where each of its points lies off the curve through the two points before
+    and the two after the block, and off the running median of seven points, which follows steps. A block at a run's end
+    is marked where it lies off all that the next three points foretell. Runs with fewer than seven points are not
+    judged. Raises ValueError for arguments of the wrong shape.
+    """
+    deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
+    if deviation.ndim != 2 or deviation.shape[1] != 3 or run.shape != deviation.shape[:1]:
+        raise ValueError(f"expected deviations (n, 3) and runs (n,), got {deviation.shape} and {run.shape}")
+    place = np.arange(len(deviation), dtype=float) if place is None else np.asarray(place, dtype=float)
+    marked = np.zeros(len(deviation), dtype=bool)
+    known = np.isfinite(deviation).all(axis=1)
+    for number in np.unique(run[known]):
+        rows = np.flatnonzero(known & (run == number))
+        marked[rows[_bad_points(place[rows], deviation[rows], noise_mm or 0.0, threshold)]] = True
+    return marked
+
+
+def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
+    """Which marked points (n,) another run came back to: a broken beam does not repeat itself, a spike near a
+    singularity does.
+
+    Compares deviations (n, 3) in mm at the same commanded position (n, 3) in another run (n,); they repeat within
+    `tolerance_mm`.
+    """
+    deviation, command, run = np.asarray(deviation_mm), np.asarray(command_mm), np.asarray(run)
+    result = np.zeros(len(deviation), dtype=bool)
+    for i in np.flatnonzero(marked):
+        others = (run != run[i]) & (np.abs(command - command[i]) < 1e-3).all(axis=1)
+        result[i] = (np.linalg.norm(deviation[others] - deviation[i], axis=1) < tolerance_mm).any()
+    return result
+
+
+def _bad_points(place, deviation, noise_mm, threshold):
+    """Indices of the bad points of one run: the worst block first, then again without it, until none is left.
+
+    A good point beside bad ones can be taken with them: each is put back once to see whether it fits the good ones.
+    """
+    kept, bad = np.arange(len(deviation)), []
+    while (
+        len(kept) >= _WINDOW and (block := _worst_block(place[kept], deviation[kept], noise_mm, threshold)) is not None
+    ):
+        bad.extend(kept[block])
+        kept = np.delete(kept, block)
+    for one in sorted(bad) if len(kept) >= _WINDOW else ():
+        again = np.sort(np.append(kept, one))
+        if _worst_block(place[again], deviation[again], noise_mm, threshold) is None:
+            kept = again
+    return np.setdiff1d(np.arange(len(deviation)), kept)
+
+
+def _worst_block(place, deviation, noise_mm, threshold):
+    """Indices of the block that is farthest off among those beyond their limits, or None."""
+    jump = np.linalg.norm(np.diff(deviation, axis=0), axis=1)
+    usual = np.sort(jump)[::-1][min(2 * max(1, round(_BAD_SHARE * len(place))), len(jump) - 1)]
+    loose = min(_JUMP_FACTOR * usual, threshold * max(_LOOSEST_MM, noise_mm))
+    inner, end = (
+        max(
+            ((off, block) for off, limit, block in found if off > max(limit, loose)),
+            key=lambda one: one[0],
+            default=(0.0, None),
+        )
+        for found in (
+            _inner_blocks(place, deviation, noise_mm, threshold),
+            _end_blocks(place, deviation, jump, noise_mm, threshold),
+        )
+    )
+    return end[1] if end[0] > _END_PREFERENCE * inner[0] else inner[1]
+
+
+def _inner_blocks(place, deviation, noise_mm, threshold):
+    """Per length of block: the worst block's least distance from its neighbours' curve, the limit for it, its
+    indices.
+    """
+    off_median = np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1)
+    for length in range(1, _LONGEST + 1):
+        floor = max(noise_mm, _SPIKE_MM if length == 1 else _FLIP_MM)
+        blocks = np.arange(1, len(place) - length)[:, None] + np.arange(length)
+        nodes = np.stack([blocks[:, 0] - 2, blocks[:, 0] - 1, blocks[:, -1] + 1, blocks[:, -1] + 2])
+        off = _off_curve(place, deviation, blocks, nodes)
+        limit = threshold * max(np.median(off) / _MEDIAN_OF_CHI3, floor)
+        least = np.where(off_median[blocks].min(axis=1) > threshold * floor, off.min(axis=1), 0.0)
+        yield least.max(), limit, blocks[np.argmax(least)]
+
+
+def _off_curve(place, deviation, blocks, nodes):
+    """Distances (m, length) of blocks (m, length) from the polynomials through nodes (k, m); nodes beyond the run's
+    ends are left out.
+    """
+    there = (nodes >= 0) & (nodes < len(place))
+    nodes = np.clip(nodes, 0, len(place) - 1)
+    predicted = np.zeros((*blocks.shape, 3))
+    for i in range(len(nodes)):
+        weight = np.repeat(there[i].astype(float)[:, None], blocks.shape[1], axis=1)
+        for j in set(range(len(nodes))) - {i}:
+            both = there[i] & there[j]
+            step = np.where(both, place[nodes[i]] - place[nodes[j]], 1.0)[:, None]
+            weight *= np.where(both[:, None], (place[blocks] - place[nodes[j]][:, None]) / step, 1.0)
+        predicted += weight[..., None] * deviation[nodes[i]][:, None]
+    return np.linalg.norm(deviation[blocks] - predicted, axis=2)
+
+
+def _end_blocks(place, deviation, jump, noise_mm, threshold):
+    """Per end and length of block: the block's least distance from what the next points foretell, the limit for it, its
+    indices.
+
+    Foretold are the next point, the line through two and the parabola through three. Errors grow fast towards a
+    singularity, where runs often end: twice the growth between the next two points is allowed.
+    """
+    for order in (1, -1):
+        index, steps, gaps = np.arange(len(place))[::order], jump[::order], np.diff(place)[::order]
+        for length in range(1, _LONGEST + 1):
+            block, nodes = index[:length], index[length : length + 3, None]
+            off = min(_off_curve(place, deviation, block[None], nodes[:count]).min() for count in (1, 2, 3))
+            growth = gaps[length - 1] / gaps[length] * steps[length]
+            yield off, max(threshold * max(noise_mm, _END_MM), _JUMP_FACTOR * growth), block

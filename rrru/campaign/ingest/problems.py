@@ -1,0 +1,57 @@
+"""What is wrong with a measurement file, collected until everything has been looked at."""
+
+from collections import defaultdict
+
+from rrru.errors import IngestError
+
+LISTED = 20
+_LENGTH = 500
+
+
+class Problems:
+    """Problems of one file by kind; each kind lists the first 20 and counts the rest."""
+
+    def __init__(self, file):
+        self._file = str(file)
+        self._by_kind = defaultdict(list)
+
+    def __bool__(self):
+        return bool(self._by_kind)
+
+    def add(self, kind, *, row=None, column=None, value, allowed):
+        """Note one problem: data row from 1 or None, the file's column name or None, the value as the file has it, what
+        is allowed.
+        """
+        self._by_kind[kind].append(
+            {
+                "file": self._file,
+                "row": None if row is None else int(row),
+                "column": None if column is None else _short(column),
+                "value": _short(value),
+                "allowed": _short(allowed),
+            }
+        )
+
+    def refuse(self):
+        """Raise IngestError if there is any problem."""
+        if not self._by_kind:
+            return
+        listed = []
+        for problems in self._by_kind.values():
+            listed += problems[:LISTED]
+            if len(problems) > LISTED:
+                more = f"{len(problems)} problems of this kind, of which the first {LISTED} are listed"
+                listed.append(
+                    {"file": self._file, "row": None, "column": None, "value": more, "allowed": problems[0]["allowed"]}
+                )
+        raise IngestError(listed)
+
+    def refuse_now(self, **problem):
+        """Raise IngestError for a problem that leaves nothing more to look at."""
+        self.add("file", **problem)
+        self.refuse()
+
+
+def _short(text):
+    """Text that fits into a message; a broken file can make one cell of everything below it."""
+    return text if len(text) <= _LENGTH else f"{text[:_LENGTH]}... ({len(text)} characters)"

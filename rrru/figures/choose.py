@@ -1,0 +1,139 @@
+"""Rows of the result tables that a figure draws, with clear errors where they are not there."""
+
+import re
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from rrru.errors import ConfigError
+
+_CALIBRATION_LABELS = {
+    "group_1": "calibration on group 1",
+    "lines": "line calibration",
+    "spiral": "spiral calibration",
+    "both": "calibration on both",
+}
+_PARAMETER_LABELS = {
+    **{f"dtheta{leg}": rf"$\Delta\theta_{leg}$" for leg in (1, 2, 3)},
+    **{f"dL{link}": rf"$\Delta L_{link}$" for link in (1, 2, 3)},
+    **{f"db{leg}": rf"$\Delta b_{leg}$" for leg in (1, 2, 3)},
+    "da": r"$\Delta a$",
+    "dL": r"$\Delta L$",
+    "dl1": r"$\Delta l_1$",
+    "dl2": r"$\Delta l_2$",
+}
+
+
+def calibration_label(calibration):
+    """Name of a calibration in a legend."""
+    return _CALIBRATION_LABELS.get(calibration, f"calibration on {calibration}")
+
+
+def parameter_label(parameter):
+    """Symbol of an error parameter."""
+    return _PARAMETER_LABELS.get(parameter, parameter)
+
+
+def trajectory_label(trajectory):
+    """Name of a trajectory in a figure: the paper calls the lines groups."""
+    found = re.fullmatch(r"line_(\d+)", trajectory)
+    return f"group {found[1]}" if found else trajectory.replace("_", " ")
+
+
+def natural(name):
+    """Sorting key that puts line_10 behind line_9."""
+    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", name)]
+
+
+def trajectories(paths, pattern, figure):
+    """Names of a campaign's trajectories that fit a pattern, in natural order; raises ConfigError where none does."""
+    present = sorted(paths["trajectory"].unique(), key=natural)
+    chosen = [name for name in present if fnmatchcase(name, pattern)]
+    if not chosen:
+        raise ConfigError(
+            f"{figure}: the campaign has no trajectory {pattern!r}; it has {', '.join(present) or 'none'}"
+        )
+    return chosen
+
+
+def of_campaign(tables, name, campaign, figure):
+    """Rows of a table that belong to a campaign; raises ConfigError naming the campaigns that the table has."""
+    frame = tables[name]
+    rows = frame[frame["campaign"] == campaign]
+    if rows.empty:
+        raise ConfigError(f"{figure}: table {name} has no campaign {campaign!r}; it has {_listed(frame['campaign'])}")
+    return rows
+
+
+def mode_of(errors, options):
+    """The mode that is drawn: the one asked for, or "model" where the campaign was never driven again."""
+    return options["mode"] if (errors["mode"] == options["mode"]).any() else "model"
+
+
+def before(tables, options, figure):
+    """Rows of `errors` before any calibration."""
+    errors = of_campaign(tables, "errors", options["campaign"], figure)
+    return errors[errors["mode"] == "before"]
+
+
+def after(tables, options, calibration, figure):
+    """Rows of `errors` under a calibration, and their mode; raises ConfigError naming the calibration where there are
+    none.
+    """
+    errors = of_campaign(tables, "errors", options["campaign"], figure)
+    mode = mode_of(errors, options)
+    rows = errors[
+        (errors["calibration"] == calibration) & (errors["method"] == options["method"]) & (errors["mode"] == mode)
+    ]
+    if rows.empty:
+        known = errors.loc[errors["mode"] == mode, "calibration"]
+        raise ConfigError(
+            f"{figure}: campaign {options['campaign']!r} has no errors under calibration {calibration!r} by {options['method']!r}"
+            f" (mode {mode}); it has {_listed(known)}"
+        )
+    return rows, mode
+
+
+def after_label(calibration, mode):
+    """Legend entry of an error after a calibration; a model residual says that it is one."""
+    return f"{'residual of' if mode == 'model' else 'after'} {calibration_label(calibration)}"
+
+
+def stations(paths, trajectory):
+    """Points of a trajectory in all passes with their station: the number of the nearest point of the first pass, from
+    1.
+
+    So passes in the other direction, or of another number of points, lie at the right places. Columns run, point,
+    station, the command of the first pass there (x_mm, y_mm, z_mm) and status.
+    """
+    rows = paths[paths["trajectory"] == trajectory].sort_values(["run", "point"])
+    position = rows[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+    first = position[(rows["run"] == rows["run"].iloc[0]).to_numpy()]
+    distance = np.linalg.norm(position[:, None] - first[None], axis=2)
+    index = distance.argmin(axis=1)
+    same_run = (rows["run"] == rows["run"].iloc[0]).to_numpy()
+    # a closed path passes the same place twice: in the first pass every point is its own station
+    index[same_run] = np.arange(len(first))
+    place = first[index]
+    return rows[["run", "point", "status"]].assign(
+        station=index + 1, x_mm=place[:, 0], y_mm=place[:, 1], z_mm=place[:, 2]
+    )
+
+
+def along(errors, places, columns=("error_mm",)):
+    """Mean, lowest and highest value of error columns at each station over the passes: frames indexed by station, null
+    where none.
+    """
+    joined = places.merge(errors[["run", "point", *columns]], on=["run", "point"], how="left", validate="one_to_one")
+    groups = joined.groupby("station")[list(columns)]
+    return groups.mean(), groups.min(), groups.max()
+
+
+def passes(places):
+    """Number of passes of a trajectory."""
+    return places["run"].nunique()
+
+
+def _listed(values):
+    """Distinct values as text."""
+    return ", ".join(sorted({str(value) for value in values})) or "none"

@@ -1,0 +1,83 @@
+"""Every calibration applied to every trajectory."""
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from matplotlib.ticker import LogLocator
+
+from rrru.figures import choose, style
+
+_GROUPS = ("all_lines",)
+_NOT_SHOWN = ("all",)
+# more columns than this do not fit beside each other
+_SIDE_BY_SIDE = 9
+
+
+@style.printed
+def cross(tables, options):
+    """Mean and largest error of one campaign: calibrated on (rows, the first is before any calibration), applied to
+    (columns).
+    """
+    summary = choose.of_campaign(tables, "error_summary", options["campaign"], "cross")
+    mode = choose.mode_of(summary, options)
+    before = summary[summary["mode"] == "before"].assign(calibration="before")
+    after = summary[(summary["mode"] == mode) & (summary["method"] == options["method"])]
+    rows = ["before", *dict.fromkeys(after["calibration"])]
+    present = [name for name in summary["trajectory"].unique() if name not in _NOT_SHOWN]
+    columns = [
+        *sorted((name for name in present if name not in _GROUPS), key=choose.natural),
+        *(g for g in _GROUPS if g in present),
+    ]
+    both = {column: _matrix(before, after, column, rows, columns) for column in ("mean_mm", "max_mm")}
+    beside = len(columns) <= _SIDE_BY_SIDE
+    height = 8.0 * len(rows) + 22.0
+    figure = style.new(style.DOUBLE_MM, height + 22.0 if beside else 2.0 * height + 14.0)
+    panels = figure.subplots(*((1, 2) if beside else (2, 1)), sharey=beside)
+    scale = _scale(both.values())
+    meaning = "residual of the calibrated model" if mode == "model" else "error when driven again"
+    for mark, word, axes, matrix in zip("ab", ("mean", "largest"), panels, both.values(), strict=True):
+        image = _panel(axes, matrix, scale, rows, columns)
+        axes.set_title(f"({mark}) {word} {meaning} (mm)")
+        axes.set_xlabel("applied to")
+    for axes in panels[: 1 if beside else 2]:
+        axes.set_ylabel("calibrated on")
+    bar = figure.colorbar(image, ax=list(panels), location="bottom", aspect=60, fraction=0.05)
+    bar.set_label("position error (mm)")
+    bar.ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    style.plain_log(bar.ax.xaxis)
+    return figure
+
+
+def _matrix(before, after, column, rows, columns):
+    """Errors (rows, columns), NaN where there is none."""
+    cells = {}
+    for frame in (before, after):
+        cells.update(dict(zip(zip(frame["calibration"], frame["trajectory"], strict=True), frame[column], strict=True)))
+    return np.array([[cells.get((row, name), np.nan) for name in columns] for row in rows], dtype=float)
+
+
+def _scale(matrices):
+    """One log colour scale for all panels."""
+    values = np.concatenate([matrix.ravel() for matrix in matrices])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not values.size:
+        return LogNorm(0.1, 1.0)
+    return LogNorm(values.min(), max(values.max(), values.min() * 1.1))
+
+
+def _panel(axes, matrix, scale, rows, columns):
+    """Heat map with every number written; lightness alone orders the colours."""
+    image = axes.imshow(
+        np.ma.masked_invalid(matrix), cmap=style.SEQUENTIAL, norm=scale, aspect="auto", interpolation="none"
+    )
+    for (row, column), value in np.ndenumerate(matrix):
+        dark = np.isfinite(value) and scale(max(value, scale.vmin)) > 0.6
+        look = {"ha": "center", "va": "center", "fontsize": 7.0, "in_layout": False}
+        axes.text(column, row, style.number(value), color="white" if dark else "black", **look)
+    axes.set_xticks(range(len(columns)), [choose.trajectory_label(name) for name in columns], rotation=90)
+    axes.set_yticks(range(len(rows)), [name.replace("_", " ") for name in rows])
+    axes.tick_params(length=0.0)
+    axes.axhline(0.5, color="white", linewidth=2.0)
+    groups = sum(name in _GROUPS for name in columns)
+    if groups:
+        axes.axvline(len(columns) - groups - 0.5, color="white", linewidth=2.0)
+    return image

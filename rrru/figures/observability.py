@@ -1,0 +1,85 @@
+"""Which combinations of parameters each set of trajectories sees, and how well."""
+
+import numpy as np
+from matplotlib.ticker import LogLocator
+
+from rrru.figures import choose, style
+
+# weights smaller than this are left unwritten
+_WRITTEN_FROM = 0.15
+
+
+@style.printed
+def observability(tables, options):
+    """Directions of parameter space of every calibration set: their weights, and the standard error along each."""
+    rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
+    names = list(dict.fromkeys(rows["calibration"]))
+    columns = min(len(names), 2)
+    lines = -(-len(names) // columns)
+    figure = style.new(style.DOUBLE_MM if columns > 1 else style.SINGLE_MM, 14.0 + 58.0 * lines)
+    grid = figure.subplots(lines, 2 * columns, squeeze=False, width_ratios=[2.6, 1.0] * columns)
+    pairs = grid.reshape(-1, 2)
+    limits = _error_limits(rows["standard_error_mm"])
+    for place, (name, (weights, errors)) in enumerate(zip(names, pairs, strict=False)):
+        part = rows[rows["calibration"] == name]
+        image = _weights(weights, part)
+        weights.set_title(f"({chr(97 + place)}) {choose.calibration_label(name)}")
+        _errors(errors, part, limits)
+        if place % columns == 0:
+            weights.set_ylabel("direction, best seen first")
+    for axes in pairs[len(names) :].ravel():
+        axes.set_axis_off()
+    bar = figure.colorbar(image, ax=list(grid.ravel()), location="top", fraction=0.03, aspect=50, shrink=0.6)
+    bar.set_label("size of the weight in the unit direction (angles as arcs at the end of the drive arm)")
+    return figure
+
+
+def _weights(axes, part):
+    """Heat map of the weights' sizes, lightness alone, with the signed numbers written where they count."""
+    parameters = list(dict.fromkeys(part["parameter"]))
+    table = part.pivot(index="direction", columns="parameter", values="weight")[parameters].sort_index()
+    image = axes.imshow(table.abs(), cmap=style.SEQUENTIAL, vmin=0.0, vmax=1.0, aspect="auto", interpolation="none")
+    for (row, column), weight in np.ndenumerate(table.to_numpy()):
+        if abs(weight) >= _WRITTEN_FROM:
+            text = f"{weight:+.2f}".replace("0.", ".", 1).replace("-", "\N{MINUS SIGN}")
+            color = "white" if abs(weight) > 0.6 else "black"
+            axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
+    axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters])
+    axes.set_yticks(range(len(table)), table.index)
+    axes.tick_params(length=0.0)
+    axes.set_xlabel("error parameter")
+    return image
+
+
+def _errors(axes, part, limits):
+    """Standard error along each direction on a log axis, the singular value as a number beside it."""
+    each = part.drop_duplicates("direction").set_index("direction").sort_index()
+    rows = np.arange(len(each))
+    seen = each["standard_error_mm"].notna().to_numpy()
+    axes.hlines(rows[seen], limits[0], each["standard_error_mm"][seen], color=style.BLUE, linewidth=1.0)
+    axes.plot(each["standard_error_mm"], rows, "o", color=style.BLUE)
+    for row in rows[~seen]:
+        axes.text(0.5, row, "not seen", transform=axes.get_yaxis_transform(), ha="center", va="center", fontsize=7.0)
+    axes.set(xscale="log", xlim=limits, ylim=(len(each) - 0.5, -0.5))
+    axes.set_yticks(rows, [_short(value) for value in each["singular_value"]])
+    axes.yaxis.tick_right()
+    axes.xaxis.set_major_locator(LogLocator(numticks=4))
+    style.plain_log(axes.xaxis)
+    axes.tick_params(axis="y", length=0.0)
+    axes.set_xlabel("std. error (mm)")
+    axes.set_title("singular value (mm/mm)", loc="right", fontsize=7.0)
+    axes.grid(True, axis="x")
+
+
+def _error_limits(errors):
+    """Common limits of all panels' standard errors, whole decades."""
+    finite = errors[np.isfinite(errors) & (errors > 0.0)]
+    if finite.empty:
+        return 0.1, 1.0
+    low, high = np.floor(np.log10(finite.min() * 0.8)), np.ceil(np.log10(finite.max() * 1.2))
+    return 10.0**low, 10.0 ** max(high, low + 1.0)
+
+
+def _short(value):
+    """Two digits of a number, or all before the point."""
+    return f"{value:.2g}" if 1e-3 <= value < 10.0 else f"{value:.0f}" if value >= 10.0 else f"{value:.0e}"

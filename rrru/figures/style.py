@@ -1,0 +1,181 @@
+"""Print style of every figure: sizes in mm, colours, labels, and saving with bytes that depend on the data only.
+
+Colours are Okabe and Ito's, told apart by every kind of colour vision; those that meet in one panel also differ in grey
+and in marker.
+"""
+
+from contextlib import contextmanager
+from functools import wraps
+from pathlib import Path
+from textwrap import fill
+
+import numpy as np
+from matplotlib import style
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+
+SINGLE_MM, DOUBLE_MM = 85.0, 175.0
+_MM_PER_INCH = 25.4
+_DPI = 300
+# characters in a line of a legend that stands in a panel's place
+_NARROW = 24
+
+# Okabe and Ito, "Color universal design", 2008
+BLACK, ORANGE, SKY, BLUE, VERMILION, GREY = "#000000", "#E69F00", "#56B4E9", "#0072B2", "#D55E00", "#999999"
+
+BEFORE = {"color": BLACK, "marker": "o", "markerfacecolor": "white", "linestyle": (0, (1, 1))}
+LINES = {"color": BLUE, "marker": "s", "markerfacecolor": BLUE, "linestyle": "-"}
+SPIRAL = {"color": ORANGE, "marker": "^", "markerfacecolor": "white", "linestyle": (0, (5, 1))}
+COMMANDED = {"color": GREY, "marker": "+", "markersize": 3.5, "linestyle": "-", "linewidth": 0.6}
+PUBLISHED = {"color": VERMILION, "marker": "D", "markerfacecolor": "white", "linestyle": "-"}
+TOLERANCE = {"color": VERMILION, "linestyle": (0, (4, 2, 1, 2)), "linewidth": 0.8}
+# light end for small numbers; lightness alone orders it, so that it reads in grey
+SEQUENTIAL = "Blues"
+MEASURE = "viridis"
+
+_STYLE = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "mathtext.fontset": "dejavusans",
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 4.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "legend.title_fontsize": 7.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.2,
+    "lines.linewidth": 0.9,
+    "lines.markersize": 3.0,
+    "lines.markeredgewidth": 0.7,
+    "axes.linewidth": 0.6,
+    "axes.grid": False,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.unicode_minus": True,
+    "grid.linewidth": 0.4,
+    "grid.color": "#dddddd",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "hatch.linewidth": 0.5,
+    "pdf.fonttype": 42,
+    "pdf.compression": 6,
+    "savefig.bbox": None,
+}
+
+
+@contextmanager
+def print_style():
+    """Matplotlib's own defaults with the print style on top, whatever the user's settings are."""
+    with style.context(["default", _STYLE], after_reset=True):
+        yield
+
+
+def printed(draw):
+    """A figure function that draws in print style."""
+
+    @wraps(draw)
+    def styled(tables, options):
+        with print_style():
+            return draw(tables, options)
+
+    return styled
+
+
+def new(width_mm, height_mm):
+    """An empty figure that keeps its size and arranges its panels by itself."""
+    figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.03, h_pad=0.03, wspace=0.03, hspace=0.04)
+    return figure
+
+
+def legend_above(figure, axes, columns=5):
+    """One legend above all panels, so that it covers no data, in as few rows of `columns` as it takes; each label
+    once.
+    """
+    entries = _entries(axes)
+    rows = max(-(-len(entries) // columns), 1)
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="outside upper center",
+        ncols=max(-(-len(entries) // rows), 1),
+        columnspacing=1.4,
+    )
+
+
+def legend_inside(place, axes):
+    """One legend for the given axes in a place that is left empty for it."""
+    entries = _entries(axes)
+    labels = [fill(label, _NARROW) for label in entries]
+    legend = place.legend(entries.values(), labels, loc="upper left", borderaxespad=0.0, handlelength=2.0)
+    legend.set_in_layout(False)
+
+
+def _entries(axes):
+    """Legend entries of axes: label to handle, each label once."""
+    entries = {}
+    for one in axes:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    return entries
+
+
+def magnification(deviation_mm, span_mm, share=0.16):
+    """Round factor (1, 2, 5, 10, ...) that makes the largest deviation about `share` of the span; 1 where there is
+    none.
+    """
+    sizes = np.abs(np.asarray(deviation_mm, dtype=float))
+    largest = sizes[np.isfinite(sizes)].max(initial=0.0)
+    if largest <= 0.0 or not span_mm > 0.0:
+        return 1.0
+    wanted = max(share * span_mm / largest, 1.0)
+    decade = 10.0 ** np.floor(np.log10(wanted))
+    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= wanted * (1.0 + 1e-12)))
+
+
+def number(value):
+    """An error to two decimals, more where it is small, fewer where it is large; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    size = abs(value)
+    digits = 3 if size < 0.1 else 2 if size < 10.0 else 1 if size < 100.0 else 0
+    return f"{value:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def plain_log(axis):
+    """Ticks of a log axis as plain numbers at the decades: the digits of powers would be too small to read."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def save(figure, pdf, png):
+    """Write both files of a figure; they carry no date, and none is replaced before both are whole.
+
+    pdf, png: paths. The same tables give the same bytes under the same versions of Matplotlib and its font library.
+    """
+    formats = {"pdf": (Path(pdf), {"CreationDate": None}), "png": (Path(png), {"Software": None})}
+    partial = {kind: path.parent / f".{path.name}.partial" for kind, (path, _) in formats.items()}
+    try:
+        with print_style():
+            # arrange once, so that both files, and every later one, have the panels at the same places
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+            for kind, (path, metadata) in formats.items():
+                path.parent.mkdir(parents=True, exist_ok=True)
+                figure.savefig(partial[kind], format=kind, dpi=_DPI, metadata=metadata)
+        for kind, (path, _) in formats.items():
+            partial[kind].replace(path)
+    finally:
+        for path in partial.values():
+            path.unlink(missing_ok=True)
+
+
+def height_axis(axes, z_down):
+    """Label the vertical axis as the robot frame's z and turn it round where z points down."""
+    axes.set_ylabel("z (mm), down" if z_down else "z (mm)")
+    if z_down:
+        axes.invert_yaxis()

@@ -1,0 +1,108 @@
+"""Least mean distance: the optimum of paper A's objective, eq. (11), which its genetic algorithm searches."""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy import optimize
+
+from rrru.errors import FitError
+from rrru.fit.identifiability import analyse, parameter_scale
+from rrru.fit.least_squares import make_fit
+
+_OUT_OF_REACH_MM = 1e6
+_GRADIENT = 1e-9
+
+
+def least_mean_distance(residuals, start, noise_mm=None):
+    """Fit within the parameters' bounds, near `start` (p,), that minimises the mean distance.
+
+    Newton steps in a trust region with the exact gradient and the Hessian of the distances without the model's own
+    curvature, which is smaller by residual over link length. Where they end at a kink of the objective (a point met
+    exactly) a simplex search goes on, and where they leave the bounds a bounded search (SLSQP) does. The bounds hold
+    only where every direction is seen, as in `least_squares`. Raises FitError, carrying scipy's result, where the
+    search fails.
+    """
+    mechanism, parameters = residuals.mechanism, residuals.mechanism.parameters
+    start = np.asarray(start, dtype=float)
+    ident = analyse(mechanism, residuals.jacobian(start))
+    # whitened coordinates: one unit along each seen direction moves the points by 1 mm on average
+    seen = (
+        (ident.directions[: ident.rank] * ident.scale).T / ident.singular_values[: ident.rank] * np.sqrt(len(residuals))
+    )
+    value, gradient, hessian = _objective(residuals, start, seen)
+    solution = optimize.minimize(
+        value, np.zeros(ident.rank), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": _GRADIENT}
+    )
+    evaluations, best = int(solution.nfev), solution.x
+    if not solution.success:
+        simplex = optimize.minimize(
+            lambda q: residuals.mean_distance((start + seen @ q)[None])[0],
+            best,
+            method="Nelder-Mead",
+            options={
+                "maxfev": 20_000,
+                "maxiter": 20_000,
+                "xatol": 1e-8,
+                "fatol": 1e-12,
+                "adaptive": True,
+                "initial_simplex": _simplex(best),
+            },
+        )
+        evaluations, best = evaluations + int(simplex.nfev), simplex.x
+    errors = start + seen @ best
+    if ident.rank == len(parameters) and not parameters.hold(errors):
+        errors, more = _bounded(residuals, parameters.inside(errors))
+        evaluations += more
+    if not np.isfinite(residuals.mean_distance(errors[None])[0]):
+        raise FitError(f"least mean distance did not converge: {solution.message}", solution)
+    return make_fit(residuals, errors, evaluations, noise_mm)
+
+
+def _objective(residuals, start, directions):
+    """Mean distance at start + directions q, its gradient and its Hessian, as functions of q."""
+    rank = directions.shape[1]
+
+    @lru_cache(maxsize=1)
+    def parts(key):
+        errors = start + directions @ np.frombuffer(key)
+        residual = residuals.residual(errors)
+        if not np.isfinite(residual).all():
+            # a trial step left the reach: a value that the trust region turns away from
+            return np.full(len(residuals), _OUT_OF_REACH_MM), np.zeros((len(residuals), rank)), np.zeros((1, 3, rank))
+        distance = np.maximum(np.linalg.norm(residual, axis=1), 1e-12)
+        jacobian = residuals.jacobian(errors) @ directions
+        return distance, np.einsum("na,nap->np", residual / distance[:, None], jacobian), jacobian
+
+    def value(q):
+        return parts(q.tobytes())[0].mean()
+
+    def gradient(q):
+        return parts(q.tobytes())[1].mean(axis=0)
+
+    def hessian(q):
+        distance, along, jacobian = parts(q.tobytes())
+        weighted = jacobian / np.sqrt(distance[: len(jacobian)])[:, None, None]
+        flat, along = weighted.reshape(-1, rank), along / np.sqrt(distance)[:, None]
+        return (flat.T @ flat - along.T @ along) / len(residuals)
+
+    return value, gradient, hessian
+
+
+def _simplex(centre):
+    """Simplex (k + 1, k) about a point (k,) with edges of a hundredth of a millimetre's effect."""
+    return np.vstack([centre, centre + 0.01 * np.eye(len(centre))])
+
+
+def _bounded(residuals, start):
+    """Errors (p,) of least mean distance inside the bounds from a start (p,) inside them, and the evaluations."""
+    parameters, scale = residuals.mechanism.parameters, parameter_scale(residuals.mechanism)
+    value, gradient, _ = _objective(residuals, np.zeros(len(parameters)), np.diag(scale))
+    solution = optimize.minimize(
+        value,
+        start / scale,
+        jac=gradient,
+        method="SLSQP",
+        bounds=list(zip(parameters.low / scale, parameters.high / scale, strict=True)),
+        options={"ftol": 1e-14, "maxiter": 1000},
+    )
+    return np.clip(solution.x * scale, parameters.low, parameters.high), int(solution.nfev)

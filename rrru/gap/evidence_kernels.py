@@ -1,0 +1,63 @@
+"""Compiled inner loop of the evidence."""
+
+import math
+
+import numba
+import numpy as np
+
+
+@numba.njit(cache=True, error_model="numpy")
+def log_ndtr(x):
+    """Logarithm of the standard normal distribution function."""
+    if x > -10.0:
+        return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
+    # the tail's asymptotic series (Abramowitz and Stegun 26.2.12), good to 1e-4 here
+    return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / (x * x)
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def log_evidence(gram, moment, scale, positive):
+    """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
+
+    gram (v, k, k), moment (v, k): of the whitened columns, for v noise levels; scale (m, k): prior standard deviations;
+    positive (k,): coefficients whose prior is the positive half, whose posterior is counted as independent of the
+    others. Returns (v, m).
+    """
+    v, k = moment.shape
+    m = scale.shape[0]
+    result = np.empty((v, m))
+    low, inverse = np.zeros((k, k)), np.zeros((k, k))
+    half = np.empty(k)
+    for level in range(v):
+        for j in range(m):
+            total = 0.0
+            for r in range(k):
+                for c in range(r + 1):
+                    entry = scale[j, r] * scale[j, c] * gram[level, r, c]
+                    if r == c:
+                        entry += 1.0
+                    for q in range(c):
+                        entry -= low[r, q] * low[c, q]
+                    # pivots of the identity plus a Gram matrix are at least 1; rounding must not make them less
+                    low[r, c] = math.sqrt(max(entry, 1.0)) if r == c else entry / low[c, c]
+                entry = scale[j, r] * moment[level, r]
+                for q in range(r):
+                    entry -= low[r, q] * half[q]
+                half[r] = entry / low[r, r]
+                total += 0.5 * half[r] * half[r] - math.log(low[r, r])
+            for c in range(k):
+                if not positive[c]:
+                    continue
+                inverse[c, c] = 1.0 / low[c, c]
+                for r in range(c + 1, k):
+                    entry = 0.0
+                    for q in range(c, r):
+                        entry -= low[r, q] * inverse[q, c]
+                    inverse[r, c] = entry / low[r, r]
+                mean, variance = 0.0, 0.0
+                for r in range(c, k):
+                    mean += inverse[r, c] * half[r]
+                    variance += inverse[r, c] * inverse[r, c]
+                total += log_ndtr(mean / math.sqrt(variance)) + math.log(2.0)
+            result[level, j] = total
+    return result

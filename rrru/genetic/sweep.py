@@ -1,0 +1,157 @@
+"""Sweeps of the genetic algorithm's settings over many seeds, and whether a setting's effect can be told from the
+seeds' scatter.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from rrru.errors import ConfigError
+from rrru.genetic.algorithm import minimise
+from rrru.seeds import run_seed
+
+SWEPT = ("crossover_fraction", "migration_fraction")
+_EVERY_UNTIL, _THEN_EVERY = 100, 10
+_LEVEL = 0.05
+_RESAMPLES = 4999
+
+
+def population_kind(settings):
+    """Name of a population's structure in the tables: "one" or "islands"."""
+    return "one" if len(settings.populations) == 1 else "islands"
+
+
+def run_sweep(objective, low, high, settings, parameter, value, seeds, names, study_seed=0):
+    """Runs of the genetic algorithm at one value of one setting, one per seed number.
+
+    objective, low, high: see `genetic.minimise`; settings: GeneticSettings, of which `parameter` (one of SWEPT) is set
+    to `value`; seeds: seed numbers, each run's own seed being run_seed(study_seed, parameter, population, value,
+    number); names: of the p errors.
+
+    Returns two tables. runs, a row per seed: parameter, value, population ("one", "islands"), seed (number),
+    objective_mm, generations, evaluations, stopped, and a column per name. history: parameter, value, population, seed,
+    generation, best_mm, mean_mm, with every generation up to 100, every 10th after it, and the last. Raises ConfigError
+    for another parameter or a value that is not allowed.
+    """
+    if parameter not in SWEPT:
+        raise ConfigError(f"swept parameter is {parameter!r}; allowed: {', '.join(SWEPT)}")
+    settings = replace(settings, **{parameter: value})
+    kind = population_kind(settings)
+    runs, history = [], []
+    for number in seeds:
+        result = minimise(objective, low, high, settings, run_seed(study_seed, parameter, kind, value, number))
+        labels = {"parameter": parameter, "value": float(value), "population": kind, "seed": int(number)}
+        runs.append(
+            labels
+            | {"objective_mm": result.objective, "generations": result.generations}
+            | {"evaluations": result.evaluations, "stopped": result.stopped}
+            | dict(zip(names, result.errors.tolist(), strict=True))
+        )
+        kept = kept_generations(result.generations)
+        columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}
+        history.append(pd.DataFrame(labels | columns))
+    return pd.DataFrame(runs), pd.concat(history, ignore_index=True)
+
+
+def setting_effect(runs):
+    """Whether the settings' objectives differ at all: one row per (parameter, population) of a table of runs.
+
+    Columns: parameter, population, settings (number of values), runs, statistic and p_value of the Kruskal-Wallis test
+    over all values, epsilon_squared = H / (n - 1), the share of the rank variance that the settings explain (Tomczak
+    and Tomczak 2014), and the same three ending in _mutating without the crossover fraction 1.0, where nothing mutates;
+    distinguishable_mutating: that p below 5 %. Equal objectives everywhere, or fewer than two values, give p = 1.
+    """
+    rows = []
+    for (parameter, population), group in runs.groupby(["parameter", "population"]):
+        mutates = group["value"] < 1.0 if parameter == "crossover_fraction" else np.full(len(group), True)
+        every, mutating = _kruskal(group), _kruskal(group[mutates])
+        rows.append(
+            {"parameter": parameter, "population": population, "settings": group["value"].nunique(), "runs": len(group)}
+            | every
+            | {f"{key}_mutating": value for key, value in mutating.items()}
+            | {"distinguishable_mutating": mutating["p_value"] < _LEVEL}
+        )
+    return pd.DataFrame(rows)
+
+
+def setting_pairs(runs, seed=0):
+    """How far each setting is from the best one: a row per value but the best, of each (parameter, population) of a
+    table of runs.
+
+    Columns: parameter, population, value, best_value (lowest median objective), median_mm, difference_mm (of the
+    medians, value minus best) with its 95 % percentile-bootstrap interval difference_low_mm, difference_high_mm (NaN
+    with a single run or infeasible ones), p_value (Mann-Whitney, two-sided), p_holm (corrected over the values of the
+    group), distinguishable (p_holm below 5 %). The best value was picked from the same runs, which makes the
+    differences look somewhat too large. `seed` is of the bootstrap.
+    """
+    rows = []
+    for (parameter, population), group in runs.groupby(["parameter", "population"]):
+        samples = {value: part.to_numpy() for value, part in group.groupby("value")["objective_mm"]}
+        best = min(samples, key=lambda value: np.median(samples[value]))
+        pairs = []
+        for value, sample in samples.items():
+            if value == best:
+                continue
+            difference, low, high = _median_difference(
+                sample, samples[best], run_seed(seed, parameter, population, value)
+            )
+            pairs.append(
+                {"parameter": parameter, "population": population, "value": value, "best_value": best}
+                | {"median_mm": float(np.median(sample)), "difference_mm": difference}
+                | {"difference_low_mm": low, "difference_high_mm": high}
+                | {"p_value": float(stats.mannwhitneyu(sample, samples[best]).pvalue)}
+            )
+        for pair, corrected in zip(pairs, _holm([pair["p_value"] for pair in pairs]), strict=True):
+            rows.append(pair | {"p_holm": corrected, "distinguishable": corrected < _LEVEL})
+    return pd.DataFrame(rows)
+
+
+def kept_generations(last):
+    """Generations whose history is kept: every one up to 100, every 10th after it, and the last."""
+    kept = np.arange(last + 1)
+    return kept[(kept <= _EVERY_UNTIL) | (kept % _THEN_EVERY == 0) | (kept == last)]
+
+
+def _kruskal(group):
+    """Statistic, p value and epsilon squared of the Kruskal-Wallis test of the objective over the values of a group of
+    runs.
+    """
+    samples = [part.to_numpy() for _, part in group.groupby("value")["objective_mm"]]
+    if len(samples) < 2 or group["objective_mm"].nunique() < 2:
+        return {"statistic": 0.0, "p_value": 1.0, "epsilon_squared": 0.0}
+    test = stats.kruskal(*samples)
+    return {
+        "statistic": float(test.statistic),
+        "p_value": float(test.pvalue),
+        "epsilon_squared": float(test.statistic / (len(group) - 1)),
+    }
+
+
+def _median_difference(sample, reference, seed):
+    """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it cannot be had."""
+    if not np.isfinite([*sample, *reference]).all():
+        return np.nan, np.nan, np.nan
+    difference = float(np.median(sample) - np.median(reference))
+    if min(len(sample), len(reference)) < 2:
+        return difference, np.nan, np.nan
+    interval = stats.bootstrap(
+        (sample, reference),
+        lambda a, b, axis=-1: np.median(a, axis=axis) - np.median(b, axis=axis),
+        n_resamples=_RESAMPLES,
+        confidence_level=1.0 - _LEVEL,
+        method="percentile",
+        vectorized=True,
+        rng=np.random.default_rng(seed),
+    ).confidence_interval
+    return difference, float(interval.low), float(interval.high)
+
+
+def _holm(p_values):
+    """P values corrected for their number (S. Holm 1979), in the order given; SciPy offers Benjamini-Hochberg only."""
+    corrected, floor = [0.0] * len(p_values), 0.0
+    for rank, index in enumerate(np.argsort(p_values, kind="stable")):
+        floor = max(floor, min(1.0, (len(p_values) - rank) * p_values[index]))
+        corrected[index] = floor
+    return corrected

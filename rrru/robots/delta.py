@@ -1,0 +1,149 @@
+"""Rotary Delta robot (paper C): what its controller believes.
+
+Frame of the static platform O-XYZ: the three drive axes lie in the plane Z = 0, z UP, leg i at the structure angle
+beta_i = -pi/6 + 2 pi (i-1)/3, so that Y points to the second drive axis (the scan prints every minus sign as a question
+mark). The calibration frame o-xyz has the same directions and its origin where the platform stands at zero drive
+angles, in the middle of the workspace:
+
+    r = a_i + l1 u_i + l2 w_i
+    (eq. 1) u_i = Rot(Z, beta_i - pi/2) Rot(x_i, -theta_i) e_2 = cos(theta_i) e_i - sin(theta_i) z
+    (eq. 2)
+
+with e_i the outward direction and |a_i| = a the base's radius less the platform's: the platform counts as a point.
+theta > 0 lowers the arm. To first order an error of the drives moves the platform by
+
+    w_i . dr = l1 w_i . (du_i / dtheta_i) dtheta_i,   dr = J dtheta
+    (eqs. 3-6)
+
+Of the scan's equations (1), (3) to (6) the text around them is left; they are rebuilt from it. Lengths in mm, angles in
+rad.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.robots.three_legs import points
+from rrru.robots.tripod import Tripod
+
+COLUMNS = ("dtheta_rad", "l1_mm", "l2_mm", "a_mm")
+_LEGS = (1, 2, 3)
+_DRIVES = tuple(f"dtheta{leg}" for leg in _LEGS)
+ERROR_NAMES = {
+    "zero": _DRIVES,
+    "tied": (*_DRIVES, "dl1", "dl2", "da"),
+    "legs": (
+        *_DRIVES,
+        *(f"dl1_{leg}" for leg in _LEGS),
+        *(f"dl2_{leg}" for leg in _LEGS),
+        *(f"da_{leg}" for leg in _LEGS),
+    ),
+}
+_KINDS = {"dtheta": 0, "dl1": 1, "dl2": 2, "da": 3}
+
+
+@dataclass(frozen=True)
+class Delta(Tripod):
+    """The robot with its nominal dimensions in mm and the choice of error parameters: "zero" (3), "tied" (6) or "legs"
+    (12).
+    """
+
+    l1_mm: float = 375.0  # ASSUME this and the next two: the paper gives no dimensions
+    l2_mm: float = 900.0
+    a_mm: float = 125.0
+    azimuth_rad: tuple[float, float, float] = (-np.pi / 6.0, np.pi / 2.0, 7.0 * np.pi / 6.0)
+    errors: str = "zero"
+    angle_limit_rad: float = 0.05
+    length_limit_mm: float = 10.0
+    name: str = field(default="delta", init=False)
+
+    ARM, LINK, OFFSET = 1, 2, 3
+    TRACKED = "tied"
+
+    DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
+    ANGLES = ("dtheta",)
+    ERROR_NAMES = ERROR_NAMES
+    SOURCE = "paper C, 1.1; bounds assumed"
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not self.l2_mm > self.a_mm + self.l1_mm:
+            raise ConfigError(
+                f"delta: l2_mm is {self.l2_mm}; allowed: more than a_mm + l1_mm, else no pose has level arms"
+            )
+
+    @property
+    def angle_arm_mm(self):
+        """Length that makes an angle error comparable with a length error."""
+        return self.l1_mm
+
+    @property
+    def lengths_mm(self):
+        """Nominal R, L1, L2, L3, r (5,) as effects count them: arm L1, link L3."""
+        return np.array([self.a_mm, self.l1_mm, 0.0, self.l2_mm, 0.0])
+
+    @property
+    def origin_depth_mm(self):
+        """Depth of the calibration frame's origin below the drive axes: the platform's at zero drive angles."""
+        return float(np.sqrt(self.l2_mm**2 - (self.a_mm + self.l1_mm) ** 2))
+
+    @cached_property
+    def leg_map(self):
+        """Derivative of the legs' numbers with respect to the errors, shape (3, 4, p)."""
+        matrix = np.zeros((3, len(COLUMNS), len(self.parameters)))
+        for column, name in enumerate(self.parameters.names):
+            if name.startswith("dtheta"):
+                matrix[int(name[-1]) - 1, 0, column] = 1.0
+                continue
+            kind, _, leg = name.partition("_")
+            matrix[slice(None) if not leg else int(leg) - 1, _KINDS[kind], column] = 1.0
+        return matrix
+
+    @cached_property
+    def nominal_legs(self):
+        """Numbers of the legs (3, 4) without errors."""
+        return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
+
+    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where a leg cannot
+        reach.
+        """
+        position = points(position_mm)
+        cx, cy = self.turn
+        u, v = position[:, :1] * cx + position[:, 1:2] * cy, position[:, 1:2] * cx - position[:, :1] * cy
+        depth = self.origin_depth_mm - position[:, 2:]
+        inward = u - legs[:, 3]
+        d = np.hypot(inward, depth)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            cosine = (legs[:, 1] ** 2 + d**2 + v**2 - legs[:, 2] ** 2) / (2.0 * legs[:, 1] * d)
+            # beyond the reach arccos gives NaN, which is the mask the callers rely on
+            return np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0]
+
+    def ends(self, theta_rad, legs):
+        """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm in the calibration frame, for drive angles
+        (n, 3).
+        """
+        angle = theta_rad + legs[..., 0]
+        reach = legs[..., 3] + legs[..., 1] * np.cos(angle)
+        height = self.origin_depth_mm - legs[..., 1] * np.sin(angle)
+        return reach[..., None] * self.radial + height[..., None] * np.array([0.0, 0.0, 1.0])
+
+    def end_rates(self, theta_rad, legs):
+        """Derivative (n, 3 legs, 3 axes, 4) of `ends` by the legs' numbers (3, 4)."""
+        angle = theta_rad + legs[:, 0]
+        cosine, sine, up = np.cos(angle)[..., None], np.sin(angle)[..., None], np.array([0.0, 0.0, 1.0])
+        turned = -legs[:, 1, None] * (sine * self.radial + cosine * up)
+        columns = [turned, cosine * self.radial - sine * up, np.zeros(3), self.radial]
+        return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
+
+    def levers(self, theta_rad, legs):
+        """Vectors (n, 3 legs, 3) in mm from the drive axes to the arms' ends."""
+        angle = (theta_rad + legs[:, 0])[..., None]
+        return legs[:, 1, None] * (np.cos(angle) * self.radial - np.sin(angle) * np.array([0.0, 0.0, 1.0]))
+
+    def couples(self, position_mm, theta_rad, errors=None):
+        """Unit directions (n, 3 legs, 3) about which each leg's parallelogram keeps the platform from turning."""
+        across = np.cross(self.tangent, self.link_directions(position_mm, theta_rad, errors))
+        return across / np.linalg.norm(across, axis=-1, keepdims=True)

@@ -1,0 +1,58 @@
+"""A linear delta as its owner's firmware describes it: the 3-PTT with upright rails and nominal numbers of its own for
+every tower.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.robots.ptt3 import Ptt3
+
+# ASSUME firmware knows only the difference of the radii; this platform radius does not act on any result
+_PLATFORM_MM = 30.0
+
+
+@dataclass(frozen=True)
+class LinearDelta(Ptt3):
+    """Ptt3 whose slider positions count up from the frame's zero marks plus zero_mm; see `linear_delta`.
+
+    arms_mm, zero_mm: per tower.
+    """
+
+    arms_mm: tuple[float, float, float] = (350.0, 350.0, 350.0)
+    zero_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @cached_property
+    def nominal_legs(self):
+        """Numbers of the legs (3, 6) without errors."""
+        legs = np.zeros((3, 6))
+        legs[:, 0], legs[:, 1], legs[:, 2] = self.zero_mm, self.arms_mm, self.R_mm - self.r_mm
+        return legs
+
+
+def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, errors, angle_limit_rad=1.0, length_limit_mm=1e4):
+    """The mechanism of a printer, whose sliders stand at minus the way down from their endstops.
+
+    radius_mm: tower circle less joint offsets. azimuth_rad, arms_mm, endstop_mm: (3,) per tower. errors: "heights" or
+    "distances" (ERROR_NAMES of the 3-PTT). The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
+    Raises ConfigError for arms that are too short.
+    """
+    arms = np.asarray(arms_mm, dtype=float)
+    if not (arms > radius_mm).all():
+        raise ConfigError(
+            f"linear delta: an arm of {arms.min():g} mm; allowed: longer than the radius, {radius_mm:g} mm"
+        )
+    return LinearDelta(
+        L_mm=float(arms.mean()),
+        R_mm=radius_mm + _PLATFORM_MM,
+        r_mm=_PLATFORM_MM,
+        rail_inclination_rad=np.pi / 2.0,
+        azimuth_rad=tuple(azimuth_rad),
+        errors=errors,
+        angle_limit_rad=angle_limit_rad,
+        length_limit_mm=length_limit_mm,
+        arms_mm=tuple(arms),
+        zero_mm=tuple(np.asarray(endstop_mm, dtype=float) + np.sqrt(arms**2 - radius_mm**2)),
+    )

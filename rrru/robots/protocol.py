@@ -1,0 +1,100 @@
+"""What every mechanism offers to calibration and plant, and the mechanisms by name. Lengths in mm, angles in rad."""
+
+from dataclasses import fields
+from typing import Protocol
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.parameters import ParameterSet
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
+from rrru.robots.rrru3 import Rrru3, to_identifiable
+
+
+class Mechanism(Protocol):
+    """A parallel robot as its controller believes it to be, with small errors of its numbers.
+
+    drive_unit: "rad" or "mm", unit of an actuator value; TRACKED: the set of error parameters that measured positions
+    identify; angle_arm_mm: the length that makes an angle error comparable with a length error; lengths_mm (5,):
+    nominal R, L1, L2, L3, r as effects count them, 0 for what a robot does not have.
+    """
+
+    name: str
+    parameters: ParameterSet
+    drive_unit: str
+    TRACKED: str
+    angle_arm_mm: float
+    lengths_mm: np.ndarray
+
+    def inverse(self, position_mm: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
+        """Actuator values (n, k) for positions (n, 3); NaN where out of reach."""
+
+    def forward(
+        self, actuators: np.ndarray, errors: np.ndarray | None = None, guess_mm: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Positions (n, 3) for actuator values (n, k); NaN where there is none near the guess."""
+
+    def forward_batch(
+        self, actuators: np.ndarray, errors: np.ndarray, guess_mm: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Positions (m, n, 3) for n actuator triples under m error vectors (m, p)."""
+
+    def actuator_jacobian(
+        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Derivative (n, 3, k) of the position by the actuator values."""
+
+    def error_jacobian(
+        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Derivative (n, 3, p) of the position by the errors."""
+
+    def closure_jacobians(
+        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+    ) -> tuple:
+        """Derivatives of the legs' closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
+
+    def couples(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
+
+
+# errors that stand for all legs, and the names of the legs' own
+_COMMON = {"dL": ("dL1", "dL2", "dL3")} | {
+    name: tuple(f"{name}_{leg}" for leg in (1, 2, 3)) for name in ("dl1", "dl2", "da")
+}
+MECHANISMS = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
+
+
+def identifiable_truth(mechanism, values):
+    """Mapping of the mechanism's error parameters from a mapping of true errors in its richest set; what is absent is
+    zero.
+
+    NaN for a number that stands for all legs where theirs differ.
+    """
+    if isinstance(mechanism, Rrru3):
+        return to_identifiable(values)
+    result = {}
+    for name in mechanism.parameters.names:
+        legs = {float(values.get(own, values.get(name, 0.0))) for own in _COMMON.get(name, (name,))}
+        result[name] = legs.pop() if len(legs) == 1 else float("nan")
+    return result
+
+
+def make_mechanism(name, section, **options):
+    """The mechanism of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key.
+
+    Angles of the entry are in degrees, with keys that end in _deg.
+    """
+    if name not in MECHANISMS:
+        raise ConfigError(f"unknown robot {name!r}; known: {', '.join(MECHANISMS)}")
+    kind = MECHANISMS[name]
+    section = {
+        key.replace("_deg", "_rad"): float(np.radians(value)) if key.endswith("_deg") else value
+        for key, value in section.items()
+    }
+    known = {f.name for f in fields(kind) if f.init}
+    for key in section:
+        if key not in known:
+            raise ConfigError(f"robot {name}: unknown key {key!r}; known: {', '.join(sorted(known))}")
+    return kind(**section, **options)

@@ -1,0 +1,192 @@
+"""3-PTT translational parallel robot (paper B) and, with upright rails, the linear delta: what its controller believes.
+
+Three carriages run on rails at the azimuths phi_i, screw-driven; a link of length L with a U joint (T) at both ends
+ties each to the platform. Robot frame: origin at the static platform's centre in the plane of the rails' zero marks, x
+along the first rail, z UP. The rails rise outwards by the inclination gamma: 0 is paper B's robot, a right angle the
+linear delta, whose carriages run upright. With the outward direction e_i, the slider position b_i along d_i and a = R -
+r,
+
+    E_i = a e_i + b_i d_i,   d_i = cos(gamma) e_i + sin(gamma) z,   |P - E_i|^2 = L^2
+    (eq. 1) b_i = -w_i . d_i + sqrt((w_i . d_i)^2 - |w_i|^2 + L^2),   w_i = a e_i - P
+    (eq. 2)
+
+the root whose carriage stands outside of (gamma = 0) or above (upright) the platform. For gamma = 0, with the radial
+and tangential coordinates u, v of P, b_i = u_i - a + D_i, D_i = sqrt(L^2 - v_i^2 - Z^2), and J of db = J dp (eqs. 4,
+10) has the determinant
+
+    det J = -Z kappa / (D_1 D_2 D_3),   kappa = sum_i [ sqrt(3)/2 (D_j D_k + v_j v_k) + (v_k D_j - v_j D_k) / 2 ],  (i,
+    j, k) cyclic
+
+# ASSUME The scan has lost eqs. (1) to (9) and Table 1; these are ours. R and r enter only as R - r, and along
+horizontal rails an error of R - r is a common one of the sliders. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.robots.three_legs import points
+from rrru.robots.tripod import Tripod
+
+COLUMNS = ("db_mm", "L_mm", "a_mm", "azimuth_rad", "rise_rad", "swing_rad")
+_LEGS = (1, 2, 3)
+_SLIDERS = tuple(f"db{leg}" for leg in _LEGS)
+_LINKS = tuple(f"dL{leg}" for leg in _LEGS)
+# The gauges: "tied" leaves out a = R - r, which horizontal rails cannot tell from the sliders' zeros; "heights" and
+# "distances" fix the third azimuth, the base's free rotation, which neither kind of measurement sees.
+ERROR_NAMES = {
+    "zero": _SLIDERS,
+    "tied": (*_SLIDERS, "dL"),
+    "legs": (*_SLIDERS, *_LINKS),
+    "rails": (*_SLIDERS, *_LINKS, *(f"{kind}{leg}" for leg in _LEGS for kind in ("dphi", "rise", "swing"))),
+    "heights": ("da", "dphi1", "dphi2", *_SLIDERS),
+    "distances": ("da", "dphi1", "dphi2", *_SLIDERS, *_LINKS),
+}
+_KINDS = {"db": 0, "dL": 1, "da": 2, "dphi": 3, "rise": 4, "swing": 5}
+
+
+@dataclass(frozen=True)
+class Ptt3(Tripod):
+    """The robot with its nominal dimensions in mm and the choice of error parameters, a key of ERROR_NAMES.
+
+    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. errors: "zero" (3), "tied" (4), "legs" (6), "rails"
+    (15), "heights" (6), "distances" (9).
+    """
+
+    L_mm: float = 350.0  # ASSUME this and the next two: Table 1 is lost
+    R_mm: float = 300.0
+    r_mm: float = 60.0
+    rail_inclination_rad: float = 0.0
+    azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
+    errors: str = "tied"
+    angle_limit_rad: float = 0.05
+    length_limit_mm: float = 10.0
+    name: str = field(default="ptt3", init=False)
+
+    LINK, OFFSET = 1, 2
+    drive_unit = "mm"
+    TRACKED = "tied"
+
+    DIMENSIONS = ("L_mm", "R_mm", "r_mm")
+    ANGLES = ("dphi", "rise", "swing")
+    ERROR_NAMES = ERROR_NAMES
+    SOURCE = "paper B, 2.2; bounds assumed"
+
+    def __post_init__(self):
+        super().__post_init__()
+        if not 0.0 <= self.rail_inclination_rad <= np.pi / 2.0 + 1e-12:
+            raise ConfigError(f"ptt3: rail_inclination_rad is {self.rail_inclination_rad}; allowed: 0 to pi / 2")
+
+    @property
+    def angle_arm_mm(self):
+        """Length that makes an angle error comparable with a length error."""
+        return self.R_mm
+
+    @property
+    def lengths_mm(self):
+        """Nominal R, L1, L2, L3, r (5,) as effects count them: without arms, the link is the forearm."""
+        return np.array([self.R_mm, 0.0, 0.0, self.L_mm, self.r_mm])
+
+    @cached_property
+    def leg_map(self):
+        """Derivative of the legs' numbers with respect to the errors, shape (3, 6, p)."""
+        matrix = np.zeros((3, len(COLUMNS), len(self.parameters)))
+        for column, name in enumerate(self.parameters.names):
+            leg = name[-1]
+            which = slice(None) if leg not in "123" else int(leg) - 1
+            matrix[which, _KINDS[name.rstrip("123")], column] = 1.0
+        return matrix
+
+    @cached_property
+    def nominal_legs(self):
+        """Numbers of the legs (3, 6) without errors."""
+        return np.tile([0.0, self.L_mm, self.R_mm - self.r_mm, 0.0, 0.0, 0.0], (3, 1))
+
+    def inverse_of_legs(self, position_mm, legs, sign=1.0):
+        """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign; NaN where a leg cannot reach
+        (eq. 2).
+        """
+        outward, _, rail = self._directions(legs)
+        w = legs[:, 2, None] * outward - points(position_mm)[:, None, :]
+        along = (w * rail).sum(axis=-1)
+        with np.errstate(invalid="ignore"):
+            # beyond the reach the root gives NaN, which is the mask the callers rely on
+            return -along + sign * np.sqrt(along**2 - (w**2).sum(axis=-1) + legs[:, self.LINK] ** 2) - legs[:, 0]
+
+    def ends(self, slider_mm, legs):
+        """Links' driven ends less the platform's radius, (..., n, 3 legs, 3) in mm, for slider positions (n, 3)."""
+        outward, _, rail = self._directions(legs)
+        return legs[..., 2, None] * outward + (slider_mm + legs[..., 0])[..., None] * rail
+
+    def end_rates(self, slider_mm, legs):
+        """Derivative (n, 3 legs, 3 axes, 6) of `ends` by the legs' numbers (3, 6)."""
+        outward, sideways, rail = self._directions(legs)
+        along = (slider_mm + legs[:, 0])[..., None]
+        rise, swing = self.rail_inclination_rad + legs[:, 4, None], legs[:, 5, None]
+        up = np.array([0.0, 0.0, 1.0])
+        shape = np.broadcast_shapes(along.shape, rail.shape)
+        columns = [
+            rail,
+            np.zeros(3),
+            outward,
+            legs[:, 2, None] * sideways + along * (np.cos(swing) * np.cos(rise) * sideways - np.sin(swing) * outward),
+            along * np.cos(swing) * (np.cos(rise) * up - np.sin(rise) * outward),
+            along * (np.cos(swing) * sideways - np.sin(swing) * (np.cos(rise) * outward + np.sin(rise) * up)),
+        ]
+        return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
+
+    def levers(self, slider_mm, legs):
+        """Vectors (n, 3 legs, 3) in mm from the rails' zero marks to the carriages."""
+        return (slider_mm + legs[:, 0])[..., None] * self._directions(legs)[2]
+
+    def rails(self, errors=None):
+        """Unit directions (3 legs, 3) in which the sliders count up."""
+        return self._directions(self.legs(errors))[2]
+
+    def couples(self, position_mm, slider_mm, errors=None):
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
+
+        # ASSUME both U joints have their outer axes tangential: the leg then resists turning about the link's part in
+        the plane across them.
+        """
+        link = self.link_directions(position_mm, slider_mm, errors)
+        flat = link - (link * self.tangent).sum(axis=-1, keepdims=True) * self.tangent
+        return flat / np.linalg.norm(flat, axis=-1, keepdims=True)
+
+    def jacobian(self, position_mm, slider_mm, errors=None):
+        """J (n, 3, 3) of db = J dp, exact at slider positions that fit the position (eqs. 4, 10)."""
+        link = self.link_directions(position_mm, slider_mm, errors)
+        return link / (link * self.rails(errors)).sum(axis=-1, keepdims=True)
+
+    def determinant_factors(self, position_mm):
+        """Z, kappa and D (3) of det J = -Z kappa / (D_1 D_2 D_3), each over n points, D (n, 3); horizontal rails only.
+
+        Raises ConfigError for other rails.
+        """
+        if self.rail_inclination_rad != 0.0:
+            raise ConfigError(
+                f"the factors of det J hold for horizontal rails, not for {self.rail_inclination_rad} rad"
+            )
+        position = points(position_mm)
+        cx, cy = self.turn
+        v = position[:, 1:2] * cx - position[:, :1] * cy
+        with np.errstate(invalid="ignore"):
+            d = np.sqrt(self.L_mm**2 - v**2 - position[:, 2:] ** 2)
+        kappa = np.zeros(len(position))
+        for j, k in ((1, 2), (2, 0), (0, 1)):
+            kappa += np.sqrt(0.75) * (d[:, j] * d[:, k] + v[:, j] * v[:, k]) + 0.5 * (
+                v[:, k] * d[:, j] - v[:, j] * d[:, k]
+            )
+        return position[:, 2], kappa, d
+
+    def _directions(self, legs):
+        """Outward, sideways and rail direction of every leg, each (..., 3 legs, 3), under leg numbers (..., 3, 6)."""
+        azimuth, swing = np.asarray(self.azimuth_rad) + legs[..., 3], legs[..., 5, None]
+        rise = self.rail_inclination_rad + legs[..., 4, None]
+        zero = np.zeros_like(azimuth)
+        outward = np.stack([np.cos(azimuth), np.sin(azimuth), zero], axis=-1)
+        sideways = np.stack([-np.sin(azimuth), np.cos(azimuth), zero], axis=-1)
+        upright = np.cos(rise) * outward + np.sin(rise) * np.array([0.0, 0.0, 1.0])
+        return outward, sideways, np.cos(swing) * upright + np.sin(swing) * sideways

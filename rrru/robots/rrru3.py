@@ -1,0 +1,271 @@
+"""3-RRRU translational parallel robot (paper A): what its controller believes.
+
+Robot frame: origin at the centre of the static platform, z DOWN. Leg i stands at azimuth phi_i; with u the radial and v
+the tangential coordinate of the platform's centre in leg i,
+
+    X = u + r - R - L1 cos(theta),  Z = z - L1 sin(theta),  rho = L2 + sqrt(L3^2 - v^2),  X^2 + Z^2 - rho^2 = 0
+    (eq. 8)
+
+R and r enter only as r - R: of the 14 published errors, tied across the legs to 8, 7 can be identified. Lengths in mm,
+angles in rad.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.parameters import Parameter, ParameterSet
+from rrru.robots import rrru3_kernels as kernels
+from rrru.robots.three_legs import ThreeLegs, points
+
+LEG_COLUMNS = ("dtheta_rad", "L1_mm", "L2_mm", "L3_mm", "r_minus_R_mm")
+ELBOW_SIGN = {"out": -1.0, "in": 1.0}
+
+# ASSUME the paper prints no search bounds; these hold Table 6 read in radians (0.0201 rad) and twice the largest
+# printed length error.
+ANGLE_LIMIT_RAD = 0.03
+LENGTH_LIMIT_MM = 4.0
+_SOURCE = "paper A, section 2.2; bounds assumed"
+_ANGLES = ("dtheta1", "dtheta2", "dtheta3")
+# The gauge: R and r shift every leg by the same r - R, so that in the identifiable set one number, da = dr - dR, stands
+# for both.
+ERROR_NAMES = {
+    "published": (*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr"),
+    "tied": (*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr"),
+    "identifiable": (*_ANGLES, "dL1", "dL2", "dL3", "da"),
+    "zero": _ANGLES,
+}
+
+
+def _error_parameter(name, angle_limit_rad, length_limit_mm):
+    """One error parameter, nominally zero; da, which stands for two lengths, has twice a length's limit."""
+    if name in _ANGLES:
+        return Parameter(name, "rad", 0.0, -angle_limit_rad, angle_limit_rad, _SOURCE)
+    limit = length_limit_mm * (2.0 if name == "da" else 1.0)
+    return Parameter(name, "mm", 0.0, -limit, limit, _SOURCE)
+
+
+def _leg_map(names):
+    """Matrix (3, 5, p) from the named errors to changes of the legs' numbers."""
+    matrix = np.zeros((3, 5, len(names)))
+    for column, name in enumerate(names):
+        if name.startswith("dtheta"):
+            matrix[int(name[-1]) - 1, 0, column] = 1.0
+        elif name.startswith("dL") and len(name) == 4:
+            matrix[int(name[2]) - 1, int(name[3]), column] = 1.0
+        elif name.startswith("dL"):
+            matrix[:, int(name[2]), column] = 1.0
+        else:
+            matrix[:, 4, column] = {"dR": -1.0, "dr": 1.0, "da": 1.0}[name]
+    return matrix
+
+
+def to_identifiable(values):
+    """Mapping of the 7 identifiable errors from a mapping of published or tied ones; what is absent is zero.
+
+    NaN for a link whose errors differ between the legs, since the identifiable set has one number for all three.
+    """
+    result = {name: float(values.get(name, 0.0)) for name in _ANGLES}
+    for link in (1, 2, 3):
+        legs = {float(values.get(f"dL{leg}{link}", values.get(f"dL{link}", 0.0))) for leg in (1, 2, 3)}
+        result[f"dL{link}"] = legs.pop() if len(legs) == 1 else float("nan")
+    result["da"] = float(values.get("da", values.get("dr", 0.0) - values.get("dR", 0.0)))
+    return result
+
+
+@dataclass(frozen=True)
+class Rrru3(ThreeLegs):
+    """The robot with its nominal dimensions and the choice of error parameters.
+
+    Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8), "identifiable" (7) or "zero" (3).
+    """
+
+    L1_mm: float = 400.0
+    L2_mm: float = 100.0
+    L3_mm: float = 800.0
+    R_mm: float = 400.0
+    r_mm: float = 400.0
+    azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
+    errors: str = "identifiable"
+    angle_limit_rad: float = ANGLE_LIMIT_RAD
+    length_limit_mm: float = LENGTH_LIMIT_MM
+    name: str = field(default="rrru3", init=False)
+
+    # unit of an actuator value; the set of error parameters that measured positions identify
+    drive_unit = "rad"
+    TRACKED = "identifiable"
+
+    def __post_init__(self):
+        for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
+            if not getattr(self, key) > 0.0:
+                raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive number")
+        if self.errors not in ERROR_NAMES:
+            raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
+
+    @property
+    def angle_arm_mm(self):
+        """Length that makes an angle error comparable with a length error."""
+        return self.L1_mm
+
+    @property
+    def lengths_mm(self):
+        """Nominal R, L1, L2, L3, r (5,)."""
+        return np.array([self.R_mm, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm])
+
+    @cached_property
+    def parameters(self):
+        """The error parameters: the meaning of every `errors` vector."""
+        return ParameterSet(
+            tuple(
+                _error_parameter(name, self.angle_limit_rad, self.length_limit_mm) for name in ERROR_NAMES[self.errors]
+            )
+        )
+
+    @cached_property
+    def leg_map(self):
+        """Derivative of the legs' numbers with respect to the errors, shape (3, 5, p)."""
+        return _leg_map(self.parameters.names)
+
+    @cached_property
+    def nominal_legs(self):
+        """Numbers of the legs (3, 5), LEG_COLUMNS, without errors."""
+        return np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
+
+    def inverse(self, position_mm, errors=None, elbow="out"):
+        """Drive angles (n, 3) in rad for positions (n, 3) in mm; NaN where a leg cannot reach (eqs. 5, 6).
+
+        `elbow` is "out" (the robot's assembly), "in", or one of these per leg.
+        """
+        return self.inverse_of_legs(position_mm, self.legs(errors), elbow)
+
+    def inverse_of_legs(self, position_mm, legs, elbow="out"):
+        """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
+        position = points(position_mm)
+        signs = np.array([ELBOW_SIGN[e] for e in ((elbow,) * 3 if isinstance(elbow, str) else elbow)])
+        u, v = self._radial_tangential(position)
+        reach = u + legs[:, 4]
+        d = np.hypot(reach, position[:, 2:])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rho = legs[:, 2] + np.sqrt(legs[:, 3] ** 2 - v**2)
+            cosine = (legs[:, 1] ** 2 + d**2 - rho**2) / (2.0 * legs[:, 1] * d)
+            # beyond the reach arccos gives NaN, which is the mask the callers rely on
+            return np.arctan2(position[:, 2:], reach) + signs * np.arccos(cosine) - legs[:, 0]
+
+    def forward(self, theta_rad, errors=None, guess_mm=None):
+        """Positions (n, 3) in mm of drive angles (n, 3); NaN where Newton does not converge (eq. 8).
+
+        `guess_mm` (n, 3) selects the assembly; without it Newton starts from the lower intersection of three spheres,
+        see `first_guess`.
+        """
+        return self.forward_batch(theta_rad, None if errors is None else np.asarray(errors)[None], guess_mm)[0]
+
+    def forward_batch(self, theta_rad, errors=None, guess_mm=None):
+        """Positions (m, n, 3) in mm of n drive-angle triples under m error vectors (m, p); see `forward`."""
+        legs = self.legs(errors) if errors is not None else self.legs()[None]
+        return self.forward_of_legs(theta_rad, legs, guess_mm)
+
+    def first_guess(self, theta_rad):
+        """Positions (n, 3) in mm of the nominal robot if joints 2 and 3 stood at one point: the lower intersection of
+        three spheres.
+
+        With rho = L2 + L3 on every leg each closure is a sphere about the elbow, shifted by r - R. Where the spheres do
+        not meet, the point nearest to all three is taken.
+        """
+        theta = points(theta_rad)
+        cx, cy = self.turn
+        radial = self.L1_mm * np.cos(theta) - (self.r_mm - self.R_mm)
+        centre = np.stack([radial * cx, radial * cy, self.L1_mm * np.sin(theta)], axis=-1)
+        first, second, third = centre[:, 0], centre[:, 1], centre[:, 2]
+        normal = np.cross(second - first, third - first)
+        area = np.linalg.norm(normal, axis=1, keepdims=True)
+        # the circumcentre of the elbows is as far from each of them
+        b, c = second - first, third - first
+        to_circumcentre = np.cross((b**2).sum(1, keepdims=True) * c - (c**2).sum(1, keepdims=True) * b, normal) / (
+            2.0 * area**2
+        )
+        height = np.sqrt(np.maximum((self.L2_mm + self.L3_mm) ** 2 - (to_circumcentre**2).sum(1, keepdims=True), 0.0))
+        down = np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
+        return first + to_circumcentre + down * normal / area * height
+
+    def forward_of_legs(self, theta_rad, legs, guess_mm=None):
+        """Positions (m, n, 3) in mm of drive angles (n, 3) under m sets of leg numbers (m, 3, 5)."""
+        theta = points(theta_rad)
+        start = self.first_guess(theta) if guess_mm is None else points(guess_mm)
+        solved = kernels.forward(
+            np.ascontiguousarray(legs, dtype=float),
+            self.turn,
+            np.ascontiguousarray(np.cos(theta).T),
+            np.ascontiguousarray(np.sin(theta).T),
+            np.ascontiguousarray(start.T),
+        )
+        return solved.transpose(0, 2, 1)
+
+    def closure(self, position_mm, theta_rad, errors=None):
+        """Left sides (n, 3) of eq. (8) in mm^2, zero where position and drive angles fit."""
+        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.legs(errors))
+        return big_x**2 + big_z**2 - rho**2
+
+    def closure_jacobians(self, position_mm, theta_rad, errors=None):
+        """Derivatives of the closures with respect to the position (n, 3, 3) in mm and to the legs' numbers (n, 3,
+        5).
+        """
+        legs = self.legs(errors)
+        big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
+        cx, cy = self.turn
+        by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
+        arm, forearm = legs[:, 1], legs[:, 3]
+        by_leg = 2.0 * np.stack(
+            [
+                arm * (big_x * np.sin(angle) - big_z * np.cos(angle)),
+                -(big_x * np.cos(angle) + big_z * np.sin(angle)),
+                -rho,
+                -rho * forearm / s,
+                big_x,
+            ],
+            axis=-1,
+        )
+        return by_position, by_leg
+
+    def passive_angles(self, position_mm, theta_rad, errors=None):
+        """Angles (n, 3 legs, 4) of joints 2 to 5 in rad; theta3 = arcsin(v / L3) keeps the sign that eq. (6) loses.
+
+        Joint 4 undoes joint 3 and joint 5 undoes joints 1 and 2, so that the platform does not turn.
+        """
+        legs = self.legs(errors)
+        big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
+        _, v = self._radial_tangential(points(position_mm))
+        plane = np.arctan2(big_z, big_x)
+        second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
+        third = np.arcsin(v / legs[:, 3])
+        return np.stack([second, third, -third, -(angle + second)], axis=-1)
+
+    def couples(self, position_mm, theta_rad, errors=None):
+        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
+
+        b_i = t_i x a_3i, where t_i is the direction of joints 1, 2 and 5 and a_3i that of joints 3 and 4; it points
+        from joint 2 along L2.
+        """
+        passive = self.passive_angles(position_mm, theta_rad, errors)
+        plane = np.asarray(theta_rad, dtype=float) + self.legs(errors)[:, 0] + passive[..., 0]
+        cx, cy = self.turn
+        return np.stack([np.cos(plane) * cx, np.cos(plane) * cy, np.sin(plane)], axis=-1)
+
+    def _radial_tangential(self, position):
+        """Coordinates u and v (n, 3) of the points in the three legs."""
+        cx, cy = self.turn
+        x, y = position[:, :1], position[:, 1:2]
+        return x * cx + y * cy, y * cx - x * cy
+
+    def _chain(self, position_mm, theta_rad, legs):
+        """X, Z, rho v / s, rho, s and the true drive angle of every leg at every point, each (n, 3)."""
+        position = points(position_mm)
+        angle = points(theta_rad) + legs[:, 0]
+        u, v = self._radial_tangential(position)
+        with np.errstate(invalid="ignore"):
+            s = np.sqrt(legs[:, 3] ** 2 - v**2)
+        rho = legs[:, 2] + s
+        big_x = u + legs[:, 4] - legs[:, 1] * np.cos(angle)
+        big_z = position[:, 2:] - legs[:, 1] * np.sin(angle)
+        return big_x, big_z, rho * v / s, rho, s, angle

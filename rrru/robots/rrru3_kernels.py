@@ -1,0 +1,218 @@
+"""Compiled inner loops of the forward kinematics: a population of error vectors times the points of a campaign.
+
+Those of the 3-RRRU come first; their arrays are stored component first, shape (3, n), so that the loop over points is
+the innermost one and vectorises, and `legs` has the columns of `rrru.robots.rrru3.LEG_COLUMNS`. Lengths in mm, angles
+in rad.
+"""
+
+import numba
+import numpy as np
+
+# A Newton step of this size (mm^2, squared) leaves an error far below 1e-9 mm, since convergence is quadratic with a
+# constant of about 1 / (link length): (1e-4)^2 / 100 = 1e-10.
+_LAST_STEP_SQUARED = 1e-8
+_MOST_STEPS = 25
+
+_compiled = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+
+
+@_compiled
+def _newton_step(legs, turn, cosine, sine, position, step_squared):
+    """One Newton step of all points on the three closures (eq. 8), in place; the squared step lengths go to
+    `step_squared`.
+    """
+    n = position.shape[1]
+    cos_delta, sin_delta = np.cos(legs[:, 0]), np.sin(legs[:, 0])
+    arm, offset, forearm_squared, radial = legs[:, 1], legs[:, 2], legs[:, 3] * legs[:, 3], legs[:, 4]
+    cx, cy = turn[0], turn[1]
+    for j in range(n):
+        x, y, z = position[0, j], position[1, j], position[2, j]
+        g00, g01, g02, h0 = _leg_row(
+            x,
+            y,
+            z,
+            cx[0],
+            cy[0],
+            cos_delta[0],
+            sin_delta[0],
+            arm[0],
+            offset[0],
+            forearm_squared[0],
+            radial[0],
+            cosine[0, j],
+            sine[0, j],
+        )
+        g10, g11, g12, h1 = _leg_row(
+            x,
+            y,
+            z,
+            cx[1],
+            cy[1],
+            cos_delta[1],
+            sin_delta[1],
+            arm[1],
+            offset[1],
+            forearm_squared[1],
+            radial[1],
+            cosine[1, j],
+            sine[1, j],
+        )
+        g20, g21, g22, h2 = _leg_row(
+            x,
+            y,
+            z,
+            cx[2],
+            cy[2],
+            cos_delta[2],
+            sin_delta[2],
+            arm[2],
+            offset[2],
+            forearm_squared[2],
+            radial[2],
+            cosine[2, j],
+            sine[2, j],
+        )
+        c0 = g11 * g22 - g12 * g21
+        c1 = g12 * g20 - g10 * g22
+        c2 = g10 * g21 - g11 * g20
+        scale = -1.0 / (g00 * c0 + g01 * c1 + g02 * c2)
+        dx = scale * (h0 * c0 + h1 * (g02 * g21 - g01 * g22) + h2 * (g01 * g12 - g02 * g11))
+        dy = scale * (h0 * c1 + h1 * (g00 * g22 - g02 * g20) + h2 * (g02 * g10 - g00 * g12))
+        dz = scale * (h0 * c2 + h1 * (g01 * g20 - g00 * g21) + h2 * (g00 * g11 - g01 * g10))
+        position[0, j] = x + dx
+        position[1, j] = y + dy
+        position[2, j] = z + dz
+        step_squared[j] = dx * dx + dy * dy + dz * dz
+
+
+@numba.njit(inline="always", error_model="numpy", fastmath={"contract"})
+def _leg_row(x, y, z, cx, cy, cos_delta, sin_delta, arm, offset, forearm_squared, radial, cosine, sine):
+    """Half the closure's gradient with respect to x, y, z and half the closure itself, for one leg at one point."""
+    v = cx * y - cy * x
+    s = np.sqrt(forearm_squared - v * v)
+    rho = offset + s
+    big_x = cx * x + cy * y + radial - arm * (cosine * cos_delta - sine * sin_delta)
+    big_z = z - arm * (sine * cos_delta + cosine * sin_delta)
+    side = rho * v / s
+    return (
+        big_x * cx - side * cy,
+        big_x * cy + side * cx,
+        big_z,
+        0.5 * (big_x * big_x + big_z * big_z - rho * rho),
+    )
+
+
+@_compiled
+def _solve(legs, turn, cosine, sine, position, step_squared):
+    """Newton iteration of all points, in place, until the longest step is negligible; points that do not converge
+    become NaN.
+    """
+    n = position.shape[1]
+    for iteration in range(_MOST_STEPS):
+        _newton_step(legs, turn, cosine, sine, position, step_squared)
+        if iteration == 0:
+            continue
+        converged = True
+        for j in range(n):
+            # a NaN has left the reach and stays NaN; it must not keep the others iterating
+            if step_squared[j] > _LAST_STEP_SQUARED:
+                converged = False
+        if converged:
+            return
+    for j in range(n):
+        if step_squared[j] > _LAST_STEP_SQUARED:
+            position[:, j] = np.nan
+
+
+@_compiled
+def forward(legs, turn, cosine, sine, start):
+    """Positions of n drive-angle triples under m sets of leg numbers.
+
+    legs: (m, 3, 5); turn: (2, 3) cosine and sine of the azimuths; cosine, sine: (3, n) of the drive angles; start: (3,
+    n) first guess. Returns (m, 3, n), NaN where Newton did not converge.
+    """
+    m, n = legs.shape[0], start.shape[1]
+    result = np.empty((m, 3, n))
+    step_squared = np.empty(n)
+    for k in range(m):
+        result[k] = start
+        _solve(legs[k], turn, cosine, sine, result[k], step_squared)
+    return result
+
+
+@_compiled
+def mean_distance(errors, legs, turn, cosine, sine, start, slope, measured):
+    """Mean distance between model and measured positions (eq. 11) for m error vectors.
+
+    errors: (m, p); legs: (m, 3, 5), the same errors applied to the legs; start: (3, n) positions without errors; slope:
+    (p, 3, n) derivative of the position with respect to each error, used for the first guess; measured: (3, n). Returns
+    (m,), inf where a point left the reach.
+    """
+    m, n = legs.shape[0], start.shape[1]
+    position = np.empty((3, n))
+    work = np.empty(n)
+    result = np.empty(m)
+    for k in range(m):
+        for axis in range(3):
+            for j in range(n):
+                position[axis, j] = start[axis, j]
+            for q in range(slope.shape[0]):
+                error = errors[k, q]
+                for j in range(n):
+                    position[axis, j] += error * slope[q, axis, j]
+        _solve(legs[k], turn, cosine, sine, position, work)
+        for j in range(n):
+            dx = position[0, j] - measured[0, j]
+            dy = position[1, j] - measured[1, j]
+            dz = position[2, j] - measured[2, j]
+            work[j] = np.sqrt(dx * dx + dy * dy + dz * dz)
+        total = 0.0
+        for j in range(n):
+            total += work[j]
+        result[k] = total / n if np.isfinite(total) else np.inf
+    return result
+
+
+@_compiled
+def tripod_mean_distance(ends, radii, measured):
+    """Mean distance (m,) in mm between measured points (n, 3) and the lower intersections of three spheres; inf where
+    there are none.
+
+    ends: (m, n, 3 spheres, 3) centres, radii: (m, 3), both in mm; as `rrru.robots.spheres.lower_intersection`.
+    """
+    m, n = ends.shape[0], ends.shape[1]
+    result = np.empty(m)
+    along, rest, normal = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(m):
+        total = 0.0
+        first, second, third = radii[i, 0] ** 2, radii[i, 1] ** 2, radii[i, 2] ** 2
+        for j in range(n):
+            d = u = h = 0.0
+            for k in range(3):
+                along[k] = ends[i, j, 1, k] - ends[i, j, 0, k]
+                d += along[k] * along[k]
+            d = np.sqrt(d)
+            for k in range(3):
+                along[k] /= d
+                u += (ends[i, j, 2, k] - ends[i, j, 0, k]) * along[k]
+            for k in range(3):
+                rest[k] = ends[i, j, 2, k] - ends[i, j, 0, k] - u * along[k]
+                h += rest[k] * rest[k]
+            h = np.sqrt(h)
+            x = (d * d + first - second) / (2.0 * d)
+            y = (u * u + h * h + first - third - 2.0 * u * x) / (2.0 * h)
+            height = np.sqrt(first - x * x - y * y)
+            for k in range(3):
+                rest[k] /= h
+            normal[0] = along[1] * rest[2] - along[2] * rest[1]
+            normal[1] = along[2] * rest[0] - along[0] * rest[2]
+            normal[2] = along[0] * rest[1] - along[1] * rest[0]
+            if normal[2] > 0.0:
+                height = -height
+            square = 0.0
+            for k in range(3):
+                off = ends[i, j, 0, k] + x * along[k] + y * rest[k] + height * normal[k] - measured[j, k]
+                square += off * off
+            total += np.sqrt(square)
+        result[i] = total / n if np.isfinite(total) else np.inf
+    return result

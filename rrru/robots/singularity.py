@@ -1,0 +1,43 @@
+"""How far a mechanism is from its two kinds of singularity.
+
+A locked drive lets leg i move the platform only across g_i, the unit gradient of its closure, and keeps it from turning
+about b_i, the mechanism's `couples`. The rows g_i make the translational measure, the rows b_i the constraint measure:
+each is the smallest singular value of a matrix of three unit rows, 0 at a singularity and 1 at best. The closures of a
+platform that only translates do not see the second kind.
+"""
+
+import numpy as np
+
+
+def leg_forces(mechanism, position_mm, actuators, errors=None):
+    """Unit directions (n, 3 legs, 3) in which each leg pushes the platform: rows of the normalised closure Jacobian."""
+    gradient, _ = mechanism.closure_jacobians(position_mm, actuators, errors)
+    return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+
+
+def translational_measure(mechanism, position_mm, actuators, errors=None):
+    """Smallest singular value (n,) of the three unit force directions; 0 where the platform can move with all drives
+    locked.
+    """
+    return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, errors))
+
+
+def constraint_measure(mechanism, position_mm, actuators, errors=None):
+    """Smallest singular value (n,) of the three unit couple directions; 0 where the platform can turn with all drives
+    locked.
+    """
+    return _smallest_singular_value(mechanism.couples(position_mm, actuators, errors))
+
+
+def constraint_determinant(mechanism, position_mm, actuators, errors=None):
+    """Determinant (n,) of the couple directions; its sign changes across a constraint singularity."""
+    return np.linalg.det(mechanism.couples(position_mm, actuators, errors))
+
+
+def _smallest_singular_value(matrices):
+    """Smallest singular value (n,) of (n, 3, 3) matrices, NaN where the pose cannot be reached."""
+    result = np.full(len(matrices), np.nan)
+    fine = np.isfinite(matrices).all(axis=(1, 2))
+    if fine.any():
+        result[fine] = np.linalg.svd(matrices[fine], compute_uv=False)[:, -1]
+    return result

@@ -1,0 +1,37 @@
+"""Slices of the reachable workspace with both singularity measures. Lengths in mm."""
+
+import numpy as np
+
+from rrru.robots import singularity
+
+PLANES = {"xz": (0, 2, 1), "xy": (0, 1, 2)}
+
+
+def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
+    """Regular grid (n, 3) in a plane: "xz" at a y, or "xy" at a z; the ranges (low, high) are of the plane's first and
+    second axis.
+    """
+    first, second, fixed = PLANES[plane]
+    grid_a, grid_b = np.meshgrid(
+        np.arange(horizontal_mm[0], horizontal_mm[1] + 0.5 * step_mm, step_mm),
+        np.arange(vertical_mm[0], vertical_mm[1] + 0.5 * step_mm, step_mm),
+        indexing="ij",
+    )
+    points = np.empty((grid_a.size, 3))
+    points[:, first], points[:, second], points[:, fixed] = grid_a.ravel(), grid_b.ravel(), at_mm
+    return points
+
+
+def measures(mechanism, points_mm):
+    """Reachable (n,), translational and constraint measure (n,) and constraint determinant (n,), NaN where out of
+    reach.
+    """
+    theta = mechanism.inverse(points_mm)
+    # of the poses that these actuator values allow, the robot takes the one of its own assembly
+    reachable = np.linalg.norm(mechanism.forward(theta, guess_mm=points_mm) - points_mm, axis=1) < 1e-6
+    result = np.full((3, len(points_mm)), np.nan)
+    inside = points_mm[reachable]
+    result[0, reachable] = singularity.translational_measure(mechanism, inside, theta[reachable])
+    result[1, reachable] = singularity.constraint_measure(mechanism, inside, theta[reachable])
+    result[2, reachable] = singularity.constraint_determinant(mechanism, inside, theta[reachable])
+    return reachable, *result

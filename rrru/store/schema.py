@@ -1,0 +1,80 @@
+"""What a schema is made of, and the columns that many tables share."""
+
+from dataclasses import dataclass
+
+import pandera.pandas as pa
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: name with its unit, kind (int64, float64, str, bool), meaning; `allowed` lists the values of a closed
+    set.
+    """
+
+    name: str
+    kind: str
+    description: str
+    nullable: bool = False
+    allowed: tuple = ()
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table: where it lies below results/, what a row is, its columns and the columns that name a row."""
+
+    name: str
+    path: str
+    description: str
+    columns: tuple[Column, ...]
+    key: tuple[str, ...]
+
+    def pandera(self):
+        """Pandera schema: exactly these columns, typed, null only where allowed, key unique."""
+        return pa.DataFrameSchema(
+            {
+                column.name: pa.Column(
+                    column.kind,
+                    checks=[pa.Check.isin(column.allowed)] if column.allowed else None,
+                    nullable=column.nullable,
+                )
+                for column in self.columns
+            },
+            strict=True,
+            coerce=True,
+            unique=list(self.key) or None,
+        )
+
+
+def xyz(prefix, suffix, text, nullable=False):
+    """Three columns for the axes."""
+    return tuple(Column(f"{prefix}_{axis}_{suffix}", "float64", f"{text}, {axis}", nullable) for axis in "xyz")
+
+
+CAMPAIGN = Column("campaign", "str", "name of the campaign in the configuration")
+CALIBRATION = Column("calibration", "str", "set of trajectories that was calibrated on; none before any calibration")
+METHOD = Column(
+    "method",
+    "str",
+    "how: least_squares, least_mean_distance (the optimum of the paper's objective), genetic; none before",
+)
+MODE = Column(
+    "mode",
+    "str",
+    "before: measured minus commanded; model: measured minus calibrated model; closed_loop: driven again with corrected commands",
+    allowed=("before", "model", "closed_loop"),
+)
+NUMBER = "float64"
+
+SETTING = (
+    Column("parameter", "str", "swept setting", allowed=("crossover_fraction", "migration_fraction")),
+    Column("population", "str", "one population, or islands", allowed=("one", "islands")),
+    Column("value", NUMBER, "value of the setting"),
+)
+HISTORY = (
+    Column("seed", "int64", "number of the run"),
+    Column("generation", "int64", "0: initial population"),
+    Column("best_mm", NUMBER, "lowest mean distance so far"),
+    Column("mean_mm", NUMBER, "mean over the population; infinite where a member is out of reach"),
+)
+
+STATUS = ("ok", "outlier", "near_singularity", "unsolved")

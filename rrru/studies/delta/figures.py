@@ -1,0 +1,207 @@
+"""The Delta's zero calibration by vision: what the camera sees, errors on the plane, and what the variants can tell."""
+
+import numpy as np
+from matplotlib.colors import Normalize
+from matplotlib.lines import Line2D
+
+from rrru.errors import ConfigError
+from rrru.figures import style
+
+_NAMES = {
+    "none": "before",
+    "paper": "distances, one step (paper)",
+    "converged": "distances",
+    "two_heights": "distances, two heights",
+    "shape": "shape",
+    "shape_two_heights": "shape, two heights",
+    "one_rotation": "one rotation: distances",
+    "one_rotation_two_heights": "one rotation: two heights",
+    "one_rotation_shape": "one rotation: shape",
+    "true_centres": "true centres: distances",
+    "true_centres_two_heights": "true centres: two heights",
+    "tracker_heights": "tracker: heights",
+    "tracker_positions": "tracker: positions",
+}
+_COMMON = {"color": style.BLUE, "marker": "s", "linestyle": "none"}
+_DIFFERENTIAL = {"color": style.VERMILION, "marker": "o", "markerfacecolor": "white", "linestyle": "none"}
+_MEAN = {"color": style.BLUE, "marker": "s", "linestyle": "none"}
+_MAX = {"color": style.BLACK, "marker": "|", "markersize": 6.0, "linestyle": "none"}
+_DRAWS = {"color": style.BLUE, "alpha": 0.3, "linewidth": 4.5}
+_FOUND = {"color": style.ORANGE, "marker": "+", "markersize": 4.0, "linestyle": "none"}
+
+
+@style.printed
+def delta_images(tables, options):
+    """(a) The first pose's image with the dots found; (b) the target as seen, and the optical centres with their
+    errors.
+    """
+    dots, poses = _rows(tables, "delta_dots", "delta_images"), _rows(tables, "delta_poses", "delta_images")
+    figure = style.new(style.DOUBLE_MM, 80.0)
+    image, plate = figure.subplots(1, 2, width_ratios=[1.0, 1.0])
+    picture = tables["delta_picture"].pivot(index="y_px", columns="x_px", values="grey").to_numpy()
+    first = dots[dots["pose"] == dots["pose"].min()]
+    image.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="none")
+    image.plot(first["x_px"], first["y_px"], **_FOUND, label="dot found")
+    image.set(xlabel="column (pixel)", ylabel="row (pixel)")
+    image.set_title(f"(a) image of pose {first['pose'].iloc[0]}, {len(first)} dots")
+    _plate(plate, dots, first, poses, tables["delta_centres"])
+    style.legend_above(figure, [image, plate], columns=3)
+    return figure
+
+
+def _plate(axes, dots, first, poses, centres):
+    """The dots that were seen, numbered in pitches, and the centres with magnified errors."""
+    pitch = _pitch(dots, centres)
+    seen = dots.drop_duplicates(["column", "row"])
+    axes.plot(
+        pitch * seen["column"], pitch * seen["row"], ".", color="#bbbbbb", markersize=1.6, label="dot seen in any image"
+    )
+    axes.plot(
+        pitch * first["column"], pitch * first["row"], ".", color=style.ORANGE, markersize=1.6, label="dot seen in (a)"
+    )
+    place = centres[["centre_x_mm", "centre_y_mm"]].to_numpy()
+    error = poses[["error_x_mm", "error_y_mm"]].to_numpy()
+    factor = style.magnification(np.linalg.norm(error, axis=1), np.ptp(place, axis=0).max(), 0.12)
+    for plane, look in (
+        ("first", {"color": style.BLUE, "marker": "o"}),
+        ("second", {"color": style.BLACK, "marker": "^"}),
+    ):
+        rows = (centres["plane"] == plane).to_numpy()
+        if rows.any():
+            axes.plot(
+                *place[rows].T,
+                linestyle="none",
+                markerfacecolor="white",
+                label=f"optical centre, {plane} height",
+                **look,
+            )
+            axes.quiver(
+                *place[rows].T,
+                *error[rows].T,
+                color=look["color"],
+                angles="xy",
+                scale_units="xy",
+                scale=1.0 / factor,
+                width=0.004,
+            )
+    axes.set(xlabel="x of the target (mm)", ylabel="y of the target (mm)", aspect="equal")
+    axes.set_title(f"(b) target; errors magnified {factor:g} times")
+
+
+def _pitch(dots, centres):
+    """Pitch of the dots in mm: what the optical centre moves over what the middle of the seen dots does, on the longest
+    way.
+    """
+    middle = dots.groupby("pose")[["column", "row"]].mean().to_numpy()
+    place = centres.sort_values("pose")[["centre_x_mm", "centre_y_mm"]].to_numpy()
+    far = np.linalg.norm(place - place[0], axis=1).argmax()
+    return float(np.rint(np.linalg.norm(place[far] - place[0]) / np.linalg.norm(middle[far] - middle[0])))
+
+
+@style.printed
+def delta_errors(tables, options):
+    """Maps of the errors before and after the paper's calibration, and what every variant leaves, in other draws
+    too.
+    """
+    points, calibrations = (
+        _rows(tables, "delta_points", "delta_errors"),
+        _rows(tables, "delta_calibrations", "delta_errors"),
+    )
+    draws = _rows(tables, "delta_draws", "delta_errors").set_index("variant").reindex(calibrations["variant"])
+    figure = style.new(style.DOUBLE_MM, 92.0 + 4.6 * len(calibrations))
+    grid = figure.add_gridspec(2, 1, height_ratios=[78.0, 10.0 + 4.6 * len(calibrations)])
+    upper, lower = grid[0].subgridspec(1, 2), grid[1].subgridspec(1, 2)
+    for place, (variant, title) in enumerate((("none", "before"), ("paper", "after the paper's calibration"))):
+        rows = points[points["variant"] == variant]
+        if rows.empty:
+            raise ConfigError(f"delta_errors: table delta_points has no variant {variant!r}")
+        _map(figure.add_subplot(upper[place]), rows, f"({'ab'[place]}) {title}")
+    left = figure.add_subplot(lower[0])
+    right = figure.add_subplot(lower[1], sharey=left)
+    _sizes(left, calibrations, draws, "plane", "(c) calibration frame")
+    _sizes(right, calibrations, draws, "base", "(d) frame of the base")
+    right.tick_params(labelleft=False)
+    left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.06), ncols=3, borderaxespad=0.2)
+    return figure
+
+
+def _map(axes, rows, title):
+    """Size of the error as colour, its part in the plane as arrows; mean and largest in the title."""
+    x, y, size = (rows[column].to_numpy() for column in ("command_x_mm", "command_y_mm", "error_mm"))
+    flat = rows[["error_x_mm", "error_y_mm"]].to_numpy()
+    factor = style.magnification(np.linalg.norm(flat, axis=1), np.ptp(x), 0.12)
+    side = np.sort(np.unique(x))
+    marks = axes.scatter(
+        x, y, c=size, s=46.0, marker="s", cmap=style.SEQUENTIAL, norm=Normalize(0.0, size.max()), linewidths=0.0
+    )
+    axes.quiver(x, y, *flat.T, angles="xy", scale_units="xy", scale=1.0 / factor, width=0.003, color="black")
+    room = 0.08 * np.ptp(side)
+    axes.set(xlim=(side[0] - room, side[-1] + room), ylim=(side[0] - room, side[-1] + room), aspect="equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    axes.set_title(f"{title}\nmean {size.mean():.3f} mm, largest {size.max():.3f} mm")
+    bar = axes.figure.colorbar(marks, ax=axes, location="bottom", aspect=40, fraction=0.05)
+    bar.set_label(f"error (mm); arrows magnified {factor:g} times")
+
+
+def _sizes(axes, calibrations, draws, frame, title):
+    """Mean and largest error of every variant in a frame, and the mean's range over draws."""
+    rows = np.arange(len(calibrations))
+    low, high = (draws[f"{frame}_mean_{side}_mm"].to_numpy() for side in ("low", "high"))
+    axes.hlines(rows, low, high, **_DRAWS, label=f"mean in {draws['draws'].max():g} draws, 5 to 95 %")
+    axes.hlines(rows, calibrations[f"{frame}_mean_mm"], calibrations[f"{frame}_max_mm"], color="#bbbbbb", linewidth=0.9)
+    axes.plot(calibrations[f"{frame}_mean_mm"], rows, **_MEAN, label="mean")
+    axes.plot(calibrations[f"{frame}_max_mm"], rows, **_MAX, label="largest")
+    axes.set_yticks(rows, [_NAMES.get(name, name) for name in calibrations["variant"]])
+    right = max(calibrations[f"{frame}_max_mm"].max(), np.nanmax(high))
+    axes.set(xlim=(0.0, 1.08 * right), ylim=(len(rows) - 0.5, -0.5), xlabel="error on the plane (mm)")
+    axes.set_ylabel("variant" if frame == "plane" else "")
+    axes.tick_params(axis="y", length=0.0)
+    axes.set_title(title)
+    axes.grid(True, axis="x")
+
+
+@style.printed
+def delta_observability(tables, options):
+    """Singular values, standard errors and the gain of length errors of the common and the differential
+    combinations.
+    """
+    rows = _rows(tables, "delta_observability", "delta_observability")
+    names = list(dict.fromkeys(rows["variant"]))
+    figure = style.new(style.DOUBLE_MM, 24.0 + 5.4 * len(names))
+    panels = figure.subplots(1, 3, sharey=True)
+    columns = {
+        "singular_value": ("(a) seen", "singular value (mm/mm)", 1.0),
+        "standard_error_rad": ("(b) uncertainty", "standard error (mrad)", 1e3),
+        "per_length_rad_mm": ("(c) length errors", "error per length (mrad/mm)", 1e3),
+    }
+    for axes, (column, (title, label, factor)) in zip(panels, columns.items(), strict=True):
+        for place, name in enumerate(names):
+            part = rows[rows["variant"] == name]
+            axes.hlines(place, *(factor * part[column].agg(["min", "max"])), color="#bbbbbb", linewidth=0.9)
+            for kind, look in (("common", _COMMON), ("differential", _DIFFERENTIAL)):
+                values = factor * part.loc[part["kind"] == kind, column]
+                axes.plot(values, np.full(len(values), place), **look)
+        axes.set(ylim=(len(names) - 0.5, -0.5), xlabel=label)
+        if column == "per_length_rad_mm":
+            axes.set_xlim(left=0.0)
+        else:
+            axes.set_xscale("log")
+            style.plain_log(axes.xaxis)
+        axes.tick_params(axis="y", length=0.0)
+        axes.set_title(title)
+        axes.grid(True, axis="x")
+    panels[0].set_yticks(range(len(names)), [_NAMES.get(name, name) for name in names])
+    panels[0].set_ylabel("variant")
+    handles = [
+        Line2D([], [], **_COMMON, label="all drives alike (common)"),
+        Line2D([], [], **_DIFFERENTIAL, label="differential"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    return figure
+
+
+def _rows(tables, name, figure):
+    """A table; raises ConfigError where it is empty."""
+    if tables[name].empty:
+        raise ConfigError(f"{figure}: table {name} is empty")
+    return tables[name]

@@ -1,0 +1,127 @@
+"""The Delta of the vision study: its twin, where it is sent, and the tracker's errors on the plane. Lengths in mm,
+angles in rad.
+
+Errors are counted in two frames. The paper's calibration frame o-xyz (1.1) is laid out by driving the robot: origin
+where it stands at the command (0, 0, 0), x axis towards where it goes for x, y in the plane of where it goes for y.
+ASSUME it is laid out anew before and after the calibration. The other is the frame of the robot's base, which a tracker
+knows from the drive axes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.plant.tracker import measure
+from rrru.robots.delta import Delta
+from rrru.robots.protocol import make_mechanism
+from rrru.seeds import stream
+
+
+@dataclass(frozen=True)
+class DeltaTwin:
+    """A virtual Delta and its tasks.
+
+    mechanism: what the controller believes, its parameters are the drives' zero errors; truth: the same robot with
+    every leg's lengths as parameters, errors (12,) the true ones; plane_mm (n, 3): where errors are counted; axes_mm
+    (3, 3): commands that lay out the calibration frame; tracker_noise_mm: 1 sigma per axis; labels: which repetition of
+    the study this is, every one has its own noise.
+    """
+
+    mechanism: Delta
+    truth: Delta
+    errors: np.ndarray
+    plane_mm: np.ndarray
+    axes_mm: np.ndarray
+    tracker_noise_mm: float
+    seed: int
+    labels: tuple = ()
+
+    @property
+    def zero_errors_rad(self):
+        """The drives' true zero errors (3,)."""
+        return self.errors[:3]
+
+    def generator(self, *labels):
+        """Random stream of the study for a purpose."""
+        return stream(self.seed, "delta", *self.labels, *labels)
+
+    def positions(self, actuators):
+        """Where the robot really stands (n, 3) in the base frame for the drive angles (n, 3) that its controller
+        commands.
+        """
+        return self.truth.forward(actuators, self.errors)
+
+    def drive(self, command_mm, found=None):
+        """Where the robot really goes (n, 3) for commands (n, 3) when the zero errors `found` (3,) are fed back, base
+        frame.
+        """
+        return self.positions(self.mechanism.require_reachable(command_mm, found))
+
+    def plane_errors(self, found, generator):
+        """Errors (n, 3) on the plane in the calibration frame and in the base frame, as a tracker measures them; see
+        `drive`.
+        """
+        command = np.concatenate([self.axes_mm, self.plane_mm])
+        measured = measure(self.drive(command, found), self.tracker_noise_mm, generator)
+        own = in_own_frame(measured[:3], measured[3:])
+        return own - self.plane_mm, measured[3:] - self.plane_mm
+
+
+def twin(config):
+    """The twin of the configuration's `delta` section; raises ConfigError where the robot cannot go where the section
+    sends it.
+    """
+    section = config["delta"]
+    mechanism, truth = (
+        make_mechanism("delta", config["robots"]["delta"], errors=errors) for errors in ("zero", "legs")
+    )
+    plane = section["plane"]
+    found = DeltaTwin(
+        mechanism,
+        truth,
+        truth.parameters.vector(section["errors"]),
+        disc(plane["radius_mm"], plane["step_mm"], plane["z_mm"]),
+        plane["z_mm"] * np.array([0.0, 0.0, 1.0])
+        + plane["radius_mm"] * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+        section["tracker_noise_mm"],
+        config["seed"],
+    )
+    for key, command in (("plane", found.plane_mm), ("poses", pose_commands(section)[1])):
+        if not np.isfinite(found.positions(mechanism.inverse(command))).all():
+            raise ConfigError(f"delta.{key}: a point is out of the robot's reach")
+    return found
+
+
+def disc(radius_mm, step_mm, z_mm):
+    """Points (n, 3) of a square grid within a circle about the origin of a horizontal plane."""
+    side = step_mm * np.arange(-np.floor(radius_mm / step_mm), np.floor(radius_mm / step_mm) + 1.0)
+    y, x = (axis.ravel() for axis in np.meshgrid(side, side, indexing="ij"))
+    inside = np.hypot(x, y) <= radius_mm * (1.0 + 1e-9)
+    return np.column_stack([x, y, np.full(len(x), z_mm)])[inside]
+
+
+def pose_commands(section):
+    """Planes' names (n,) and commands (n, 3) of every pose that is photographed, in the order driven.
+
+    The paper's poses, spread evenly over its plane ("first"), row by row to and fro so that steps are short; then every
+    other of them on a second height ("second").
+    """
+    poses = section["poses"]
+    columns, rows = poses["counts"]
+    x, y = (np.linspace(-half, half, count) for half, count in zip(poses["half_mm"], poses["counts"], strict=True))
+    order = [(c if r % 2 == 0 else columns - 1 - c, r) for r in range(rows) for c in range(columns)]
+    first = np.array([[x[c], y[r], poses["z_mm"]] for c, r in order])
+    # backwards, so that the step between the planes is short too
+    second = first[::-2] + np.array([0.0, 0.0, poses["second_z_mm"] - poses["z_mm"]])
+    return np.repeat(["first", "second"], [len(first), len(second)]), np.concatenate([first, second])
+
+
+def in_own_frame(axes_mm, places_mm):
+    """Places (n, 3) in the frame of three places (3, 3): its origin, one on its x axis, one in its xy plane on the side
+    of y.
+    """
+    x = axes_mm[1] - axes_mm[0]
+    z = np.cross(x, axes_mm[2] - axes_mm[0])
+    frame = np.array([x, np.cross(z, x), z])
+    return (places_mm - axes_mm[0]) @ (frame / np.linalg.norm(frame, axis=1, keepdims=True)).T

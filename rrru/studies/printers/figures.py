@@ -1,0 +1,87 @@
+"""Linear-delta printers on one page: whose saved answer belongs to its readings, what is left, and how well arms are
+known.
+"""
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.figures import style
+
+_VERDICTS = {
+    "reproduced": {"color": style.BLUE, "marker": "o"},
+    "does not belong": {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white"},
+}
+_HEIGHT = {"color": style.BLUE, "marker": "o"}
+_DISTANCE = {"color": style.ORANGE, "marker": "^"}
+# share of a decade
+_MARGIN = 0.1
+_ROW_MM, _AROUND_MM, _HIGHEST_MM = 4.4, 34.0, 238.0
+
+
+@style.printed
+def printers(tables, options):
+    """One row per printer: (a) largest difference to the saved answer, (b) residuals under both answers, (c) standard
+    error of arms.
+    """
+    frame = tables["printers"]
+    frame = frame[frame["verdict"].isin(_VERDICTS)].reset_index(drop=True)
+    if frame.empty:
+        raise ConfigError("printers: table printers has no printer that could be fitted")
+    figure = style.new(style.DOUBLE_MM, min(_ROW_MM * len(frame) + _AROUND_MM, _HIGHEST_MM))
+    panels = figure.subplots(1, 3, sharey=True)
+    for axes, draw in zip(panels, (_differences, _residuals, _arms), strict=True):
+        draw(axes, frame, np.arange(len(frame)))
+        axes.set_xscale("log")
+        axes.set_xlim(*_decades(axes.dataLim.minposx, axes.dataLim.x1))
+        style.plain_log(axes.xaxis)
+        axes.grid(True)
+    panels[0].set_yticks(range(len(frame)), frame["printer"])
+    panels[0].set(ylim=(len(frame) - 0.5, -0.5), ylabel="printer")
+    style.legend_above(figure, panels, columns=4)
+    return figure
+
+
+def _decades(low, high):
+    """Limits of a log axis at whole decades, off the data by a margin, so that few data have two labelled ticks too."""
+    return 10.0 ** np.floor(np.log10(low) - _MARGIN), 10.0 ** np.ceil(np.log10(high) + _MARGIN)
+
+
+def _differences(axes, frame, rows):
+    """Largest difference between saved and own numbers, by verdict."""
+    for verdict, look in _VERDICTS.items():
+        chosen = (frame["verdict"] == verdict).to_numpy()
+        axes.plot(
+            frame["largest_difference"][chosen], rows[chosen], linestyle="none", label=f"answer {verdict}", **look
+        )
+    axes.set(xlabel="largest difference (mm) or (deg)")
+    axes.set_title("(a) saved answer less ours")
+
+
+def _residuals(axes, frame, rows):
+    """Rms residuals of heights and distances, ours filled, the saved answer's open."""
+    for kind, look in (("height", _HEIGHT), ("distance", _DISTANCE)):
+        axes.plot(
+            frame[f"{kind}_rms_there_mm"],
+            rows,
+            linestyle="none",
+            label=f"{kind}s, saved",
+            **look | {"markerfacecolor": "white", "markersize": 4.5},
+        )
+        axes.plot(frame[f"{kind}_rms_here_mm"], rows, linestyle="none", label=f"{kind}s, ours", **look)
+    axes.set(xlabel="rms residual (mm)")
+    axes.set_title("(b) what is left")
+
+
+def _arms(axes, frame, rows):
+    """Standard error of the arms: calibrated with distances, and of their common length if its heights, or 100, had to
+    give it.
+    """
+    columns = (
+        ("arm_standard_error_mm", "an arm, with distances", {"color": style.ORANGE, "marker": "s"}),
+        ("common_arm_standard_error_mm", "all arms, heights alone", {"color": style.BLUE, "marker": "s"}),
+        ("dense_common_arm_standard_error_mm", "all arms, 100 heights", {"color": style.BLUE, "marker": "v"}),
+    )
+    for column, label, look in columns:
+        axes.plot(frame[column], rows, linestyle="none", label=label, markerfacecolor="white", **look)
+    axes.set(xlabel="standard error (mm)")
+    axes.set_title("(c) how well arms are known")

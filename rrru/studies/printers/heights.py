@@ -1,0 +1,99 @@
+"""Heights and distances as measurements of a calibration: what a probe and calipers see of a robot, one number per
+reading.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.errors import FitError
+
+
+@dataclass(frozen=True)
+class HeightResiduals:
+    """Readings of a robot without points: heights of its platform, and distances between two of its places.
+
+    mechanism: its `parameters` are fitted. height_actuators (n, 3) with height_mm (n,); distance_actuators (m, 2, 3)
+    with distance_mm (m,). height_weight: what a squared height counts against a squared distance. Fits
+    `rrru.fit.least_squares`, with one axis instead of three. Raises FitError where a number is not finite or the
+    nominal robot cannot take a place.
+    """
+
+    mechanism: object
+    height_actuators: np.ndarray
+    height_mm: np.ndarray
+    distance_actuators: np.ndarray
+    distance_mm: np.ndarray
+    height_weight: float = 1.0
+
+    def __post_init__(self):
+        if not np.isfinite(np.concatenate([self.height_mm, self.distance_mm])).all():
+            raise FitError("a height or a distance is not finite")
+        lost = np.flatnonzero(~np.isfinite(self.predicted_mm(self.mechanism.parameters.nominal)))
+        if lost.size:
+            raise FitError(
+                f"the nominal robot cannot take {lost.size} of {len(self)} readings' places, the first is reading {lost[0] + 1}"
+            )
+
+    def __len__(self):
+        return len(self.height_mm) + len(self.distance_mm)
+
+    @property
+    def measured_mm(self):
+        """Readings (n + m,): the heights, then the distances."""
+        return np.concatenate([self.height_mm, self.distance_mm])
+
+    @property
+    def root_weight(self):
+        """Factor (n + m,) of every reading's residual."""
+        return np.concatenate(
+            [np.full(len(self.height_mm), np.sqrt(self.height_weight)), np.ones(len(self.distance_mm))]
+        )
+
+    @property
+    def actuators(self):
+        """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
+        return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
+
+    def predicted_mm(self, errors):
+        """Readings (n + m,) of the robot under errors (p,)."""
+        return self._of_places(self.mechanism.forward(self.actuators, errors))[0]
+
+    def gradient(self, errors):
+        """Derivative (n + m, n + 2 m, 3) of the readings by the places at which the robot stands under errors (p,)."""
+        return self._of_places(self.mechanism.forward(self.actuators, errors))[1]
+
+    def residual(self, errors):
+        """Measured less predicted readings times the roots of their weights, (n + m, 1), under errors (p,)."""
+        return (self.root_weight * (self.measured_mm - self.predicted_mm(errors)))[:, None]
+
+    def jacobian(self, errors):
+        """Derivative (n + m, 1, p) of the residual by the errors."""
+        places = self.mechanism.forward(self.actuators, errors)
+        moved = self.mechanism.error_jacobian(places, self.actuators, errors)
+        return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self._of_places(places)[1], moved)[:, None]
+
+    def without(self, reading):
+        """The same residuals less one reading, counted from 0 over the heights and then the distances."""
+        heights = np.delete(np.arange(len(self.height_mm)), [reading] if reading < len(self.height_mm) else [])
+        left = reading - len(self.height_mm)
+        distances = np.delete(np.arange(len(self.distance_mm)), [left] if left >= 0 else [])
+        return HeightResiduals(
+            self.mechanism,
+            self.height_actuators[heights],
+            self.height_mm[heights],
+            self.distance_actuators[distances],
+            self.distance_mm[distances],
+            self.height_weight,
+        )
+
+    def _of_places(self, places):
+        """Readings (n + m,) of places (n + 2 m, 3), and their derivative (n + m, n + 2 m, 3)."""
+        n, m = len(self.height_mm), len(self.distance_mm)
+        between = places[n : n + m] - places[n + m :]
+        length = np.linalg.norm(between, axis=1)
+        slope = np.zeros((n + m, n + 2 * m, 3))
+        slope[np.arange(n), np.arange(n), 2] = 1.0
+        pairs = np.arange(n, n + m)
+        slope[pairs, pairs], slope[pairs, pairs + m] = between / length[:, None], -between / length[:, None]
+        return np.concatenate([places[:n, 2], length]), slope

@@ -1,0 +1,98 @@
+"""Figures of paper B's experiments along the curve: path, errors before and after, what the network leaves."""
+
+import numpy as np
+
+from rrru.figures import style
+
+AXES = "xyz"
+_BEFORE = {"color": style.BLACK, "linewidth": 0.8, "linestyle": (0, (3, 1))}
+_AFTER = {"color": style.BLUE, "linewidth": 0.9}
+_COLOURS = dict(zip(AXES, (style.BLUE, style.VERMILION, style.GREY), strict=True))
+_TEST = {"linestyle": "none", "marker": "o", "markersize": 2.4, "markerfacecolor": "white"}
+
+
+def experiments(frame):
+    """Names of the experiments of a table in order, with the rows of each."""
+    return [(name, rows.sort_values("point")) for name, rows in frame.groupby("experiment", sort=True)]
+
+
+def columns(rows, prefix):
+    """Three columns (n, 3) of a part of `ptt_points`."""
+    return rows[[f"{prefix}_{axis}_mm" for axis in AXES]].to_numpy()
+
+
+@style.printed
+def ptt_path(tables, options):
+    """Every experiment's curve from above and its height: commanded, measured before and after compensation, deviations
+    magnified.
+    """
+    parts = experiments(tables["ptt_points"])
+    figure = style.new(style.DOUBLE_MM, 88.0)
+    panels = figure.subplots(2, len(parts), squeeze=False, sharex="row", sharey="row", height_ratios=(1.0, 0.8))
+    deviations = np.concatenate([columns(rows, "before") for _, rows in parts])
+    span = np.ptp(columns(parts[0][1], "command"), axis=0)
+    factors = [
+        style.magnification(deviations[:, :2], span[0], 0.2),
+        style.magnification(deviations[:, 2], max(span[2], 1.0), 0.2),
+    ]
+    for column, (name, rows) in enumerate(parts):
+        command = columns(rows, "command")
+        above, height = panels[:, column]
+        for label, prefix, look in (("before compensation", "before", _BEFORE), ("driven again", "after", _AFTER)):
+            moved = command + columns(rows, prefix) * np.array([factors[0], factors[0], factors[1]])
+            above.plot(moved[:, 0], moved[:, 1], label=label, **look)
+            height.plot(rows["point"], moved[:, 2], **look)
+        above.plot(command[:, 0], command[:, 1], label="commanded", color=style.ORANGE, linewidth=2.4, zorder=0)
+        height.plot(rows["point"], command[:, 2], color=style.ORANGE, linewidth=2.4, zorder=0)
+        above.set(aspect="equal", xlabel="x (mm)")
+        above.set_title(name, loc="center")
+        height.set_xlabel("point")
+    panels[0, 0].set_ylabel(f"y (mm), deviations × {factors[0]:g}")
+    panels[1, 0].set_ylabel(f"z (mm), deviations × {factors[1]:g}")
+    style.legend_above(figure, panels[0, :1])
+    return figure
+
+
+@style.printed
+def ptt_errors(tables, options):
+    """Errors along the axes before compensation and when driven again, every experiment."""
+    parts = experiments(tables["ptt_points"])
+    figure = style.new(style.DOUBLE_MM, 100.0)
+    panels = figure.subplots(3, len(parts), squeeze=False, sharex=True, sharey="row")
+    for column, (name, rows) in enumerate(parts):
+        for row, axis in enumerate(AXES):
+            axes = panels[row, column]
+            axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
+            axes.plot(rows["point"], rows[f"before_{axis}_mm"], label="before compensation", **_BEFORE)
+            axes.plot(rows["point"], rows[f"after_{axis}_mm"], label="driven again", **_AFTER)
+            axes.margins(x=0.02)
+        panels[0, column].set_title(name, loc="center")
+        panels[2, column].set_xlabel("point")
+    for row, axis in enumerate(AXES):
+        panels[row, 0].set_ylabel(f"{axis} error (mm)")
+    style.legend_above(figure, panels[0, :1])
+    return figure
+
+
+@style.printed
+def ptt_network(tables, options):
+    """What the chosen network leaves of the corrected positions that it was taught, every experiment, test points
+    marked.
+    """
+    parts = experiments(tables["ptt_points"])
+    figure = style.new(style.DOUBLE_MM, 24.0 + 21.0 * len(parts))
+    panels = figure.subplots(len(parts), 1, squeeze=False, sharex=True, sharey=True)[:, 0]
+    for axes, (name, rows) in zip(panels, parts, strict=True):
+        test = rows[rows["set"] == "test"]
+        axes.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
+        for axis, colour in _COLOURS.items():
+            axes.plot(rows["point"], 1e3 * rows[f"network_{axis}_mm"], color=colour, linewidth=0.7, label=axis)
+            axes.plot(
+                test["point"], 1e3 * test[f"network_{axis}_mm"], color=colour, label=f"{axis}, test point", **_TEST
+            )
+        axes.set_title(name)
+        axes.set_ylabel("left over (µm)")
+        axes.margins(x=0.01)
+    panels[-1].set_xlabel("point")
+    style.legend_above(figure, panels[:1], columns=6)
+    return figure

@@ -1,0 +1,125 @@
+"""Figures of paper B's robot: its singularities, its backlash and its repeatability."""
+
+import numpy as np
+from matplotlib.colors import BoundaryNorm
+from matplotlib.lines import Line2D
+
+from rrru.figures import style
+
+_LEVELS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
+_SLICES = {"xz": ("x", "z", "y"), "xy": ("x", "y", "z")}
+_LEGS = {1: style.BLUE, 2: style.ORANGE, 3: style.VERMILION}
+_MARKS = {1: "o", 2: "s", 3: "^"}
+
+
+@style.printed
+def ptt_singularity(tables, options):
+    """Both singularity measures over two slices of the workspace, where kappa vanishes, and the curve."""
+    grid, points = tables["ptt_singularity"], tables["ptt_points"]
+    curve = points[points["experiment"] == points["experiment"].min()].sort_values("point")
+    figure = style.new(style.DOUBLE_MM, 150.0)
+    panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(0.55, 1.0))
+    marks = iter("abcd")
+    for row, (name, (across, up, normal)) in enumerate(_SLICES.items()):
+        part = grid[grid["slice"] == name]
+        place = f"{part[f'{normal}_mm'].iloc[0]:g}".replace("-", "\N{MINUS SIGN}")
+        fields = {
+            field: part.pivot(index=f"{up}_mm", columns=f"{across}_mm", values=field)
+            for field in ("translational_measure", "constraint_measure", "kappa_mm2")
+        }
+        for axes, measure in zip(panels[row], ("translational_measure", "constraint_measure"), strict=True):
+            image = _map(axes, fields[measure], fields["kappa_mm2"] if measure == "translational_measure" else None)
+            axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color="white", linewidth=2.0)
+            axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color="black", linewidth=0.9)
+            axes.set(xlabel=f"{across} (mm)", aspect="equal")
+            axes.set_title(f"({next(marks)}) {measure.replace('_', ' ')}, {normal} = {place} mm")
+        panels[row, 0].set_ylabel(f"{up} (mm)")
+    bar = figure.colorbar(
+        image, ax=list(panels.ravel()), location="bottom", aspect=60, fraction=0.03, spacing="uniform"
+    )
+    bar.set_label("singularity measure: 0 at a singularity, 1 at best")
+    handles = [
+        Line2D([], [], color="black", linewidth=0.9, label="commanded curve (projected)"),
+        Line2D([], [], color=style.VERMILION, linewidth=1.2, label="κ = 0: det J = 0"),
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=2)
+    return figure
+
+
+def _map(axes, field, kappa):
+    """One measure over a slice, hatched out of reach, with the zero line of kappa where it is given."""
+    across, up = field.columns.to_numpy(), field.index.to_numpy()
+    half = 0.5 * (across[1] - across[0])
+    axes.patch.set(facecolor="white", edgecolor="#cccccc", hatch="////", linewidth=0.0)
+    image = axes.imshow(
+        np.ma.masked_invalid(field.to_numpy(dtype=float)),
+        extent=(across[0] - half, across[-1] + half, up[0] - half, up[-1] + half),
+        origin="lower",
+        cmap=style.MEASURE,
+        norm=BoundaryNorm(_LEVELS, 256),
+        interpolation="none",
+    )
+    if kappa is not None:
+        values = np.ma.masked_invalid(kappa.to_numpy(dtype=float))
+        if values.count() and values.min() < 0.0 < values.max():
+            for colour, width in (("white", 2.2), (style.VERMILION, 1.2)):
+                axes.contour(across, up, values, levels=[0.0], colors=[colour], linewidths=width)
+    return image
+
+
+@style.printed
+def ptt_backlash(tables, options):
+    """The encoder's readings less the command, the backlash per screw and load, and the repeatability with and without
+    compensation.
+    """
+    figure = style.new(style.DOUBLE_MM, 70.0)
+    left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
+    encoder, widths = tables["ptt_encoder"], tables["ptt_backlash"]
+    lightest = encoder[encoder["payload_kg"] == encoder["payload_kg"].min()]
+    for leg, colour in _LEGS.items():
+        record = lightest[lightest["leg"] == leg].sort_values("sample")
+        left.plot(
+            record["commanded_mm"],
+            record["encoder_mm"] - record["commanded_mm"],
+            color=colour,
+            linewidth=0.6,
+            label=f"screw {leg}",
+        )
+        part = widths[widths["leg"] == leg].sort_values("payload_kg")
+        middle.axhline(part["true_mm"].iloc[0], color=colour, linewidth=0.6, zorder=0)
+        middle.errorbar(
+            part["payload_kg"],
+            part["backlash_mm"],
+            2.0 * part["standard_error_mm"],
+            color=colour,
+            marker=_MARKS[leg],
+            markerfacecolor="white",
+            linestyle="none",
+        )
+    left.set(xlabel="commanded slider position (mm)", ylabel="encoder less command (mm)")
+    left.set_title("(a) forwards, back, forwards")
+    middle.set(xlabel="payload (kg)", ylabel="backlash (mm)", ylim=(0.0, None))
+    middle.set_title("(b) eq. (19); lines: true")
+    _repeatability(right, tables["ptt_repeatability"])
+    style.legend_above(figure, [left, right], columns=6)
+    return figure
+
+
+def _repeatability(axes, frame):
+    """Scatter per travel of every slider, and what the tracker's noise alone gives."""
+    for compensated, colour in ((False, "white"), (True, style.SKY)):
+        part = frame[frame["compensated"] == compensated].sort_values("leg")
+        place = part["leg"] + (0.19 if compensated else -0.19)
+        label = "backlash compensated" if compensated else "not compensated"
+        axes.bar(place, part["per_travel_um_per_mm"], 0.36, color=colour, edgecolor="black", linewidth=0.6, label=label)
+        axes.plot(
+            place,
+            part["noise_um_per_mm"],
+            label="tracker's noise",
+            color=style.VERMILION,
+            marker="_",
+            linestyle="none",
+            markersize=9,
+        )
+    axes.set(xlabel="slider", ylabel="scatter per travel (µm/mm)", xticks=(1, 2, 3))
+    axes.set_title("(c) repeatability")

@@ -1,0 +1,179 @@
+"""How good the diagnosis is where the answer was withheld from it."""
+
+import numpy as np
+from matplotlib.colors import PowerNorm
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator, MultipleLocator
+
+from rrru.errors import ConfigError
+from rrru.figures import style
+
+NONE, UNEXPLAINED, OUTSIDE, SEVERAL = "none", "unexplained", "outside the library", "two or more"
+_OUTSIDE_MARK = "outside:"
+_CHECKS = {
+    "label": ("label withheld", style.LINES),
+    "effect": ("effect withheld", style.SPIRAL),
+    "field": ("field campaigns", style.PUBLISHED),
+}
+_PROBABILITY_EDGES = np.array([0.0, 0.5, 0.7, 0.8, 0.9, 0.97, 1.0])
+_STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
+# shares closed below this are drawn on the edge
+_LOWEST_CLOSED = -0.2
+_WILSON_Z = 1.959963984540054
+_EVEN = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1}
+_FRAME = {"facecolor": "none", "edgecolor": style.ORANGE, "linewidth": 0.9}
+_ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "linestyle": (0, (1, 1))}
+
+
+@style.printed
+def withheld(tables, options):
+    """Checks on withheld data: confusion tables, stated probabilities, rights against strength, and predicted against
+    true shrink.
+    """
+    scores, confusion = tables["withheld_scores"], tables["withheld_confusion"]
+    if scores.empty:
+        raise ConfigError("withheld: table withheld_scores has no robot")
+    checks = [name for name in _CHECKS if (scores["check"] == name).any()]
+    counts = {name: _counts(confusion, name) for name in checks[:2]}
+    names = _singles(confusion)
+    rows = {name: _rows(table, names) for name, table in counts.items()}
+    upper = 4.4 * max(len(labels) for labels in rows.values()) + 38.0
+    figure = style.new(style.DOUBLE_MM, upper + 62.0)
+    parts = figure.add_gridspec(2, 1, height_ratios=[upper, 62.0])
+    marks = iter("abcdefg")
+    maps = parts[0].subgridspec(1, len(counts))
+    for place, (name, table) in enumerate(counts.items()):
+        axes = figure.add_subplot(maps[place])
+        _confusion(axes, table, rows[name], [*names, UNEXPLAINED, NONE, SEVERAL], name == "effect")
+        axes.set_title(f"({next(marks)}) robots, {_CHECKS[name][0]}")
+    panels = [figure.add_subplot(part) for part in parts[1].subgridspec(1, 3)]
+    for axes, draw in zip(panels, (_reliability, _strength, _closed), strict=True):
+        draw(axes, scores, checks)
+        axes.set_title(f"({next(marks)}) {axes.get_title(loc='left')}")
+        axes.grid(True)
+    style.legend_above(figure, panels)
+    return figure
+
+
+def _truth(truth, check):
+    """The row of a truth: one effect (of the effect check: the one taken out), none, outside, or several."""
+    if check == "effect":
+        truth = truth.removeprefix(_OUTSIDE_MARK)
+    return OUTSIDE if truth.startswith((_OUTSIDE_MARK, UNEXPLAINED)) else SEVERAL if "+" in truth else truth
+
+
+def _verdict(verdict):
+    """The column of a verdict; what says unexplained counts as that, whatever it names besides."""
+    names = verdict.split("+")
+    return UNEXPLAINED if UNEXPLAINED in names else SEVERAL if len(names) > 1 else verdict
+
+
+def _counts(confusion, check):
+    """Robots by row and column of a check's confusion table."""
+    rows = confusion[confusion["check"] == check]
+    truth = rows["truth"].map(lambda name: _truth(name, check))
+    verdict = rows["verdict"].map(_verdict)
+    return rows["robots"].groupby([truth, verdict]).sum()
+
+
+def _singles(confusion):
+    """Names of all single effects in truths and verdicts."""
+    seen = {_truth(truth, check) for check, truth in zip(confusion["check"], confusion["truth"], strict=True)}
+    return sorted((seen | set(confusion["verdict"].map(_verdict))) - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
+
+
+def _rows(counts, names):
+    """Truths of a confusion table in the order of its columns."""
+    present = set(counts.index.get_level_values(0))
+    return [name for name in (*names, OUTSIDE, NONE, SEVERAL) if name in present]
+
+
+def _confusion(axes, counts, rows, columns, withheld_effect):
+    """Confusion table as a heat map of each row's shares, counts written; the right answers are framed."""
+    table = counts.unstack(fill_value=0).reindex(index=rows, columns=columns, fill_value=0).to_numpy()
+    share = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
+    axes.imshow(share, cmap=style.SEQUENTIAL, norm=PowerNorm(0.6, 0.0, 1.0), aspect="auto", interpolation="none")
+    for (row, column), count in np.ndenumerate(table):
+        if count:
+            color = "white" if share[row, column] > 0.45 else "black"
+            axes.text(column, row, f"{count}", ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
+    axes.set_xticks(range(len(columns)), [_named(name) for name in columns], rotation=90)
+    axes.set_yticks(range(len(rows)), [_named(name) for name in rows])
+    axes.tick_params(length=0.0)
+    axes.set(xlabel="verdict", ylabel="truth")
+    axes.axvline(len(columns) - 3.5, color=style.GREY, linewidth=0.6)
+    for row, name in enumerate(rows):
+        right = UNEXPLAINED if withheld_effect or name == OUTSIDE else name
+        if right != SEVERAL:
+            axes.add_patch(
+                Rectangle((columns.index(right) - 0.5, row - 0.5), 1.0, 1.0, clip_on=False, zorder=3, **_FRAME)
+            )
+
+
+def _reliability(axes, scores, checks):
+    """How often the diagnosis is right against how sure it is."""
+    axes.plot([0.0, 1.0], [0.0, 1.0], **_EVEN)
+    for name in checks:
+        label, look = _CHECKS[name]
+        rows = scores[scores["check"] == name]
+        _shares(axes, rows["probability"], rows["right"], _PROBABILITY_EDGES, look, label)
+    axes.set(xlabel="stated probability", ylabel="share of robots", xlim=(-0.02, 1.03), ylim=(-0.03, 1.03))
+    axes.set_title("right, by stated probability")
+
+
+def _strength(axes, scores, checks):
+    """How often the diagnosis is right, and whether the effect could be seen at all, against the gap over the noise."""
+    for name in checks:
+        rows = scores[(scores["check"] == name) & (scores["strength"] > 0.0)]
+        label, look = _CHECKS[name]
+        _shares(axes, rows["strength"], rows["right"], _STRENGTH_EDGES, look, label)
+    if checks[0] != "field":
+        # of a field campaign nobody knows the law
+        rows = scores[(scores["check"] == checks[0]) & (scores["strength"] > 0.0)]
+        label = f"detected by the true law, {_CHECKS[checks[0]][0]}"
+        _shares(axes, rows["strength"], rows["oracle_detects"], _STRENGTH_EDGES, _ORACLE, label)
+    axes.set(xscale="log", xlabel="gap over noise, rms", ylabel="share of robots", ylim=(-0.03, 1.03))
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    style.plain_log(axes.xaxis)
+    axes.set_title("right, by strength of the gap")
+
+
+def _closed(axes, scores, checks):
+    """Share of the gap closed: as the diagnosis predicts it, against the truth."""
+    axes.plot([_LOWEST_CLOSED, 1.0], [_LOWEST_CLOSED, 1.0], **_EVEN)
+    for name in checks:
+        rows = scores[scores["check"] == name].dropna(subset=["share_closed", "share_closed_true"])
+        label, look = _CHECKS[name]
+        values = rows[["share_closed_true", "share_closed"]].clip(_LOWEST_CLOSED, 1.0).to_numpy()
+        axes.plot(*values.T, label=label, **(look | {"linestyle": "none", "markersize": 2.4, "markeredgewidth": 0.5}))
+    edges = (_LOWEST_CLOSED - 0.04, 1.04)
+    axes.set(xlabel="true share closed", ylabel="predicted share closed", xlim=edges, ylim=edges)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(0.2))
+    axes.set_title("share of the gap closed")
+
+
+def _shares(axes, value, hit, edges, look, label):
+    """Share of hits in each bin at the bin's mean value, with its 95 % Wilson interval."""
+    value, hit = value.to_numpy(dtype=float), hit.to_numpy(dtype=bool)
+    place = np.clip(np.digitize(value, edges) - 1, 0, len(edges) - 2)
+    bins = [place == number for number in range(len(edges) - 1) if (place == number).any()]
+    if not bins:
+        return
+    x = np.array([value[inside].mean() for inside in bins])
+    share, low, high = np.array([_wilson(hit[inside]) for inside in bins]).T
+    axes.vlines(x, low, high, color=look["color"], linewidth=0.7)
+    axes.plot(x, share, label=label, **(look | {"markersize": 3.6}))
+
+
+def _wilson(hit):
+    """Share of hits (n,) with the ends of its 95 % Wilson interval."""
+    count, share = len(hit), hit.mean()
+    spread = _WILSON_Z * np.sqrt(share * (1.0 - share) / count + _WILSON_Z**2 / (4.0 * count**2))
+    low, high = (share + _WILSON_Z**2 / (2.0 * count) + sign * spread for sign in (-1.0, 1.0))
+    return share, *(np.array([low, high]) / (1.0 + _WILSON_Z**2 / count))
+
+
+def _named(name):
+    """A name for reading."""
+    return name.replace("_", " ")

@@ -1,0 +1,291 @@
+"""Every refusal says where, what stands there and what is allowed."""
+
+import gzip
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.errors import IngestError
+from rrru.robots.rrru3 import Rrru3
+from tests.places import DATA
+
+SOURCE = DATA / "field_01.csv"
+TEXT = SOURCE.read_text()
+LINES = TEXT.splitlines()
+FIELD = pd.read_csv(SOURCE)
+ROBOT = Rrru3()
+COMMAND = [f"command_{axis}_mm" for axis in "xyz"]
+MEASURED = [f"measured_{axis}_mm" for axis in "xyz"]
+THETA = [f"theta{k}_rad" for k in (1, 2, 3)]
+XYZ, THETAS = ", ".join(MEASURED), ", ".join(THETA)
+AT_COMMAND = ", ".join(COMMAND)
+CSV, REGISTER = "comma-separated text in UTF-8", {"frame": "register"}
+
+
+def cells(*changes):
+    """The campaign with some cells changed: (row from 1, column, value)."""
+    frame = FIELD.astype(object)
+    for row, column, value in changes:
+        frame.loc[row - 1, column] = value
+    return frame
+
+
+def columns(names, factor=1.0, shift=0.0):
+    """The campaign with some columns multiplied and shifted."""
+    frame = FIELD.copy()
+    frame[names] = frame[names] * factor + shift
+    return frame
+
+
+def exchanged(names, others):
+    """The campaign with some columns in the place of others."""
+    frame = FIELD.copy()
+    frame[names] = FIELD[others].to_numpy()
+    return frame
+
+
+def lines(*changes):
+    """The file's text with some lines changed: (line from 0, new line)."""
+    changed = list(LINES)
+    for line, text in changes:
+        changed[line] = text
+    return "\n".join(changed)
+
+
+def parquet():
+    """Bytes of the campaign as a parquet file."""
+    return FIELD.to_parquet(None)
+
+
+def problems_of(content, tmp_path, name="f.csv", **settings):
+    """Problems with which a file of some content is refused."""
+    path = tmp_path / name
+    if isinstance(content, pd.DataFrame):
+        content.to_csv(path, index=False) if path.suffix == ".csv" else content.to_parquet(path, index=False)
+    elif content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(IngestError) as caught:
+        ingest(IngestSpec(str(path), **settings), ROBOT)
+    assert all(problem["file"] == str(path) for problem in caught.value.problems)
+    return caught.value.problems
+
+
+def assert_problem(problems, row, column, value, allowed):
+    """One of the problems is at this row and column, and says these things."""
+    assert any(
+        (p["row"], p["column"]) == (row, column) and value in p["value"] and allowed in p["allowed"] for p in problems
+    ), problems[:3]
+
+
+FILES = {
+    "not there": (None, "nothing.csv", "no such file", "an existing .csv or .parquet file"),
+    "empty": (b"", "f.csv", "an empty file", CSV),
+    "only line ends": ("\n\n \n", "f.csv", "an empty file", CSV),
+    "only a header": (LINES[0] + "\n\n", "f.csv", "a header (run, trajectory,", "one row per measured point"),
+    "no header": ("\n".join(LINES[1:]), "f.csv", "a first line of values (1, line_1,", "names of all columns"),
+    "text above the header": ("tracker 7\n" + TEXT, "f.csv", "a first line of 1 fields (tracker 7", "nothing above it"),
+    "semicolons and decimal commas": (
+        TEXT.replace(",", ";").replace(".", ","),
+        "f.csv",
+        "semicolons between",
+        "sep=';', decimal=','",
+    ),
+    "tabs": (TEXT.replace(",", "\t"), "f.csv", "tabs between the fields", "commas between the fields"),
+    "decimal commas": (
+        TEXT.replace(".", ","),
+        "f.csv",
+        "15 fields (run, trajectory",
+        "a decimal comma makes two fields",
+    ),
+    "a quote left open": (
+        lines((4, LINES[4].replace("line_1", '"line_1'))),
+        "f.csv",
+        "unexpected end of data",
+        "each quote closed",
+    ),
+    "UTF-16": (TEXT.encode("utf-16"), "f.csv", "UTF-16", "save the file again with the encoding UTF-8"),
+    "UTF-16 without a mark": (TEXT.encode("utf-16-be"), "f.csv", "UTF-16", "encoding UTF-8"),
+    "Latin-1": (TEXT.replace("line_1", "línea").encode("latin-1"), "f.csv", "byte 0xed in line 2", "encoding UTF-8"),
+    "binary": (TEXT.encode()[:9000] + b"\0" + TEXT.encode()[9000:], "f.csv", "byte 0 in line 75", CSV),
+    "a parquet file named .csv": (parquet(), "f.csv", "a parquet file", CSV),
+    "an .xlsx named .csv": (b"PK\x03\x04" + bytes(99), "f.csv", "a zip archive, which .xlsx", CSV),
+    "a gzip named .csv": (gzip.compress(TEXT.encode()), "f.csv", "a gzip archive", CSV),
+    "a CSV named .parquet": (TEXT, "f.parquet", "run,trajectory", "comma-separated text has the extension .csv"),
+    "an empty parquet file": (b"", "f.parquet", "an empty file", "a parquet file"),
+    "a truncated parquet file": (
+        parquet()[:9000],
+        "f.parquet",
+        "a damaged or truncated parquet file of 9000 bytes",
+        "a whole parquet file",
+    ),
+    "a parquet file without its end": (
+        parquet()[:-4],
+        "f.parquet",
+        "a damaged or truncated parquet file",
+        "a whole parquet file",
+    ),
+    "a parquet file with a hole": (
+        parquet()[:100] + bytes(300) + parquet()[400:],
+        "f.parquet",
+        "a damaged or truncated",
+        "a whole parquet",
+    ),
+    "a parquet file without rows": (FIELD.head(0), "f.parquet", "and no row", "one row per measured point"),
+    "an unknown extension": (TEXT, "f.xlsx", "the extension '.xlsx'", ".csv or .parquet"),
+    "no extension": (TEXT, "f", "the extension ''", ".csv or .parquet"),
+}
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_file_that_is_not_what_it_should_be(case, tmp_path):
+    content, name, value, allowed = FILES[case]
+    problems = problems_of(content, tmp_path, name)
+    assert len(problems) == 1
+    assert_problem(problems, None, None, value, allowed)
+
+
+def test_a_directory(tmp_path):
+    (tmp_path / "f.csv").mkdir()
+    assert_problem(problems_of(None, tmp_path), None, None, "a directory", "a .csv or .parquet file")
+
+
+NO_NUMBER = "a finite number"
+CELLS = {
+    "text": ("measured_x_mm", "NA", NO_NUMBER),
+    "text in time": ("time_s", "soon", NO_NUMBER),
+    "NaN": ("theta2_rad", "NaN", NO_NUMBER),
+    "infinity": ("measured_z_mm", "-inf", NO_NUMBER),
+    "too large": ("measured_z_mm", "1e999", NO_NUMBER),
+    "grouped digits": ("payload_kg", "1_000", NO_NUMBER),
+    "a decimal comma": ("speed_mm_s", "80,5", "a number with a decimal point, not a comma"),
+    "blank": ("command_x_mm", "", "a number"),
+    "half a run": ("run", "1.5", "a whole number: 1, 2, 3, ..."),
+    "point zero": ("point", "0", "a whole number: 1, 2, 3, ..."),
+    "no name": ("trajectory", "", "the trajectory's name"),
+    "a clock's time": ("time_s", "1.7e+09", "0 to 1e6 s since the campaign's start"),
+    "standing still": ("speed_mm_s", "0", "above 0 and up to 20000 mm/s"),
+    "a negative payload": ("payload_kg", "-2", "0 to 1000 kg"),
+}
+
+
+@pytest.mark.parametrize("name", ["f.csv", "f.parquet"])
+@pytest.mark.parametrize("case", CELLS)
+def test_a_cell_that_is_no_value(case, name, tmp_path):
+    column, value, allowed = CELLS[case]
+    frame = cells((6, column, value))
+    problems = problems_of(frame if name == "f.csv" else frame.astype(str), tmp_path, name)
+    assert_problem(problems, 6, column, value or "blank", allowed)
+
+
+TURNED = columns(MEASURED)
+TURNED["measured_y_mm"] *= -1.0
+UPSIDE_DOWN = columns(["command_z_mm", "measured_z_mm"], -1.0).drop(columns=THETA)
+RESTARTED = FIELD.assign(time_s=FIELD["time_s"] - FIELD.groupby("run")["time_s"].transform("min"))
+ROWS = {
+    "a missed point": (cells(*[(5, name, "") for name in MEASURED]), {}, 5, XYZ, "blank", "drop the row"),
+    "half a missed point": (cells((5, "measured_y_mm", "")), {}, 5, "measured_y_mm", "blank", "drop a row that lacks one"),
+    "too many fields": (lines((4, LINES[4] + ",7")), {}, 4, None, "16 fields (1, line_1, 4,", "15 fields as in the header"),
+    "too few fields": (lines((4, "1,line_1,4")), {}, 4, None, "3 fields (1, line_1, 4", "15 fields as in the header"),
+    "an empty line": (lines((4, "")), {}, 4, None, "an empty row", "drop the row"),
+    "a missing column": (FIELD.drop(columns="measured_x_mm"), {}, None, "measured_x_mm", "no such column", "the file has run, trajectory"),
+    "a misspelt column": (TEXT.replace("measured_x", "mesured_x"), {}, None, "measured_x_mm", "no such", '{measured_x_mm: "mesured_x_mm"}'),
+    "an unknown column": (FIELD.assign(wind=1.0), {}, None, "wind", "nobody declared", "extra_columns: ignore"),
+    "a misspelt optional column": (TEXT.replace("time_s", "Time_s"), {}, None, "Time_s", "nobody declared", '{time_s: "Time_s"}'),
+    "a column without a name": (FIELD.to_csv(), {}, None, "(no name, column 1; pandas writes its index so)", "nobody", "ignore"),
+    "a mapped column that is missing": (TEXT, {"columns": {"time_s": "t"}}, None, "t", "no such column", "a column t"),
+    "a column twice": (TEXT.replace("payload_kg", "speed_mm_s"), {}, None, "speed_mm_s", "2 columns of this name", "each name once"),
+    "some drive angles": (FIELD.drop(columns="theta2_rad"), {}, None, "theta1_rad, theta3_rad", "some drive angles", "or none"),
+    "a blank drive angle": (FIELD.assign(theta2_rad=""), {}, 1, "theta2_rad", "blank", "a number"),
+    "a point twice": (cells((4, "point", 3)), {}, 4, "run, point", "run 1, point 3, as in row 3", "each point of a run once"),
+    "a copied measurement": (cells(*[(9, n, FIELD.loc[4, n]) for n in MEASURED]), {}, 9, XYZ, "as in row 5", "repeat every digit"),
+    "a copied row": ("\n".join([*LINES[:6], *LINES[5:]]), {}, 6, XYZ, "(-620.253391, -0.27105, 609.841743) mm, exactly", "once"),
+    "points that go back": (FIELD.iloc[[0, 2, 1, *range(3, 222)]].drop(columns="time_s"), {}, 3, "point", "point 2 after point 3", "order"),
+    "runs that go back": (pd.concat([FIELD[26:52], FIELD[:26]]).drop(columns="time_s"), {}, 27, "run", "run 1 after run 2", "order"),
+    "two trajectories in a run": (cells((5, "trajectory", "arc")), {}, 5, "trajectory", "arc in run 1, which began with line_1", "one"),
+    "too few points": (FIELD.head(2), {}, None, None, "2 rows", "at least 3: three numbers per point for 7 parameters"),
+    "a short run": (FIELD.iloc[:28], {}, None, "run", "run 2 with 2 points", "at least 3 points in a run"),
+    "time that runs back": (cells((5, "time_s", 0.5)), {}, 5, "time_s", "0.5 s after 1.762291 s", "never run backwards"),
+    "time that starts again": (RESTARTED, {}, 27, "time_s", "0 s after 8.470144 s (run 2 after run 1)", "since the campaign"),
+    "a speed in m/s": (columns("speed_mm_s", 1e-3), {}, 27, "speed_mm_s", "0.08 mm/s in run 2, whose points follow each other", "in s"),
+    "a command out of reach": (cells((7, "command_x_mm", -1500)), {}, 7, AT_COMMAND, "(-1500, 0, 609.523) mm", "leg 1, 2, 3 does not"),
+    "a measurement out of reach": (cells((7, "measured_x_mm", 9999)), {}, 7, XYZ, "(9999, -0.254373", "within 1412 mm of the robot"),
+    "zeros for a missed point": (cells(*[(7, name, 0) for name in MEASURED]), {}, 7, XYZ, "(0, 0, 0) mm", "not 0, 0, 0; drop"),
+    "metres as millimetres": (columns(COMMAND + MEASURED, 1e-3), {}, None, AT_COMMAND, "0.5602 to 0.9494 mm", "unit: m brings them there"),
+    "millimetres as metres": (TEXT, {"unit": "m"}, None, AT_COMMAND, "when read in m", "unit: mm brings them there"),
+    "inches as millimetres": (columns(COMMAND + MEASURED, 1 / 25.4), {}, None, AT_COMMAND, "22.06 to 37.38 mm", "unit: inch brings them"),
+    "measured in metres only": (columns(MEASURED, 1e-3), {}, None, XYZ, "(ratio 0.0009972)", "not the measured ones in m and"),
+    "measured in inches only": (columns(MEASURED, 1 / 25.4), REGISTER, None, XYZ, "(ratio 0.03926)", "not the measured ones in inch"),
+    "degrees as radians": (columns(THETA, 180 / np.pi), {}, None, THETAS, "up to 69.1959 rad when read in rad", "angle_unit: deg makes"),
+    "radians as degrees": (TEXT, {"angle_unit": "deg"}, None, THETAS, "when read in deg", "angle_unit: rad makes them fit"),
+    "the other elbow": (TEXT, {"elbow": "in"}, None, THETAS, "from those that the commanded positions need", "elbow: out makes them fit"),
+    "legs numbered the other way": (exchanged(THETA, THETA[::-1]), {}, None, THETAS, "rad from those", "numbered the other way round"),
+    "an angle that contradicts": (cells((4, "theta2_rad", -0.1525)), {}, 4, "theta2_rad", "-0.152500 rad, while", "0.0001 rad"),
+    "exchanged axes": (exchanged(MEASURED[:2], MEASURED[1::-1]), {}, None, XYZ, "558.323 mm from the", "measured (y, x, z) would fit"),
+    "an axis turned round": (columns("measured_z_mm", -1.0), {}, None, XYZ, "1218.88 mm from", "measured (x, y, -z) would fit"),
+    "another frame": (columns("measured_x_mm", shift=5e3), {}, None, XYZ, "5001.58 mm from the commanded ones", "frame: register"),
+    "one run in another frame": (
+        FIELD.assign(measured_x_mm=FIELD["measured_x_mm"] + 200.0 * (FIELD["run"] == 3)),
+        {},
+        53,
+        XYZ,
+        "run 3: measured positions 201",
+        "at most 105.2 mm, in one frame for all runs",
+    ),
+    "a robot upside down": (UPSIDE_DOWN, {}, None, "command_z_mm", "-609.523 mm", "whose z points DOWN from the base"),
+    "a left-handed frame": (TURNED, REGISTER, None, XYZ, "positions in a left-handed frame", "turn the sign of one axis round"),
+    "points of other commands": (exchanged(MEASURED, [MEASURED[1], MEASURED[2], MEASURED[0]]).assign(
+        measured_x_mm=FIELD["measured_x_mm"].to_numpy()[::-1]), REGISTER, None, XYZ, "rms after registration", "105.2 mm rms"),
+    "two registration points": (TEXT, REGISTER | {"registration_points": ((1, 1), (2, 2))}, None, None, "2 different", "at least 3"),
+    "registration points on a line": (
+        TEXT,
+        REGISTER | {"registration_points": tuple((1, k) for k in range(1, 20))},
+        None,
+        None,
+        "19 commanded positions on one line: 0.000 mm (rms) off",
+        "at least 5.670 mm (rms) off every line",
+    ),
+    "a registration point not there": (TEXT, REGISTER | {"registration_points": ((9, 1),)}, None, None, "(run 9, point 1)", "runs 1 to 8"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", ROWS)
+def test_a_campaign_that_makes_no_sense(case, tmp_path):
+    content, settings, row, column, value, allowed = ROWS[case]
+    assert_problem(problems_of(content, tmp_path, **settings), row, column, value, allowed)
+
+
+@pytest.mark.parametrize(
+    "case",
+    ["metres as millimetres", "millimetres as metres", "degrees as radians", "exchanged axes", "the other elbow"],
+)
+def test_one_cause_is_one_problem(case, tmp_path):
+    content, settings, *_ = ROWS[case]
+    assert len(problems_of(content, tmp_path, **settings)) == 1
+
+
+def test_all_problems_are_reported_at_once_under_the_file_s_names(tmp_path):
+    frame = cells(
+        (3, "measured_x_mm", "NA"),
+        (9, "time_s", 0.0),
+        (12, "theta1_rad", 0.0),
+        (40, "command_x_mm", 3000.0),
+        (60, "run", "x"),
+    )
+    frame = frame.rename(columns={"measured_x_mm": "X"}).assign(wind=0.0)
+    problems = problems_of(frame, tmp_path, columns={"measured_x_mm": "X"})
+    assert [(p["row"], p["column"]) for p in problems] == [
+        (None, "wind"),
+        (3, "X"),
+        (60, "run"),
+        (9, "time_s"),
+        (40, AT_COMMAND),
+        (12, "theta1_rad"),
+    ]
+
+
+def test_a_kind_of_problem_lists_twenty_and_counts_the_rest(tmp_path):
+    problems = problems_of(FIELD.assign(time_s="late"), tmp_path)
+    assert [p["row"] for p in problems] == [*range(1, 21), None]
+    assert problems[-1]["value"] == "222 problems of this kind, of which the first 20 are listed"

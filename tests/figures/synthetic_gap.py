@@ -1,0 +1,162 @@
+"""Result tables of a made-up gap diagnosis and of made-up withheld robots, for drawing figures without computing
+anything.
+"""
+
+import numpy as np
+import pandas as pd
+
+from rrru.store.tables import check, columns
+
+EFFECTS = (
+    *(
+        "backlash",
+        "drive_compliance",
+        "link_flexure",
+        "joint_clearance",
+        "leg_asymmetry",
+        "axis_tilt",
+        "base_placement",
+    ),
+    *("frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth", "servo_lag"),
+)
+NOISE_MM = 0.035
+NEXT = "line_1 in reverse, 300 mm/s, payload 5 kg (separates link_flexure / drive_compliance, 14 nats); spiral in reverse, 80 mm/s"
+_SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 0.98}
+
+
+def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
+    """`gap_verdicts` of one campaign."""
+    texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats", "notes": ""}
+    numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
+    numbers |= {"worst_x_mm": -512.3, "worst_y_mm": 37.5, "worst_z_mm": 600.0, "points": 144, "dropped_points": 2}
+    return check(
+        "gap_verdicts", pd.DataFrame([{"campaign": campaign, "effects": effects} | texts | numbers | _SHARES | changes])
+    )
+
+
+def gap_attribute(
+    campaign, likely=(("link_flexure", 0.985, "2"), ("backlash", 0.97, "each"), ("unexplained", 0.04, ""))
+):
+    """`gap_attribute`: the likely effects as given, the others improbable; thermal_growth was not tested."""
+    rows = {
+        name: {"probability": 0.002 * k, "legs": "each", "log_evidence": 1.0}
+        for k, name in enumerate((*EFFECTS, "none", "unexplained"))
+    }
+    rows["thermal_growth"] |= {"probability": 0.0, "log_evidence": np.nan}
+    for name, probability, legs in likely:
+        rows[name] |= {"probability": probability, "legs": legs}
+    frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("effect").reset_index()
+    return check("gap_attribute", frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_se=1.5, note=""))
+
+
+def gap_shrink(campaign, trajectories, steps=2, kinds=("held_out", "resimulated")):
+    """`gap_shrink`: every step closes most of what is left."""
+    rows = []
+    for kind in kinds:
+        for step in range(steps + 1):
+            for k, name in enumerate(("*", *trajectories)):
+                size = (0.3 + 0.05 * k) * 0.25**step
+                shares = (
+                    {key: value - 0.01 * k for key, value in _SHARES.items()}
+                    if step
+                    else dict.fromkeys(_SHARES, np.nan)
+                )
+                label = {
+                    "step": step,
+                    "added": EFFECTS[step] if step else "",
+                    "effects": "+".join(EFFECTS[:step]) or "none",
+                }
+                numbers = {
+                    "rms_mm": np.hypot(size, NOISE_MM),
+                    "max_mm": 3.0 * size,
+                    "noise_rms_mm": NOISE_MM,
+                    "gap_rms_mm": size,
+                }
+                rows.append(label | {"trajectory": name, "kind": kind, "points": 20} | numbers | shares)
+    return check("gap_shrink", pd.DataFrame(rows).assign(campaign=campaign))
+
+
+def gap_points(ground):
+    """`gap_points` of commanded points: a smooth gap and noise before, noise alone after; two points were left out."""
+    generator = np.random.default_rng(7)
+    command = ground[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
+    noise = generator.normal(0.0, NOISE_MM / np.sqrt(3.0), command.shape)
+    x, y, _ = (command / 300.0).T
+    forward = np.where(ground["run"] % 2, 1.0, -1.0)
+    before = 0.25 * np.column_stack([x, 0.6 * y + 0.4 * forward, 0.7 * np.cos(2.0 * x)]) + noise
+    used = np.ones(len(ground), dtype=bool)
+    used[[4, len(ground) // 2]] = False
+    before[~used] += 3.0
+    after = np.where(used[:, None], noise * 1.1, np.nan)
+    frame = ground.assign(
+        used=used,
+        **{f"drive_error{k}_rad": 1e-4 * k for k in (1, 2, 3)},
+        **{f"drive_error{k}_mm": np.nan for k in (1, 2, 3)},
+    )
+    vectors = {
+        f"{name}_{axis}_mm": part[:, k]
+        for name, part in (("before", before), ("after", after))
+        for k, axis in enumerate("xyz")
+    }
+    return check("gap_points", frame.assign(**vectors))
+
+
+def gap_tables(campaign, ground):
+    """Every table that the figure of a gap reads."""
+    return {
+        "gap_verdicts": gap_verdicts(campaign),
+        "gap_attribute": gap_attribute(campaign),
+        "gap_shrink": gap_shrink(campaign, ground["trajectory"].unique()),
+        "gap_points": gap_points(ground),
+    }
+
+
+def withheld_scores(each=8):
+    """`withheld_scores`: single effects, doubles, none and outside; weak ones are often missed; the field check has
+    four campaigns.
+    """
+    generator = np.random.default_rng(11)
+    rows = []
+    for label in ("label", "effect"):
+        outside = [f"outside:{name}" for name in (EFFECTS if label == "effect" else ("gear_wear", "cable_drag"))]
+        for truth in [*EFFECTS, "link_flexure+backlash", "none", *outside] if label == "label" else outside:
+            rows += [_score(generator, label, truth) for _ in range(each)]
+    rows += [_score(generator, "field", truth) for truth in ("backlash", "none", "outside:sag", "axis_tilt+servo_lag")]
+    names = [f"robot_{k:03d}" for k in range(len(rows))]
+    return check("withheld_scores", pd.DataFrame(rows).assign(robot=names))
+
+
+def _score(generator, label, truth):
+    """One robot's score."""
+    answer = "unexplained" if truth.startswith("outside:") else truth
+    strength = 0.0 if truth == "none" else 0.3 * 80.0 ** generator.random()
+    right = generator.random() < 1.0 - 0.5 * np.exp(-strength)
+    verdict = answer if right else generator.choice(("none", "link_flexure", "unexplained", "axis_tilt+backlash"))
+    none = "none" in (truth, verdict)
+    closed = np.nan if none else 1.0 - 0.5 * generator.random() ** 2
+    return {
+        "check": label,
+        "kind": generator.choice(("paper", "full")),
+        "truth": truth,
+        "truth_leg": 0,
+        "strength": strength,
+        "verdict": verdict,
+        "right": verdict == answer,
+        "leg_right": np.nan if none else 1.0,
+        "probability": 0.99 if strength > 3.0 else 0.45 + 0.5 * generator.random(),
+        "oracle_detects": bool(strength > 0.4),
+        "share_closed_true": closed,
+        "share_closed": closed + 0.05 * generator.normal(),
+    }
+
+
+def withheld_confusion(scores):
+    """`withheld_confusion` of the scores."""
+    counted = scores.groupby(["check", "truth", "verdict"]).size().rename("robots").reset_index()
+    return check("withheld_confusion", counted if len(counted) else pd.DataFrame(columns=columns("withheld_confusion")))
+
+
+def withheld_tables():
+    """Every table that the figure of the checks reads."""
+    scores = withheld_scores()
+    return {"withheld_scores": scores, "withheld_confusion": withheld_confusion(scores)}

@@ -1,0 +1,296 @@
+"""Result tables of a made-up campaign, small but shaped as real ones, for drawing figures without computing
+anything.
+"""
+
+import numpy as np
+import pandas as pd
+
+from rrru.store.schemas import TABLES
+from rrru.store.tables import check, columns
+
+CAMPAIGN = "made_up"
+OPTIONS = {
+    "campaign": CAMPAIGN,
+    "z_down": True,
+    "sweep_campaign": CAMPAIGN,
+    "sweep_calibration": "lines",
+    "calibration_lines": "lines",
+    "calibration_spiral": "spiral",
+    "method": "least_mean_distance",
+    "mode": "closed_loop",
+}
+SETS = ("group_1", "lines", "spiral", "both")
+PARAMETERS = ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "da")
+OPTIMUM_MM = 0.46
+LINES_AND_SPIRAL = (*(f"line_{k}" for k in range(1, 8)), "spiral")
+# paper A, Tables 3 and 4
+P_C = (0.5544, 0.5293, 0.5171, 0.5160, 0.5149, 0.5115, 0.5118, 0.5114, 0.5128, 0.6516)
+P_M = (0.5115, 0.5114, 0.5113, 0.5113, 0.5114, 0.5113, 0.5112, 0.5114, 0.5113, 0.5113)
+_AXES = ("x", "y", "z")
+
+
+def commanded(names=LINES_AND_SPIRAL, points=9, passes=1):
+    """Commanded points per run: trajectory, run, point and position; every second pass goes backwards."""
+    frames, run = [], 0
+    for _pass in range(passes):
+        for k, name in enumerate(names):
+            share = np.linspace(0.0, 1.0, points)
+            if "spiral" in name:
+                angle, radius = 6.0 * np.pi * share, 60.0 + 140.0 * share
+                place = np.column_stack(
+                    [-400.0 + radius * np.cos(angle), radius * np.sin(angle), 600.0 + 150.0 * share]
+                )
+            else:
+                place = np.column_stack([-800.0 + 500.0 * share, np.full(points, 37.5 * k), np.full(points, 600.0)])
+            run += 1
+            frames.append(_run(run, name, place[::-1] if _pass % 2 else place))
+    return pd.concat(frames, ignore_index=True)
+
+
+def _run(run, name, place):
+    frame = pd.DataFrame(place, columns=[f"command_{axis}_mm" for axis in _AXES])
+    return frame.assign(run=run, trajectory=name, point=np.arange(1, len(frame) + 1))
+
+
+def paths(ground):
+    """`measurements` of the campaign; the lines' first points lie near a singularity."""
+    near = (ground["command_x_mm"] < -700.0).map({True: "near_singularity", False: "ok"})
+    return check(
+        "measurements",
+        ground.assign(
+            time_s=np.arange(len(ground), dtype=float),
+            **{f"theta{k}_rad": 0.1 * k for k in (1, 2, 3)},
+            **{f"measured_{axis}_mm": ground[f"command_{axis}_mm"] + 1.0 for axis in _AXES},
+            speed_mm_s=80.0,
+            payload_kg=0.0,
+            status=near,
+        ),
+    )
+
+
+def errors(ground, modes=("model", "closed_loop")):
+    """`errors` before and under every calibration; the second point of each run has none."""
+    generator = np.random.default_rng(1)
+    frames = []
+    cases = [
+        ("none", "none", "before", 5.0),
+        *((s, OPTIONS["method"], mode, 0.4 + 0.2 * k) for k, s in enumerate(SETS) for mode in modes),
+    ]
+    for calibration, method, mode, size in cases:
+        vector = size * (
+            generator.normal(0.0, 0.4, (len(ground), 3)) + np.array([-0.4, 0.1, -0.6]) * (mode == "before")
+        )
+        vector[ground["point"] == 2] = np.nan
+        frames.append(
+            ground[["run", "trajectory", "point"]].assign(
+                campaign=CAMPAIGN,
+                calibration=calibration,
+                method=method,
+                mode=mode,
+                error_mm=np.linalg.norm(vector, axis=1),
+                **{f"error_{axis}_mm": vector[:, k] for k, axis in enumerate(_AXES)},
+            )
+        )
+    return check("errors", pd.concat(frames, ignore_index=True))
+
+
+def error_summary(error_rows):
+    """`error_summary` of rows of `errors`."""
+    groups = {name: [name] for name in error_rows["trajectory"].unique()}
+    groups |= {"all_lines": [name for name in groups if name.startswith("line_")], "all": list(groups)}
+    rows = []
+    for key, part in error_rows.groupby(["campaign", "calibration", "method", "mode"], sort=False):
+        for name, members in groups.items():
+            size = part.loc[part["trajectory"].isin(members), "error_mm"]
+            label = dict(zip(("campaign", "calibration", "method", "mode"), key, strict=True)) | {"trajectory": name}
+            numbers = {
+                "min_mm": size.min(),
+                "mean_mm": size.mean(),
+                "rms_mm": np.sqrt((size**2).mean()),
+                "max_mm": size.max(),
+            }
+            rows.append(label | {"points": int(size.notna().sum()), "repeats": 1} | numbers)
+    none = {f"{name}_mm": np.nan for name in ("pose_accuracy", "path_accuracy", "repeatability")}
+    return check("error_summary", pd.DataFrame(rows).assign(**none))
+
+
+def singularity(path_rows):
+    """`singularity` of the commanded points."""
+    measure = ((path_rows["command_x_mm"] + 900.0) / 1200.0).clip(0.0, 1.0)
+    columns = {"translational_measure": 0.5, "constraint_measure": measure, "constraint_determinant": measure - 0.1}
+    return check(
+        "singularity", path_rows[["run", "trajectory", "point", "status"]].assign(campaign=CAMPAIGN, **columns)
+    )
+
+
+def workspace():
+    """Two slices of a made-up workspace, out of reach beyond a circle."""
+    frames = []
+    for name, across, up, rest in (("xz", "x", "z", {"y_mm": 0.0}), ("xy", "x", "y", {"z_mm": 600.0})):
+        a, b = np.meshgrid(
+            np.arange(-1000.0, 1001.0, 50.0),
+            np.arange(0.0, 1201.0, 50.0) if up == "z" else np.arange(-1000.0, 1001.0, 50.0),
+        )
+        frame = pd.DataFrame({f"{across}_mm": a.ravel(), f"{up}_mm": b.ravel()}).assign(
+            campaign=CAMPAIGN, slice=name, **rest
+        )
+        radius = np.hypot(frame[f"{across}_mm"], frame[f"{up}_mm"])
+        reach = radius < 1000.0
+        determinant = (0.9 - radius / 1000.0).where(reach)
+        fields = {
+            "translational_measure": (1.0 - radius / 1000.0).where(reach),
+            "constraint_measure": determinant.abs(),
+        }
+        frames.append(frame.assign(reachable=reach, constraint_determinant=determinant, **fields))
+    frame = pd.concat(frames, ignore_index=True)
+    return check("workspace", frame) if "workspace" in TABLES else frame
+
+
+def observability(unseen=1):
+    """`observability` of every set; the worst `unseen` directions are not seen."""
+    count = len(PARAMETERS)
+    frames = []
+    for k, name in enumerate(SETS):
+        directions = np.linalg.qr(np.random.default_rng(k).normal(size=(count, count)))[0]
+        value = 10.0 ** -np.arange(count, dtype=float)
+        error = np.where(np.arange(count) < count - unseen, 0.02 / value, np.nan)
+        frames.append(
+            pd.DataFrame(
+                {
+                    "calibration": name,
+                    "direction": np.repeat(np.arange(1, count + 1), count),
+                    "singular_value": np.repeat(value, count),
+                    "standard_error_mm": np.repeat(error, count),
+                    "parameter": np.tile(PARAMETERS, count),
+                    "weight": directions.ravel(),
+                }
+            )
+        )
+    return check("observability", pd.concat(frames, ignore_index=True).assign(campaign=CAMPAIGN))
+
+
+def calibrations():
+    """`calibrations` with the optimum of every set."""
+    numbers = {
+        c.name: 1 if c.kind == "int64" else 1.0
+        for c in TABLES["calibrations"].columns
+        if c.kind in ("int64", "float64")
+    }
+    labels = {"campaign": CAMPAIGN, "method": OPTIONS["method"], "noise_from": "given"}
+    rows = [numbers | labels | {"calibration": name, "mean_mm": OPTIMUM_MM} for name in SETS]
+    return check("calibrations", pd.DataFrame(rows))
+
+
+def _found():
+    """Columns of the errors that a run of the genetic algorithm found."""
+    return {name: 0.0 for name in (*PARAMETERS[:-1], "dR", "dr")}
+
+
+def genetic(seeds=5):
+    """`genetic` and `genetic_history`; the first run ends at the optimum itself, the second starts infeasible."""
+    runs, history = [], []
+    for name in SETS:
+        for seed in range(1, seeds + 1):
+            last = 40 + 10 * seed
+            generation = np.arange(last + 1)
+            best = OPTIMUM_MM + (
+                5.0 * np.exp(-generation / (5.0 * seed)) if seed > 1 else np.maximum(0.0, 3.0 - 0.1 * generation)
+            )
+            if seed == 2:
+                best[0] = np.inf
+            label = {"campaign": CAMPAIGN, "calibration": name, "seed": seed}
+            history.append(pd.DataFrame(label | {"generation": generation, "best_mm": best, "mean_mm": best + 1.0}))
+            numbers = {"objective_mm": best[-1], "generations": last, "evaluations": 30 * last, "stopped": "stalled"}
+            numbers["polish_evaluations"] = 20
+            excess = {
+                "polished_mm": OPTIMUM_MM,
+                "optimum_mm": OPTIMUM_MM,
+                "excess": best[-1] / OPTIMUM_MM - 1.0,
+                "polished_excess": 0.0,
+            }
+            runs.append(label | numbers | excess | _found() | {"da": 0.0})
+    return check("genetic", pd.DataFrame(runs).reindex(columns=columns("genetic"))), check(
+        "genetic_history", pd.concat(history, ignore_index=True)
+    )
+
+
+def sweeps(scatter_mm=0.3, seeds=6):
+    """`sweep_runs`, `sweep_effect`, `sweep_pairs`; one run of the crossover fraction 1.0 is infeasible."""
+    generator = np.random.default_rng(3)
+    runs, effects, pairs = [], [], []
+    for parameter in ("crossover_fraction", "migration_fraction"):
+        for population in ("one", "islands"):
+            label = {"parameter": parameter, "population": population}
+            test = {"statistic": 20.0, "p_value": 1e-5, "epsilon_squared": 0.3}
+            effects.append(
+                label
+                | {"settings": 10, "runs": 10 * seeds}
+                | test
+                | {f"{key}_mutating": 0.3 for key in test}
+                | {"distinguishable_mutating": False}
+            )
+            for k, value in enumerate(np.arange(1, 11) / 10.0):
+                excess = scatter_mm * generator.gamma(2.0, 1.0, seeds)
+                if parameter == "crossover_fraction" and value == 1.0:
+                    excess[0] = np.inf
+                for seed, one in enumerate(excess, start=1):
+                    numbers = {
+                        "objective_mm": OPTIMUM_MM + one,
+                        "generations": 100,
+                        "evaluations": 3000,
+                        "stopped": "stalled",
+                    }
+                    runs.append(label | {"value": value, "seed": seed} | numbers | _found())
+                if k:
+                    numbers = {
+                        "best_value": 0.1,
+                        "median_mm": 0.6,
+                        "difference_mm": 0.1,
+                        "difference_low_mm": 0.0,
+                        "difference_high_mm": 0.2,
+                    }
+                    pairs.append(
+                        label
+                        | {"value": value}
+                        | numbers
+                        | {"p_value": 0.01, "p_holm": 0.1, "distinguishable": bool(k > 7)}
+                    )
+    frames = {"sweep_runs": runs, "sweep_effect": effects, "sweep_pairs": pairs}
+    return {name: check(name, pd.DataFrame(rows)) for name, rows in frames.items()}
+
+
+def published():
+    """`published` with the two sweeps of the paper."""
+    items = {f"P_c={k / 10:.1f}": value for k, value in enumerate(P_C, start=1)}
+    items |= {f"P_m={k / 10:.1f}": value for k, value in enumerate(P_M, start=1)}
+    labels = {
+        "paper": "A",
+        "source": "Tables 3 and 4",
+        "unit": "mm",
+        "here": np.nan,
+        "ratio": np.nan,
+        "here_low": np.nan,
+        "here_high": np.nan,
+        "note": "",
+    }
+    return check("published", pd.DataFrame({"item": list(items), "published": list(items.values())}).assign(**labels))
+
+
+def all_tables(ground=None, **choices):
+    """Every table that a figure reads, by name."""
+    ground = commanded() if ground is None else ground
+    path_rows, error_rows = paths(ground), errors(ground, **choices)
+    runs, history = genetic()
+    return {
+        "paths": path_rows,
+        "errors": error_rows,
+        "error_summary": error_summary(error_rows),
+        "singularity": singularity(path_rows),
+        "workspace": workspace(),
+        "observability": observability(),
+        "calibrations": calibrations(),
+        "genetic": runs,
+        "genetic_history": history,
+        "published": published(),
+        **sweeps(),
+    }

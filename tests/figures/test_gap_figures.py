@@ -1,0 +1,204 @@
+"""The figures of the gap diagnosis and of its checks: what they draw is what stands in the tables, and odd verdicts are
+drawn too.
+"""
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.colors import to_hex
+from scipy.stats import binomtest
+
+from rrru.errors import ConfigError
+from rrru.figures import style
+from rrru.figures.catalogue import FIGURES
+from rrru.store import tables
+from rrru.store.schemas import TABLES
+from rrru.studies.withheld import figures as withheld
+from tests.figures import synthetic_gap as made_up
+from tests.figures import synthetic_tables as synthetic
+
+GROUND = synthetic.commanded(names=("line_1", "line_2", "spiral"), passes=2)
+
+
+@pytest.fixture
+def frames():
+    return made_up.gap_tables(synthetic.CAMPAIGN, GROUND)
+
+
+def draw(name, frames):
+    function, needed, _ = FIGURES[name]
+    figure = function({table: frames[table] for table in needed}, synthetic.OPTIONS)
+    figure.draw_without_rendering()
+    return figure
+
+
+def panel(figure, title):
+    return next(axes for axes in figure.axes if title in axes.get_title(loc="left"))
+
+
+def written(axes):
+    return [text.get_text() for text in axes.texts]
+
+
+def test_the_map_shows_the_used_points_gaps_in_the_plane_by_size(frames):
+    axes = panel(draw("gap", frames), "(a)")
+    used = frames["gap_points"].query("used")
+    vectors = used[[f"before_{axis}_mm" for axis in "xyz"]].to_numpy()
+    arrows = axes.collections[0]
+    size = np.linalg.norm(vectors, axis=1)
+    order = np.argsort(size, kind="stable")
+    np.testing.assert_allclose(arrows.get_array(), size[order])
+    np.testing.assert_allclose(np.column_stack([arrows.U, arrows.V]), vectors[order][:, :2])
+    np.testing.assert_allclose(arrows.get_offsets(), used[["command_x_mm", "command_y_mm"]].to_numpy()[order])
+    assert f"magnified {1.0 / arrows.scale:g} times" in axes.get_title(loc="left")
+    ring = axes.lines[-1].get_xydata()[0]
+    np.testing.assert_allclose(ring, frames["gap_verdicts"][["worst_x_mm", "worst_y_mm"]].iloc[0].astype(float))
+
+
+def test_both_views_hold_every_point_and_share_x(frames):
+    figure = draw("gap", frames)
+    top, side = figure.axes[1:3]
+    assert top.get_xlim() == side.get_xlim() and side.get_ylim()[0] > side.get_ylim()[1]
+    for axes, up in ((top, "y"), (side, "z")):
+        place = frames["gap_points"].query("used")[["command_x_mm", f"command_{up}_mm"]].to_numpy()
+        low, high = np.sort([axes.get_xlim(), axes.get_ylim()], axis=1).T
+        assert (place > low).all() and (place < high).all()
+
+
+def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):
+    axes = panel(draw("gap", frames), "(b)")
+    names = [label.get_text() for label in axes.get_yticklabels()]
+    assert names[:2] == ["link flexure", "backlash"] and names[-2:] == ["unexplained", "none"] and len(names) == 14
+    assert [to_hex(bar.get_facecolor()).upper() == style.BLUE for bar in axes.patches] == [True] * 2 + [False] * 12
+    texts = dict(zip(names, written(axes), strict=True))
+    assert texts["link flexure"] == "0.98, leg 2" and texts["backlash"] == "0.97, each leg"
+    assert texts["thermal growth"] == "not tested" and texts["unexplained"] == "0.04"
+
+
+def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
+    axes = panel(draw("gap", frames), "(c)")
+    rows = frames["gap_shrink"].query("kind == 'held_out'")
+    for line, step in zip(axes.lines[1:], (0, 2), strict=True):
+        np.testing.assert_allclose(line.get_xdata(), rows.loc[rows["step"] == step, "gap_rms_mm"])
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "group 1", "group 2", "spiral"]
+    closed = [label.get_text() for label in axes.child_axes[0].get_yticklabels()]
+    assert closed[:2] == ["96 % (94 to 98)", "95 % (93 to 97)"]
+
+
+def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
+    bold, *rest = written(draw("gap", frames).axes[0])
+    assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % of it closed (94 to 98)"
+    text = " ".join(rest)
+    assert (
+        "confusable with drive compliance" in text and "x \N{MINUS SIGN}512" in text and f"next: {made_up.NEXT}" in text
+    )
+
+
+def test_points_left_out_are_marked_and_break_the_lines(frames):
+    axes = panel(draw("gap", frames), "(d)")
+    points = frames["gap_points"].sort_values(["run", "point"])
+    first = axes.lines[0].get_ydata()
+    assert np.isnan(first[4]) and np.isfinite(np.delete(first, 4)).all()
+    crosses = next(line for line in axes.lines if line.get_marker() == "x")
+    assert len(crosses.get_xdata()) == (~points["used"]).sum() and max(crosses.get_ydata()) < axes.get_ylim()[1]
+
+
+@pytest.mark.parametrize("effects", ["none", "unexplained", "my_effect+unexplained"])
+def test_odd_verdicts_are_drawn_too(effects, frames):
+    campaign = synthetic.CAMPAIGN
+    changes = {
+        "leg": 0,
+        "next_runs": "",
+        "confusable_with": "",
+        "dropped_points": 0,
+        "probability": 1.0,
+        "share_closed": 0.0,
+    }
+    frames["gap_verdicts"] = made_up.gap_verdicts(campaign, effects, **changes)
+    frames["gap_attribute"] = made_up.gap_attribute(
+        campaign, [(name, 0.999, "") for name in effects.split("+") if "my" not in name]
+    )
+    frames["gap_shrink"] = made_up.gap_shrink(campaign, ["line_1"], steps=0, kinds=("resimulated",))
+    frames["gap_points"] = frames["gap_points"].assign(used=True, **{f"after_{axis}_mm": np.nan for axis in "xyz"})
+    figure = draw("gap", frames)
+    bold, *rest = written(figure.axes[0])
+    assert bold.startswith(f"{effects.replace('_', ' ').replace('+', ' + ')} (p > 0.99): 0.37 mm gap")
+    assert ("closed" in bold) == ("+" in effects) and ("nothing" in bold) == ("+" not in effects)
+    assert len(rest) == 1 and "resimulated" in panel(figure, "(c)").get_xlabel() and not panel(figure, "(c)").child_axes
+    assert [text.get_text() for text in panel(figure, "(d)").get_legend().get_texts()] == [
+        "calibrated sim",
+        "noise, rms",
+    ]
+
+
+def test_a_diagnosis_without_a_used_point_is_refused(frames):
+    frames["gap_points"] = frames["gap_points"].assign(used=False)
+    with pytest.raises(ConfigError, match="made_up"):
+        draw("gap", frames)
+
+
+def test_many_points_are_thinned_on_the_map_alone():
+    ground = synthetic.commanded(points=60, passes=2)
+    figure = draw("gap", made_up.gap_tables(synthetic.CAMPAIGN, ground))
+    assert len(panel(figure, "(a)").collections[0].get_array()) <= 400 < len(ground)
+    assert len(panel(figure, "(d)").get_xticks()) == 16
+
+
+def test_confusion_tables_count_every_robot_and_frame_the_right_answers():
+    frames = made_up.withheld_tables()
+    figure = draw("withheld", frames)
+    scores = frames["withheld_scores"]
+    for check, title in (("label", "label withheld"), ("effect", "effect withheld")):
+        axes = panel(figure, title)
+        assert sum(map(int, written(axes))) == (scores["check"] == check).sum()
+        columns, rows = (
+            [label.get_text() for label in labels] for labels in (axes.get_xticklabels(), axes.get_yticklabels())
+        )
+        framed = {rows[round(patch.get_y() + 0.5)]: columns[round(patch.get_x() + 0.5)] for patch in axes.patches}
+        assert framed["backlash"] == ("backlash" if check == "label" else "unexplained") and len(framed) == (
+            14 if check == "label" else 12
+        )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "column"),
+    [("none", "none"), ("backlash", "backlash"), ("a+b", "two or more"), ("a+unexplained", "unexplained")],
+)
+def test_every_verdict_has_a_column(verdict, column):
+    assert withheld._verdict(verdict) == column
+
+
+def test_shares_are_of_the_scores():
+    scores = made_up.withheld_scores()
+    figure = draw("withheld", {"withheld_scores": scores, "withheld_confusion": made_up.withheld_confusion(scores)})
+    axes = panel(figure, "stated probability")
+    sure = scores.query("check == 'label' and probability >= 0.97")
+    line = next(one for one in axes.lines if one.get_label() == "label withheld")
+    assert line.get_ydata()[-1] == pytest.approx(sure["right"].mean())
+    oracle = next(one for one in panel(figure, "strength").lines if one.get_label().startswith("detected"))
+    weak = scores.query("check == 'label' and 0.3 <= strength < 0.6")
+    assert oracle.get_ydata()[0] == pytest.approx(weak["oracle_detects"].mean())
+
+
+@pytest.mark.parametrize(("hits", "count"), [(48, 48), (0, 10), (52, 60), (1, 1)])
+def test_intervals_are_wilson_s(hits, count):
+    share, *ends = withheld._wilson(np.arange(count) < hits)
+    assert share == hits / count
+    np.testing.assert_allclose(ends, binomtest(hits, count).proportion_ci(method="wilson"), atol=1e-12)
+
+
+def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
+    scores = made_up.withheld_scores(each=1)
+    for check in ("label", "effect", "field"):
+        one = scores[scores["check"] == check]
+        figure = draw("withheld", {"withheld_scores": one, "withheld_confusion": made_up.withheld_confusion(one)})
+        assert len(figure.axes) == 4
+    nothing = {"withheld_scores": scores.iloc[:0], "withheld_confusion": made_up.withheld_confusion(scores.iloc[:0])}
+    with pytest.raises(ConfigError, match="withheld_scores"):
+        draw("withheld", nothing)
+
+
+@pytest.mark.parametrize("name", [name for name in TABLES if name.startswith(("gap_", "withheld_"))])
+def test_tables_of_the_diagnosis_may_be_empty(name, tmp_path):
+    tables.write(name, pd.DataFrame(columns=tables.columns(name)), tmp_path / "t.parquet")
+    assert tables.read(tmp_path / "t.parquet").empty

@@ -1,0 +1,73 @@
+"""Migration by hand and by property."""
+
+import numpy as np
+import pytest
+
+from rrru.genetic import islands
+
+
+def _population(sizes, seed=0):
+    random = np.random.default_rng(seed)
+    return random.uniform(size=(sum(sizes), 3)), random.uniform(1.0, 9.0, sum(sizes))
+
+
+def test_islands_lie_one_after_the_other():
+    assert islands.rows_of((30,)).tolist() == [[0, 30]]
+    assert islands.rows_of((12, 30, 5)).tolist() == [[0, 12], [12, 42], [42, 47]]
+
+
+@pytest.mark.parametrize(("fraction", "expected"), [(0.0, 0), (0.1, 1), (0.15, 2), (0.7, 7), (1.0, 10)])
+def test_migrants_are_the_fraction_of_the_smaller_island(fraction, expected):
+    assert islands.migrant_count(fraction, 10, 30) == expected
+    assert islands.migrant_count(fraction, 30, 10) == expected
+
+
+def test_the_best_go_over_the_worst_of_the_next_and_stay_where_they_were():
+    population = np.arange(9.0)[:, None]
+    score = np.array([3.0, 1.0, 2.0, 6.0, 4.0, 5.0, 7.0, 9.0, 8.0])
+    arrived, arrived_score = islands.migrate(population, score, islands.rows_of((3, 3, 3)), 0.34)
+    # best: 1, 4, 6; worst: 0, 3, 7; the last island goes to the first
+    assert arrived[:, 0].tolist() == [6.0, 1.0, 2.0, 1.0, 4.0, 5.0, 6.0, 4.0, 8.0]
+    assert arrived_score.tolist() == [7.0, 1.0, 2.0, 1.0, 4.0, 5.0, 7.0, 4.0, 8.0]
+
+
+def test_a_whole_island_moves_one_island_on_at_fraction_one():
+    population, score = _population((5, 5, 5))
+    arrived, arrived_score = islands.migrate(population, score, islands.rows_of((5, 5, 5)), 1.0)
+    for source, target in ((0, 1), (1, 2), (2, 0)):
+        here, there = slice(5 * source, 5 * source + 5), slice(5 * target, 5 * target + 5)
+        assert sorted(arrived_score[there]) == sorted(score[here])
+        assert sorted(map(tuple, arrived[there])) == sorted(map(tuple, population[here]))
+
+
+@pytest.mark.parametrize("fraction", [0.1, 0.5, 0.7, 1.0])
+@pytest.mark.parametrize("sizes", [(4, 4), (3, 9, 5), (10, 2, 10, 2)])
+def test_scores_stay_with_their_individuals_and_the_best_is_never_lost(fraction, sizes):
+    for seed in range(20):
+        population, score = _population(sizes, seed)
+        owner = {tuple(row): value for row, value in zip(population, score, strict=True)}
+        before = population.copy(), score.copy()
+        arrived, arrived_score = islands.migrate(population, score, islands.rows_of(sizes), fraction)
+        assert all(owner[tuple(row)] == value for row, value in zip(arrived, arrived_score, strict=True))
+        assert arrived_score.min() == score.min()
+        np.testing.assert_array_equal(population, before[0])
+        np.testing.assert_array_equal(score, before[1])
+
+
+def test_infeasible_individuals_are_the_first_to_be_replaced():
+    population, score = _population((4, 4))
+    score[[4, 6]] = np.inf
+    _, arrived_score = islands.migrate(population, score, islands.rows_of((4, 4)), 0.5)
+    assert np.isfinite(arrived_score[4:]).all()
+
+
+def test_one_population_has_nobody_to_exchange_with():
+    population, score = _population((30,))
+    arrived, arrived_score = islands.migrate(population, score, islands.rows_of((30,)), 0.9)
+    np.testing.assert_array_equal(arrived, population)
+    np.testing.assert_array_equal(arrived_score, score)
+    assert not any(islands.is_due(generation, 20, 1) for generation in range(100))
+
+
+def test_migration_follows_every_twentieth_generation():
+    assert [generation for generation in range(70) if islands.is_due(generation, 20, 3)] == [20, 40, 60]

@@ -1,0 +1,151 @@
+"""Rates and loads against exact derivatives, potential energy and the energy balance."""
+
+import numpy as np
+import pytest
+
+from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, held_force, loads
+from rrru.robots.rrru3 import Rrru3
+
+_ROBOT = Rrru3()
+_MASSES = Masses()
+_PAYLOAD_KG = 2.5
+
+
+def _motion(n):
+    generator = np.random.default_rng(2)
+    return generator.uniform(-200.0, 200.0, (n, 3)), generator.uniform(-300.0, 300.0, (n, 3))
+
+
+def test_rates_are_the_jacobians(rich_poses):
+    points, theta = rich_poses
+    velocity, acceleration = _motion(len(points))
+    rate, _ = drive_rates(_ROBOT, points, velocity, acceleration)
+    exact = np.linalg.solve(_ROBOT.actuator_jacobian(points, theta), velocity[..., None])[..., 0]
+    np.testing.assert_allclose(rate, exact, rtol=1e-5, atol=1e-6)
+
+
+def test_drive_accelerations_are_the_rates_rates(rich_poses):
+    """Along x(t) the Jacobian's rate solve(J, v) is differentiated in time."""
+    points, _ = rich_poses
+    velocity, acceleration = _motion(len(points))
+    _, second = drive_rates(_ROBOT, points, velocity, acceleration)
+    h = 1e-4
+
+    def rate(t):
+        position = points + velocity * t + 0.5 * acceleration * t**2
+        jacobian = _ROBOT.actuator_jacobian(position, _ROBOT.inverse(position))
+        return np.linalg.solve(jacobian, (velocity + acceleration * t)[..., None])[..., 0]
+
+    np.testing.assert_allclose(second, (rate(h) - rate(-h)) / (2.0 * h), rtol=1e-4, atol=1e-5)
+
+
+def test_a_robot_at_rest_has_no_rates(rich_poses):
+    points, _ = rich_poses
+    rate, second = drive_rates(_ROBOT, points, np.zeros_like(points), np.zeros_like(points))
+    assert np.abs(rate).max() == 0.0 and np.abs(second).max() == 0.0
+    # starting from rest: no rate yet, but an acceleration
+    rate, second = drive_rates(_ROBOT, points, np.zeros_like(points), np.full_like(points, 40.0))
+    assert np.abs(rate).max() < 1e-12 and np.abs(second).min(axis=0).max() > 0.0
+
+
+def test_unknown_motion_gives_unknown_rates(rich_poses):
+    points, _ = rich_poses
+    velocity, acceleration = _motion(len(points))
+    velocity[3] = np.nan
+    acceleration[5] = np.nan
+    known, _ = drive_rates(_ROBOT, points, velocity, np.nan_to_num(acceleration))
+    rate, second = drive_rates(_ROBOT, points, velocity, acceleration)
+    assert np.isnan(rate[3]).all() and np.isnan(second[[3, 5]]).all()
+    np.testing.assert_array_equal(rate[5], known[5])
+    others = np.delete(np.arange(len(points)), [3, 5])
+    assert np.isfinite(rate[others]).all() and np.isfinite(second[others]).all()
+
+
+def _potential(theta, guess):
+    """Potential energy (n,) in N mm: the lumped masses' heights from the forward kinematics; z points down."""
+    position = _ROBOT.forward(theta, guess_mm=guess)
+    platform = _MASSES.platform_kg + _PAYLOAD_KG + 1.5 * _MASSES.forearm_kg
+    elbow = 400.0 * np.sin(theta)
+    height = -platform * position[:, 2] - (0.5 * _MASSES.forearm_kg * elbow + _MASSES.arm_kg * 0.5 * elbow).sum(axis=1)
+    return height * GRAVITY_MM_S2 / 1000.0
+
+
+def test_static_torque_is_the_potential_energys_slope(rich_poses):
+    points, theta = rich_poses
+    nothing = np.zeros_like(points)
+    _, _, torque = loads(_ROBOT, _MASSES, points, theta, nothing, nothing, np.full(len(points), _PAYLOAD_KG))
+    h = 1e-5
+    for leg in range(3):
+        step = h * np.eye(3)[leg]
+        slope = (_potential(theta + step, points) - _potential(theta - step, points)) / (2.0 * h)
+        np.testing.assert_allclose(torque[:, leg], -slope, rtol=1e-5, atol=1e-2)
+
+
+def test_motors_supply_the_change_of_energy(rich_poses):
+    """Energy balance: the motors' torque is the loads' with the other sign; its power is the rate of kinetic and
+    potential energy.
+    """
+    points, theta = rich_poses
+    velocity, acceleration = _motion(len(points))
+    payload = np.full(len(points), _PAYLOAD_KG)
+    rate, second = drive_rates(_ROBOT, points, velocity, acceleration)
+    _, _, torque = loads(_ROBOT, _MASSES, points, theta, second, acceleration, payload)
+    h = 1e-4
+
+    def energy(t):
+        position = points + velocity * t + 0.5 * acceleration * t**2
+        angle = _ROBOT.inverse(position)
+        speed = velocity + acceleration * t
+        drive = np.linalg.solve(_ROBOT.actuator_jacobian(position, angle), speed[..., None])[..., 0]
+        platform = _MASSES.platform_kg + payload + 1.5 * _MASSES.forearm_kg
+        # a uniform rod about its end, and half a forearm at the rod's other end
+        rod, lump = _MASSES.arm_kg * 400.0**2 / 3.0, 0.5 * _MASSES.forearm_kg * 400.0**2
+        kinetic = 0.5 * platform * (speed**2).sum(axis=1) + 0.5 * (rod + lump) * (drive**2).sum(axis=1)
+        return kinetic / 1000.0 + _potential(angle, position)
+
+    power = (energy(h) - energy(-h)) / (2.0 * h)
+    np.testing.assert_allclose(-(torque * rate).sum(axis=1), power, rtol=1e-4, atol=0.5)
+
+
+def test_legs_carry_the_platform_along_their_forearms(rich_poses):
+    points, theta = rich_poses
+    _, acceleration = _motion(len(points))
+    force, direction, _ = loads(
+        _ROBOT, _MASSES, points, theta, np.zeros_like(points), acceleration, np.full(len(points), _PAYLOAD_KG)
+    )
+    mass = 3.0 + _PAYLOAD_KG + 1.8
+    weight = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
+    np.testing.assert_allclose(np.einsum("nl,nla->na", force, direction), -weight, atol=1e-9)
+    # joint 4 lies at the platform's U joint, joint 3 a forearm before it
+    passive = _ROBOT.passive_angles(points, theta)
+    plane = theta + passive[..., 0]
+    cx, cy = _ROBOT.turn
+    radial = np.cos(plane) * np.cos(passive[..., 1])
+    side = np.sin(passive[..., 1])
+    forearm = np.stack(
+        [radial * cx - side * cy, radial * cy + side * cx, np.sin(plane) * np.cos(passive[..., 1])], axis=-1
+    )
+    np.testing.assert_allclose(direction, forearm, atol=1e-12)
+
+
+@pytest.mark.parametrize("payload_kg", [0.0, 4.0])
+def test_forces_grow_with_the_mass_that_hangs_on_the_platform(rich_poses, payload_kg):
+    points, theta = rich_poses
+    nothing = np.zeros_like(points)
+    bare, _, _ = loads(_ROBOT, Masses(1.0, 0.0, 0.0), points, theta, nothing, nothing, np.zeros(len(points)))
+    full, _, _ = loads(_ROBOT, _MASSES, points, theta, nothing, nothing, np.full(len(points), payload_kg))
+    np.testing.assert_allclose(full, bare * (3.0 + 1.8 + payload_kg), rtol=1e-12)
+
+
+def test_held_forces_carry_the_load_along_the_lines_from_elbow_to_joint(rich_poses):
+    """Independent: the elbow from the definition of the drive arm, the balance of forces at the platform."""
+    points, theta = rich_poses
+    force = held_force(_ROBOT, _MASSES, points, theta, np.zeros_like(points), np.full(len(points), _PAYLOAD_KG))
+    total = np.zeros_like(points)
+    for leg, azimuth in enumerate(_ROBOT.azimuth_rad):
+        out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        arm = np.cos(theta[:, leg, None]) * out + np.sin(theta[:, leg, None]) * np.array([0.0, 0.0, 1.0])
+        line = points + _ROBOT.r_mm * out - _ROBOT.R_mm * out - _ROBOT.L1_mm * arm
+        total += force[:, leg, None] * line / np.linalg.norm(line, axis=1, keepdims=True)
+    weight = (_MASSES.platform_kg + _PAYLOAD_KG + 1.5 * _MASSES.forearm_kg) * 9.80665
+    np.testing.assert_allclose(total, np.tile([0.0, 0.0, -weight], (len(points), 1)), atol=1e-9)

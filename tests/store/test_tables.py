@@ -1,0 +1,78 @@
+"""Result tables: typed, checked, whole or absent, and described."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as parquet
+import pytest
+
+from rrru.errors import TableError
+from rrru.store import glossary, tables
+from rrru.store.schemas import TABLES
+from tests.places import ROOT
+
+_ROWS = pd.DataFrame(
+    {
+        "campaign": ["a", "a"],
+        "calibration": ["x", "x"],
+        "parameter_a": ["p", "p"],
+        "parameter_b": ["q", "s"],
+        "correlation": [0.5, np.nan],
+    }
+)
+
+
+def test_round_trip_keeps_values_types_and_nulls(tmp_path):
+    path = tmp_path / "deep" / "t.parquet"
+    tables.write("correlations", _ROWS[list(_ROWS)[::-1]], path)
+    pd.testing.assert_frame_equal(tables.read(path), _ROWS, check_dtype=False)
+    schema = parquet.read_schema(path)
+    assert [str(t) for t in schema.types] == ["string"] * 4 + ["double"] and schema.names == tables.columns(
+        "correlations"
+    )
+    assert parquet.read_table(path)["correlation"].null_count == 1
+
+
+def test_same_frame_same_bytes(tmp_path):
+    for name in ("a", "b"):
+        tables.write("correlations", _ROWS, tmp_path / name)
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda f: f.drop(columns="correlation"), "correlation"),
+        (lambda f: f.assign(extra=1.0), "extra"),
+        (lambda f: f.assign(correlation="high"), "correlation"),
+        (lambda f: f.assign(campaign=None), "campaign"),
+        (lambda f: f.assign(parameter_b="q"), "parameter_b"),
+    ],
+)
+def test_what_does_not_fit_is_refused_and_named(tmp_path, change, message):
+    with pytest.raises(TableError, match=message):
+        tables.write("correlations", change(_ROWS), tmp_path / "t.parquet")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failed_write_leaves_the_old_table_and_nothing_else(tmp_path, monkeypatch):
+    path = tmp_path / "t.parquet"
+    tables.write("correlations", _ROWS, path)
+    before = path.read_bytes()
+
+    def broken(data, where, **options):
+        Path(where).write_bytes(b"half")
+        raise OSError("disk full")
+
+    monkeypatch.setattr(parquet, "write_table", broken)
+    with pytest.raises(OSError, match="disk full"):
+        tables.write("correlations", _ROWS.assign(correlation=0.1), path)
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
+
+
+def test_the_glossary_describes_every_table_and_column():
+    text = (ROOT / "results" / "README.md").read_text()
+    assert text == glossary.text(), "run `python -m rrru.store.glossary`"
+    for table in TABLES.values():
+        assert table.path in text and all(f"`{column.name}`" in text for column in table.columns)

@@ -1,0 +1,132 @@
+"""Zero errors from distances, shapes and heights: exact where nothing disturbs, and as uncertain as they say."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import FitError
+from rrru.fit.least_squares import least_squares
+from rrru.fit.residuals import Residuals
+from rrru.robots.delta import Delta
+from rrru.studies.delta.zero_offset import Distances, Heights, Shape, one_step, step_fit, taken_for_errors
+
+ROBOT, LEGS = Delta(), Delta(errors="legs")
+COMMAND = np.array([[x, y, 100.0] for x in (-200.0, -70.0, 70.0, 200.0) for y in (-135.0, 0.0, 135.0)])
+THETA = ROBOT.inverse(COMMAND)
+TRUE = np.array([0.012, -0.008, 0.015])
+KINDS = [Distances, lambda *a: Distances(*a, alike=True), Shape]
+
+
+def moved(places, seed=1):
+    """Places in a frame of which nothing is known."""
+    return places @ Rotation.random(rng=np.random.default_rng(seed)).as_matrix().T + [300.0, -80.0, 550.0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_exact_places_in_any_frame_give_the_true_errors(kind):
+    places = ROBOT.forward(THETA, TRUE)
+    points = kind(ROBOT, THETA, moved(places))
+    fit = least_squares(points)
+    np.testing.assert_allclose(fit.errors, TRUE, atol=1e-11)
+    assert fit.identifiability.rank == 3
+    other = kind(ROBOT, THETA, moved(places, seed=2))
+    # the frame does not count: sums of squares are the same for any errors
+    assert (points.residual(TRUE / 2.0) ** 2).sum() == pytest.approx((other.residual(TRUE / 2.0) ** 2).sum(), rel=1e-9)
+
+
+def test_heights_and_positions_need_the_base_frame_and_give_the_true_errors():
+    places = ROBOT.forward(THETA, TRUE)
+    for kind in (Heights, Residuals):
+        np.testing.assert_allclose(least_squares(kind(ROBOT, THETA, places, COMMAND)).errors, TRUE, atol=1e-11)
+
+
+@pytest.mark.parametrize("kind", [*KINDS, lambda *a: Heights(*a, COMMAND)])
+def test_jacobians_are_those_of_finite_differences(kind):
+    points = kind(ROBOT, THETA, ROBOT.forward(THETA, TRUE))
+    step = 1e-6
+    slope = np.stack(
+        [(points.residual(TRUE + step * e) - points.residual(TRUE - step * e)) / (2.0 * step) for e in np.eye(3)],
+        axis=-1,
+    )
+    np.testing.assert_allclose(points.jacobian(TRUE), slope, atol=1e-5)
+    assert len(slope) == points.residual(TRUE).size
+
+
+def test_one_step_is_the_paper_s_equation_15():
+    measured = moved(ROBOT.forward(THETA, TRUE))
+    h, b = [], []
+    nominal = ROBOT.forward(THETA)
+    for j in range(1, len(THETA)):
+        length = np.linalg.norm(nominal[j] - nominal[0])
+        slopes = [ROBOT.error_jacobian(nominal[k : k + 1], THETA[k : k + 1])[0] for k in (0, j)]
+        h.append((nominal[j] - nominal[0]) @ (slopes[1] - slopes[0]) / length)
+        b.append(np.linalg.norm(measured[j] - measured[0]) - length)
+    h, b = np.array(h), np.array(b)
+    expected = np.linalg.inv(h.T @ h) @ h.T @ b
+    np.testing.assert_allclose(one_step(Distances(ROBOT, THETA, measured, alike=True)), expected, rtol=1e-8)
+    assert not np.allclose(expected, TRUE, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", [Distances, Shape])
+def test_standard_errors_are_the_scatter_under_noise(kind):
+    generator, noise, draws = np.random.default_rng(8), 0.01, 250
+    places = moved(ROBOT.forward(THETA, TRUE))
+    fits = [
+        least_squares(kind(ROBOT, THETA, places + noise * generator.standard_normal(places.shape)), noise)
+        for _ in range(draws)
+    ]
+    scatter = np.std([fit.errors for fit in fits], axis=0)
+    # four standard deviations of an estimated standard deviation
+    np.testing.assert_allclose(scatter, fits[0].standard_errors, rtol=4.0 / np.sqrt(2.0 * draws))
+
+
+def test_the_papers_step_is_as_uncertain_as_it_says():
+    """The first place's noise is in every distance: estimated noise and standard errors are right all the same."""
+    generator, noise, draws = np.random.default_rng(9), 0.01, 400
+    small = TRUE / 100.0
+    places = moved(ROBOT.forward(THETA, small))
+    noisy = [
+        Distances(ROBOT, THETA, places + noise * generator.standard_normal(places.shape), alike=True)
+        for _ in range(draws)
+    ]
+    fits = [step_fit(points) for points in noisy]
+    tolerance = 4.0 / np.sqrt(2.0 * draws)
+    scale = np.sqrt(np.mean([fit.noise_mm**2 for fit, _ in fits]))
+    # residuals that share a noise tell less of it than as many independent ones: variance of a quadratic form
+    jacobian = noisy[0].jacobian(np.zeros(3))[:, 0]
+    left = (np.eye(len(noisy[0])) - jacobian @ np.linalg.pinv(jacobian)) @ noisy[0].covariance
+    assert scale == pytest.approx(noise, rel=4.0 * 0.5 * np.sqrt(2.0 * np.trace(left @ left) / draws) / np.trace(left))
+    scatter = np.std([fit.errors for fit, _ in fits], axis=0)
+    expected = np.sqrt(np.mean([fit.standard_errors**2 for fit, _ in fits], axis=0))
+    np.testing.assert_allclose(scatter, expected, rtol=tolerance)
+    fit, covariance = fits[0]
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), fit.standard_errors)
+    # the condition is that of what the distances hold, not of the paper's weights
+    other = least_squares(Distances(ROBOT, THETA, noisy[0].measured_mm))
+    assert fit.identifiability.condition == pytest.approx(other.identifiability.condition, rel=1e-2)
+
+
+def test_what_is_taken_for_zero_errors_is_what_a_fit_finds():
+    for kind in (Distances, Shape, lambda *a: Heights(*a, COMMAND)):
+        length = 1e-3
+        errors = np.zeros(12)
+        errors[5] = length
+        found = least_squares(kind(ROBOT, THETA, LEGS.forward(THETA, errors))).errors
+        exact = ROBOT.forward(THETA)
+        changes = -kind(LEGS, THETA, exact).jacobian(np.zeros(12))[..., [5]]
+        np.testing.assert_allclose(
+            length * taken_for_errors(kind(ROBOT, THETA, exact), changes)[:, 0], found, rtol=2e-3
+        )
+
+
+def test_too_few_places_are_refused_and_a_second_height_conditions_better():
+    with pytest.raises(FitError, match="2 equations; allowed: at least 3"):
+        least_squares(Distances(ROBOT, THETA[:3], ROBOT.forward(THETA[:3], TRUE)))
+    split = COMMAND - np.outer(np.arange(len(COMMAND)) % 2, [0.0, 0.0, 100.0])
+    condition = [
+        least_squares(
+            Distances(ROBOT, ROBOT.inverse(p), ROBOT.forward(ROBOT.inverse(p), TRUE))
+        ).identifiability.condition
+        for p in (COMMAND, split)
+    ]
+    assert condition[1] < condition[0]

@@ -1,0 +1,244 @@
+"""Scoring made-up verdicts of robots whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.effects.library import EFFECTS
+from rrru.errors import ConfigError
+from rrru.fit.least_squares import least_squares
+from rrru.fit.residuals import Residuals
+from rrru.gap.case import State, make_case
+from rrru.robots.dynamics import Masses
+from rrru.store import tables
+from rrru.studies.withheld import draw, score
+from rrru.studies.withheld.oracle import limits, with_truth
+from rrru.studies.withheld.robots import NOISE_MM, answer, measure, nominal
+from rrru.studies.withheld.states import state_of, state_row
+from rrru.studies.withheld.summary import calibration_error, summary, wilson
+
+_MECHANISM = nominal({})
+_SEED = 11
+
+
+@pytest.fixture(scope="module")
+def robots():
+    """A robot with backlash on leg 2 of twice the noise, and one with nothing, with their measurements and
+    calibrations.
+    """
+    bare = draw._bare("bare", np.random.default_rng(7), _MECHANISM)
+    acting = draw._draw_acting(bare, "backlash", False, (2.0, 2.001), np.random.default_rng(3), _MECHANISM)
+    faulty = replace(bare, name="faulty", acting=(replace(acting, leg=2, coordinates=(0.0, 6e-4, 0.0)),))
+    result = {}
+    for robot in (replace(bare, name="sound"), faulty):
+        measurements = measure(robot, _SEED, _MECHANISM)
+        residuals = Residuals(
+            _MECHANISM, rows.actuators(measurements), rows.measured(measurements), rows.command(measurements)
+        )
+        result[robot.name] = (robot, measurements, least_squares(residuals).errors)
+    return result
+
+
+def _frames(robots, verdicts, states):
+    """The four frames of a chunk."""
+    answers = pd.DataFrame([answer(robot, _MECHANISM) for robot, _, _ in robots.values()])
+    measurements = pd.concat([frame.assign(robot=name) for name, (_, frame, _) in robots.items()])
+    told = pd.DataFrame(
+        [{"robot": name, "probability": 0.9, "share_closed": 0.5} | verdict for name, verdict in verdicts.items()]
+    )
+    return answers, measurements, told, pd.DataFrame([state_row(name, *state) for name, state in states.items()])
+
+
+def test_a_perfect_diagnosis_gets_everything(robots):
+    faulty, _, calibrated = robots["faulty"]
+    perfect = State(np.array(faulty.errors), {("backlash", 0): np.array(faulty.acting[0].coordinates)})
+    sound = State(robots["sound"][2], {})
+    frames = _frames(
+        robots,
+        {"sound": {"effects": "none", "leg": 0}, "faulty": {"effects": "backlash", "leg": 2}},
+        {"sound": (robots["sound"][2], sound), "faulty": (calibrated, perfect)},
+    )
+    scores, yardsticks = score.score_chunk("label", _SEED, *frames, _MECHANISM)
+    scores = tables.check("withheld_scores", scores).set_index("robot")
+    tables.check("withheld_limits", yardsticks)
+    assert (
+        scores["right"].all()
+        and scores.loc["faulty", "leg_right"] == 1.0
+        and np.isnan(scores.loc["sound", "leg_right"])
+    )
+    # the diagnosis' motion is not quite the robot's, so that a little is left of the hysteresis
+    assert scores.loc["faulty", "share_closed_true"] > 0.8 and np.isnan(scores.loc["sound", "share_closed_true"])
+    assert scores.loc["faulty", "oracle_detects"] and not scores.loc["sound", "oracle_detects"]
+    assert np.isnan(scores.loc["sound", "share_closed"]) and scores.loc["faulty", "share_closed"] == 0.5
+
+
+def test_a_wrong_diagnosis_gets_nothing(robots):
+    states = {name: (calibrated, State(calibrated, {})) for name, (_, _, calibrated) in robots.items()}
+    verdicts = {"sound": {"effects": "servo_lag", "leg": 0}, "faulty": {"effects": "backlash+unexplained", "leg": 1}}
+    scores, _ = score.score_chunk("label", _SEED, *_frames(robots, verdicts, states), _MECHANISM)
+    assert not scores["right"].any() and scores.set_index("robot").loc["faulty", "leg_right"] == 0.0
+    assert scores.set_index("robot").loc["faulty", "share_closed_true"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("truth", "verdict", "check", "right"),
+    [
+        ("none", "none", "label", True),
+        ("none", "unexplained", "label", False),
+        ("backlash", "backlash", "label", True),
+        ("backlash", "backlash+unexplained", "label", False),
+        ("backlash+servo_lag", "servo_lag+backlash", "label", True),
+        ("backlash+servo_lag", "servo_lag", "label", False),
+        ("outside:rehoming", "unexplained", "label", True),
+        ("outside:rehoming", "servo_lag+unexplained", "label", True),
+        ("outside:rehoming", "servo_lag", "label", False),
+        ("outside", "unexplained", "field", True),
+        ("backlash", "unexplained", "effect", True),
+        ("backlash", "servo_lag+unexplained", "effect", True),
+        ("backlash", "servo_lag", "effect", False),
+    ],
+)
+def test_right_is_what_names_exactly_the_truth(truth, verdict, check, right):
+    assert score.is_right(truth, verdict, check) is right
+
+
+def test_states_survive_as_text():
+    state = State(
+        np.array([1e-3, -2.5]),
+        {("thermal_growth", 2): np.array([1.25e-4]), ("backlash", 0): np.array([0.0, 1 / 3, 2.0])},
+        {"thermal_growth": {"time_constant": 1 / 7}},
+    )
+    calibrated, again = state_of(state_row("a", [0.5, 0.25], state))
+    np.testing.assert_array_equal(calibrated, [0.5, 0.25])
+    np.testing.assert_array_equal(again.errors, state.errors)
+    assert set(again.effects) == set(state.effects) and again.shapes == state.shapes
+    assert all((again.effects[key] == value).all() for key, value in state.effects.items())
+
+
+def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):
+    """On robots without any effect, tested for one that is not there."""
+    sound, faulty = robots["sound"][0], robots["faulty"][0]
+    alarms = 0
+    for number in range(300):
+        measurements = measure(sound, 1000 + number, _MECHANISM)
+        case = make_case(measurements, _MECHANISM, Masses(), NOISE_MM, with_truth({}, faulty.acting))
+        alarms += limits(case, np.array(sound.errors), faulty.acting, []).detects
+    assert 0 <= alarms <= 9
+
+
+def test_the_best_rival_of_backlash_is_lag(robots):
+    robot, measurements, calibrated = robots["faulty"]
+    case = make_case(measurements, _MECHANISM, Masses(), NOISE_MM, with_truth(EFFECTS, robot.acting))
+    found = limits(case, calibrated, robot.acting, list(EFFECTS))
+    assert found.detects and found.freedom == 1 and found.rival == "servo_lag" and found.rival_chi2 > 30.0
+
+
+def test_wilson_interval():
+    # R. G. Newcombe, Statistics in Medicine 17 (1998), Table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29
+    for hits, count, low, high in (
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ):
+        np.testing.assert_allclose(wilson(hits, count), (low, high), atol=5e-5)
+    assert np.isnan(wilson(0, 0)).all()
+
+
+def test_calibration_error():
+    assert calibration_error([1.0] * 20, [True] * 20) == 0.0
+    np.testing.assert_allclose(calibration_error([0.9] * 20, [True] * 10 + [False] * 10), 0.5 * (0.1 + 0.9), atol=1e-12)
+    generator = np.random.default_rng(1)
+    stated = generator.uniform(size=20000)
+    assert calibration_error(stated, generator.uniform(size=20000) < stated) < 0.02
+
+
+def _scores(*entries):
+    """Score rows from (truth, verdict, strength, leg)."""
+    base = {
+        "check": "label",
+        "kind": "full",
+        "probability": 0.9,
+        "oracle_detects": True,
+        "share_closed": 0.8,
+        "share_closed_true": 0.82,
+    }
+    return pd.DataFrame(
+        [
+            base
+            | {"robot": f"r{k}", "truth": truth, "verdict": verdict, "strength": strength, "truth_leg": leg}
+            | {"right": score.is_right(truth, verdict, "label"), "leg_right": 1.0 if leg else np.nan}
+            for k, (truth, verdict, strength, leg) in enumerate(entries)
+        ]
+    )
+
+
+def test_the_summary_counts_whom_it_says():
+    scores = _scores(
+        ("backlash", "backlash", 2.0, 1),
+        ("backlash", "servo_lag", 3.0, 0),
+        ("backlash", "none", 0.5, 0),
+        ("servo_lag", "servo_lag", 1.2, 0),
+        ("none", "none", 0.0, 0),
+        ("none", "backlash", 0.0, 0),
+        ("backlash+servo_lag", "backlash", 3.0, 0),
+        ("backlash+servo_lag", "servo_lag+backlash", 3.0, 0),
+        ("outside:rehoming", "unexplained", 4.0, 0),
+        ("outside:rehoming", "backlash", 1.0, 0),
+    )
+    weak = {"r6": 0.2, "r7": 1.5}
+    limit = pd.DataFrame(
+        [{"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "imitated_share": 0.1} for r in scores["robot"]]
+    )
+    table = tables.check("withheld_summary", summary(scores, limit)).set_index(["group", "figure"])
+    expected = {
+        ("one effect, gap >= 1.5 x noise", "named exactly"): (2, 0.5),
+        ("nothing acts", "false alarms"): (2, 0.5),
+        ("outside the library, gap >= 2 x noise", "unexplained"): (1, 1.0),
+        ("two effects", "both named exactly"): (2, 0.5),
+        ("two effects, each >= 1 x noise", "both named exactly"): (1, 1.0),
+        ("two effects", "at least one named, nothing wrong"): (2, 1.0),
+        ("one leg at fault, gap >= 1.5 x noise", "leg named"): (1, 1.0),
+        ("one effect, gap 0.3 to 1 x noise", "named exactly"): (1, 0.0),
+        ("one effect named, gap >= 1.5 x noise", "share closed predicted within 0.05"): (1, 1.0),
+        ("backlash alone", "named exactly"): (3, 1.0 / 3.0),
+    }
+    for key, (robots, value) in expected.items():
+        assert table.loc[key, "robots"] == robots and np.isclose(table.loc[key, "value"], value), key
+    counts = tables.check("withheld_confusion", score.confusion(scores)).set_index(["truth", "verdict"])["robots"]
+    assert counts["backlash+servo_lag", "backlash+servo_lag"] == 1 and counts.sum() == len(scores)
+
+
+def test_field_campaigns_are_scored_against_the_users_answers(tmp_path):
+    path = tmp_path / "answers.csv"
+    path.write_text("campaign,effects,leg\na,servo_lag+backlash,0\nb,backlash,2\nc,none,\nd,outside,0\n")
+    verdict = {"probability": 0.7, "gap_rms_mm": 0.2, "noise_rms_mm": 0.04, "share_closed": 0.9}
+    said = {
+        "a": ("backlash+servo_lag", 0),
+        "b": ("backlash", 1),
+        "c": ("none", 0),
+        "d": ("unexplained", 0),
+        "e": ("none", 0),
+    }
+    verdicts = pd.DataFrame(
+        [verdict | {"campaign": name, "effects": effects, "leg": leg} for name, (effects, leg) in said.items()]
+    )
+    scores = tables.check("withheld_scores", score.score_field(verdicts, score.read_field_answers(path)))
+    assert (
+        scores["robot"].tolist() == ["a", "b", "c", "d"] and scores["right"].all() and scores["strength"].eq(5.0).all()
+    )
+    assert scores.set_index("robot").loc["b", "leg_right"] == 0.0
+    assert len(tables.check("withheld_verdicts", score.field_verdicts(verdicts))) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("campaign,effects\na,none\n", "lacks the columns leg"), ("campaign,effects,leg\na,nosuch,0\n", "'nosuch'")],
+)
+def test_answers_that_make_no_sense_are_refused(tmp_path, text, message):
+    (tmp_path / "answers.csv").write_text(text)
+    with pytest.raises(ConfigError, match=message):
+        score.read_field_answers(tmp_path / "answers.csv")
