@@ -20,7 +20,7 @@ GENERATIONS, POPULATION, SEEDS = 1400, 30, range(5)
 
 def task(sides_mm):
     """Objective and bounds of the lines at the given y."""
-    robot = Rrru3(errors="tied")
+    robot = Rrru3(parameter_set="tied")
     line = np.linspace(-800.0, -300.0, 26)
     commanded = np.concatenate([np.column_stack([line, np.full(26, y), np.full(26, 600.0)]) for y in sides_mm])
     theta = robot.inverse(commanded)

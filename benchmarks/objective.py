@@ -18,7 +18,7 @@ _POPULATION = 30
 
 def _campaign():
     """182 points of seven lines under errors like Table 5's, tied model."""
-    robot = Rrru3(errors="tied")
+    robot = Rrru3(parameter_set="tied")
     lines = line_groups((-800.0, 0.0, 600.0), (-300.0, 0.0, 600.0), (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5), 26)
     points = np.concatenate([sample(line) for line in lines])
     theta = robot.require_reachable(points)
@@ -26,11 +26,11 @@ def _campaign():
     return Residuals(robot, theta, robot.forward(theta, truth, points), points)
 
 
-def _fsolve_rate(residuals, errors, count):
+def _fsolve_rate(residuals, deviations, count):
     """Pose solves per second of fsolve on eq. (8), written out in plain numpy as a user would, and the positions
     (count, 3).
     """
-    legs, (cx, cy) = residuals.mechanism.legs(errors), residuals.mechanism.turn
+    legs, (cx, cy) = residuals.mechanism.legs(deviations), residuals.mechanism.turn
 
     def closure(p, theta):
         u, v = p[0] * cx + p[1] * cy, p[1] * cx - p[0] * cy
@@ -51,16 +51,16 @@ def main():
     """Print both rates and their ratio, several rounds side by side."""
     residuals = _campaign()
     generator = np.random.default_rng(0)
-    errors = generator.uniform(-1.0, 1.0, (_POPULATION, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
-    residuals.mean_distance(errors)
+    deviations = generator.uniform(-1.0, 1.0, (_POPULATION, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
+    residuals.mean_distance(deviations)
     for _ in range(5):
         repeats = 200
         start = perf_counter()
         for _ in range(repeats):
-            residuals.mean_distance(errors)
+            residuals.mean_distance(deviations)
         ours = repeats * _POPULATION * len(residuals) / (perf_counter() - start)
-        theirs, positions = _fsolve_rate(residuals, errors[0], len(residuals))
-        apart = np.abs(positions - residuals.model(errors[0])).max()
+        theirs, positions = _fsolve_rate(residuals, deviations[0], len(residuals))
+        apart = np.abs(positions - residuals.model(deviations[0])).max()
         print(
             f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, positions apart {apart:.1e} mm"
         )

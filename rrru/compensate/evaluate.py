@@ -21,15 +21,15 @@ def before(measurements):
     return _rows(measurements, rows.measured(measurements) - rows.command(measurements), "none", "none", "before")
 
 
-def model_residual(measurements, mechanism, errors, calibration, method):
+def model_residual(measurements, mechanism, deviations, calibration, method):
     """Rows of `errors` in mode "model": measured position minus the one that the calibrated model gives for the angles
     that were sent.
     """
-    model = mechanism.forward(rows.actuators(measurements), errors, rows.command(measurements))
+    model = mechanism.forward(rows.actuators(measurements), deviations, rows.command(measurements))
     return _rows(measurements, rows.measured(measurements) - model, calibration, method, "model")
 
 
-def closed_loop(robot, plan, errors, noise_mm, generator, calibration, method):
+def closed_loop(robot, plan, deviations, noise_mm, generator, calibration, method):
     """Rows of `errors` in mode "closed_loop": the controller corrects its commands, the virtual robot drives them and
     is measured again.
 
@@ -37,7 +37,7 @@ def closed_loop(robot, plan, errors, noise_mm, generator, calibration, method):
     """
     mechanism = robot.mechanism
     measurements, _ = robot.run(
-        plan, noise_mm, generator, controller=lambda position: mechanism.inverse(position, errors)
+        plan, noise_mm, generator, controller=lambda position: mechanism.inverse(position, deviations)
     )
     return _rows(
         measurements, rows.measured(measurements) - rows.command(measurements), calibration, method, "closed_loop"

@@ -36,7 +36,7 @@ def fit_sets(measurements, mechanism, settings, noise_mm=None):
             continue
         fit = least_squares(residuals, noise_mm, settings["loss"], settings["loss_scale_mm"])
         fits[name, "least_squares"] = fit
-        fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.errors, noise_mm)
+        fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
         present = ", ".join(measurements["trajectory"].unique())
         raise ConfigError(
@@ -93,7 +93,7 @@ def _parameter_rows(fit, method, truth):
         {
             "parameter": names,
             "unit": ["rad" if name.startswith("dtheta") else "mm" for name in names],
-            "value": fit.errors,
+            "value": fit.deviations,
             "standard_error": np.where(np.isfinite(errors), errors, np.nan),
             "seen": [
                 bool((fit.identifiability.directions[fit.identifiability.rank :, k] ** 2).sum() < 1e-8)

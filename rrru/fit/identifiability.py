@@ -55,11 +55,11 @@ class Identifiability:
         return result
 
     def standard_errors(self, noise_mm):
-        """Standard errors (p,) for noise of `noise_mm` per axis; inf for parameters that touch an unseen direction."""
+        """Standard deviations (p,) for noise of `noise_mm` per axis; inf for parameters that touch an unseen direction."""
         return np.sqrt(np.diag(self.covariance(noise_mm)))
 
     def robust_standard_errors(self, jacobian, influence, curvature):
-        """Standard errors (p,) of an M-estimate: A^-1 B A^-1 with A = J' diag(curvature) J and B = J' diag(influence^2)
+        """Standard deviations (p,) of an M-estimate: A^-1 B A^-1 with A = J' diag(curvature) J and B = J' diag(influence^2)
         J.
 
         jacobian: (n, 3, p); influence, curvature: (n, 3), first and second derivative of the loss by the residuals. Inf

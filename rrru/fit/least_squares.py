@@ -23,13 +23,13 @@ LOSSES = tuple(_DERIVATIVES)
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted errors (p,) and what belongs to them.
+    """Fitted deviations (p,) and what belongs to them.
 
-    standard_errors (p,): NaN for a parameter at a bound, inf for one that the points do not see. noise_mm: noise per
+    standard_deviations (p,): NaN for a parameter at a bound, inf for one that the points do not see. noise_mm: noise per
     axis that they assume, from where `noise_from` says ("given", "residuals"). evaluations: of all residuals.
     """
 
-    errors: np.ndarray
+    deviations: np.ndarray
     residual_mm: np.ndarray
     noise_mm: float
     noise_from: str
@@ -78,28 +78,28 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
         x_scale=start.singular_values[0] / start.singular_values[: start.rank],
         **options,
     )
-    errors, evaluations = parameters.nominal + seen @ solution.x, int(solution.nfev)
-    if start.rank == len(parameters) and not parameters.hold(errors):
+    deviations, evaluations = parameters.nominal + seen @ solution.x, int(solution.nfev)
+    if start.rank == len(parameters) and not parameters.hold(deviations):
         solution = optimize.least_squares(
             lambda e: residuals.residual(e).ravel(),
-            parameters.inside(errors),
+            parameters.inside(deviations),
             jac=lambda e: residuals.jacobian(e).reshape(-1, len(parameters)),
             bounds=(parameters.low, parameters.high),
             x_scale=start.scale,
             **options,
         )
-        errors, evaluations = solution.x, evaluations + int(solution.nfev)
-    if not (solution.success and np.isfinite(errors).all()):
+        deviations, evaluations = solution.x, evaluations + int(solution.nfev)
+    if not (solution.success and np.isfinite(deviations).all()):
         raise FitError(f"least squares did not converge: {solution.message}", solution)
-    return make_fit(residuals, errors, evaluations, noise_mm, loss, loss_scale_mm)
+    return make_fit(residuals, deviations, evaluations, noise_mm, loss, loss_scale_mm)
 
 
-def make_fit(residuals, errors, evaluations, noise_mm=None, loss="linear", loss_scale_mm=0.1):
-    """Fit of errors (p,) that a search has found; see `least_squares` for the other arguments."""
+def make_fit(residuals, deviations, evaluations, noise_mm=None, loss="linear", loss_scale_mm=0.1):
+    """Fit of deviations (p,) that a search has found; see `least_squares` for the other arguments."""
     mechanism = residuals.mechanism
-    residual, jacobian = residuals.residual(errors), residuals.jacobian(errors)
+    residual, jacobian = residuals.residual(deviations), residuals.jacobian(deviations)
     identifiability = analyse(mechanism, jacobian)
-    at_bound = mechanism.parameters.at_bound(errors)
+    at_bound = mechanism.parameters.at_bound(deviations)
     free = np.flatnonzero(~at_bound)
     freedom = max(residual.size - min(identifiability.rank, len(free)), 1)
     estimated = float(np.sqrt((residual**2).sum() / freedom))
@@ -109,7 +109,7 @@ def make_fit(residuals, errors, evaluations, noise_mm=None, loss="linear", loss_
     # three standard deviations of an estimated standard deviation
     given = noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom))
     noise = noise_mm if given else estimated
-    standard_errors = np.full(len(errors), np.nan)
+    standard_errors = np.full(len(deviations), np.nan)
     reduced = analyse_columns(
         [mechanism.parameters.names[k] for k in free], parameter_scale(mechanism)[free], jacobian[..., free]
     )
@@ -122,7 +122,7 @@ def make_fit(residuals, errors, evaluations, noise_mm=None, loss="linear", loss_
             jacobian[..., free], first * residual, first + 2.0 * z * second
         )
     return Fit(
-        errors,
+        deviations,
         residual,
         noise,
         "given" if given else "residuals",

@@ -49,13 +49,13 @@ def least_mean_distance(residuals, start, noise_mm=None):
             },
         )
         evaluations, best = evaluations + int(simplex.nfev), simplex.x
-    errors = start + seen @ best
-    if ident.rank == len(parameters) and not parameters.hold(errors):
-        errors, more = _bounded(residuals, parameters.inside(errors))
+    deviations = start + seen @ best
+    if ident.rank == len(parameters) and not parameters.hold(deviations):
+        deviations, more = _bounded(residuals, parameters.inside(deviations))
         evaluations += more
-    if not np.isfinite(residuals.mean_distance(errors[None])[0]):
+    if not np.isfinite(residuals.mean_distance(deviations[None])[0]):
         raise FitError(f"least mean distance did not converge: {solution.message}", solution)
-    return make_fit(residuals, errors, evaluations, noise_mm)
+    return make_fit(residuals, deviations, evaluations, noise_mm)
 
 
 def _objective(residuals, start, directions):
@@ -64,13 +64,13 @@ def _objective(residuals, start, directions):
 
     @lru_cache(maxsize=1)
     def parts(key):
-        errors = start + directions @ np.frombuffer(key)
-        residual = residuals.residual(errors)
+        deviations = start + directions @ np.frombuffer(key)
+        residual = residuals.residual(deviations)
         if not np.isfinite(residual).all():
             # a trial step left the reach: a value that the trust region turns away from
             return np.full(len(residuals), _OUT_OF_REACH_MM), np.zeros((len(residuals), rank)), np.zeros((1, 3, rank))
         distance = np.maximum(np.linalg.norm(residual, axis=1), 1e-12)
-        jacobian = residuals.jacobian(errors) @ directions
+        jacobian = residuals.jacobian(deviations) @ directions
         return distance, np.einsum("na,nap->np", residual / distance[:, None], jacobian), jacobian
 
     def value(q):

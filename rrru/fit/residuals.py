@@ -49,7 +49,7 @@ class Residuals:
     @cached_property
     def _kernel_arguments(self):
         """Arrays of the compiled objective that do not change with the errors."""
-        slope = self.mechanism.error_jacobian(self.nominal_mm, self.actuators)
+        slope = self.mechanism.parameter_jacobian(self.nominal_mm, self.actuators)
         return (
             self.mechanism.turn,
             np.ascontiguousarray(np.cos(self.actuators).T),
@@ -64,27 +64,27 @@ class Residuals:
         """Measured positions (n, 3) as the compiled objective needs them."""
         return np.ascontiguousarray(self.measured_mm, dtype=float)
 
-    def model(self, errors):
-        """Model positions (n, 3) in mm under errors (p,)."""
-        return self.mechanism.forward(self.actuators, errors, self.nominal_mm)
+    def model(self, deviations):
+        """Model positions (n, 3) in mm under deviations (p,)."""
+        return self.mechanism.forward(self.actuators, deviations, self.nominal_mm)
 
-    def residual(self, errors):
-        """Measured minus model positions (n, 3) in mm under errors (p,)."""
-        return self.measured_mm - self.model(errors)
+    def residual(self, deviations):
+        """Measured minus model positions (n, 3) in mm under deviations (p,)."""
+        return self.measured_mm - self.model(deviations)
 
-    def jacobian(self, errors):
+    def jacobian(self, deviations):
         """Derivative (n, 3, p) of the residual with respect to the errors."""
-        return -self.mechanism.error_jacobian(self.model(errors), self.actuators, errors)
+        return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
 
-    def mean_distance(self, errors):
-        """Objective of paper A, eq. (11): mean distance (m,) in mm for errors (m, p); inf where the model leaves the
+    def mean_distance(self, deviations):
+        """Objective of paper A, eq. (11): mean distance (m,) in mm for deviations (m, p); inf where the model leaves the
         reach.
         """
-        errors = np.ascontiguousarray(errors, dtype=float)
+        deviations = np.ascontiguousarray(deviations, dtype=float)
         if not isinstance(self.mechanism, Rrru3):
-            legs = self.mechanism.legs(errors)
+            legs = self.mechanism.legs(deviations)
             ends = np.ascontiguousarray(self.mechanism.ends(self.actuators, legs[:, None]))
             return kernels.tripod_mean_distance(
                 ends, np.ascontiguousarray(legs[..., self.mechanism.LINK]), self._measured
             )
-        return kernels.mean_distance(errors, self.mechanism.legs(errors), *self._kernel_arguments)
+        return kernels.mean_distance(deviations, self.mechanism.legs(deviations), *self._kernel_arguments)

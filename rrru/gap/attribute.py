@@ -47,7 +47,7 @@ def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
     frame = case.measurements.iloc[np.flatnonzero(case.used)]
     fit = least_squares(Residuals(case.mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame)))
-    return State(fit.errors, {})
+    return State(fit.deviations, {})
 
 
 def attribute(case, prior, noise_from="given"):

@@ -25,11 +25,11 @@ _ENOUGH = 0.8
 
 @dataclass(frozen=True)
 class State:
-    """A corrected sim: errors (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted
+    """A corrected sim: deviations (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted
     further, by name.
     """
 
-    errors: np.ndarray
+    deviations: np.ndarray
     effects: dict
     shapes: dict = field(default_factory=dict)
 
@@ -106,9 +106,9 @@ class Case:
         used[np.flatnonzero(used)[dropped]] = False
         return replace(self, used=used)
 
-    def sim(self, errors):
+    def sim(self, deviations):
         """Positions (m, 3) of the calibrated sim without effects."""
-        return self.mechanism.forward(rows.actuators(self.measurements), errors, rows.command(self.measurements))
+        return self.mechanism.forward(rows.actuators(self.measurements), deviations, rows.command(self.measurements))
 
     def contribution(self, state):
         """What the state's effects change along the motion, together."""
@@ -118,13 +118,13 @@ class Case:
     def exact(self, state):
         """Positions (n, 3) of the sim corrected by a state: the exact closure with its effects."""
         actuators, command = rows.actuators(self.measurements), rows.command(self.measurements)
-        return corrected_sim(self.mechanism, state.errors, actuators, command, self.contribution(state))[self.used]
+        return corrected_sim(self.mechanism, state.deviations, actuators, command, self.contribution(state))[self.used]
 
     def model(self, state):
         """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has
         none.
         """
-        return self.exact(state) if state.effects else self.sim(state.errors)[self.used]
+        return self.exact(state) if state.effects else self.sim(state.deviations)[self.used]
 
     def linearise(self, state, shapes=None):
         """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
@@ -132,8 +132,8 @@ class Case:
         shapes: (effect, shape) pairs to make columns for, by default all.
         """
         actuators = rows.actuators(self.measurements)
-        position = self.sim(state.errors)
-        legs = first_order(self.mechanism, position, actuators, state.errors)
+        position = self.sim(state.deviations)
+        legs = first_order(self.mechanism, position, actuators, state.deviations)
         model = self.model(state)
         lost = ~np.isfinite(model).all(axis=1) | ~np.isfinite(position[self.used]).all(axis=1)
         if lost.any():
@@ -153,7 +153,7 @@ class Case:
             data = data + columns[key] @ coordinates
         return Linear(
             data,
-            self.mechanism.error_jacobian(position, actuators, state.errors)[self.used],
+            self.mechanism.parameter_jacobian(position, actuators, state.deviations)[self.used],
             columns,
             laws,
             reshaped,

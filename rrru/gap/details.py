@@ -27,7 +27,7 @@ def details_of(found, verdict, steps, residual, further, generator, settings):
         "gap_next_runs": further.assign(rank=np.arange(1, len(further) + 1)),
         "gap_points": _point_rows(
             case,
-            rows.measured(case.measurements) - case.sim(found.calibrated.errors),
+            rows.measured(case.measurements) - case.sim(found.calibrated.deviations),
             steps[-1].residual_mm,
             drive_errors(residual, linear.drive),
         ),
@@ -126,7 +126,7 @@ def _parameter_rows(found):
     """
     columns = ("effect", "parameter", "unit", "value", "standard_error", "at_bound")
     result, start, library = [], 0, found.case.library
-    for parameter, value in zip(found.case.mechanism.parameters, found.state.errors, strict=True):
+    for parameter, value in zip(found.case.mechanism.parameters, found.state.deviations, strict=True):
         result.append(
             dict(zip(columns, ("calibration", parameter.name, parameter.unit, value, np.nan, False), strict=True))
         )

@@ -30,7 +30,7 @@ _DEFAULTS = GapSettings()
 @dataclass(frozen=True)
 class Diagnosis:
     """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
-    corrected sim; calibrated_errors (p,): of the calibration alone; attribution: everything that the search found.
+    corrected sim; calibrated_deviations (p,): of the calibration alone; attribution: everything that the search found.
     """
 
     verdict: dict
@@ -94,7 +94,7 @@ def diagnose(
         "notes": "; ".join(f"{effect} not tested: {note}" for effect, note in case.untestable.items()),
     }
     tables = details_of(found, verdict, steps, residual, further, generator, settings) if details else {}
-    return Diagnosis(row, tables, found.state, found.calibrated.errors, found)
+    return Diagnosis(row, tables, found.state, found.calibrated.deviations, found)
 
 
 def _decide(found):

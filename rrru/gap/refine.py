@@ -21,7 +21,7 @@ def refine(case, state, hypothesis, level):
     keys = [(term.effect, term.shape) for term in hypothesis.terms]
     library, strengths = case.library, hypothesis.strengths[level]
     state = State(
-        state.errors,
+        state.deviations,
         {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys},
         {key[0]: state.shape(library, key) for key in keys},
     )
@@ -75,7 +75,7 @@ def _target(linear, state, hypothesis, mean, library):
             shapes[term.effect] = dict(shapes[term.effect]) | {name: moved}
             rest = rest - share * law[..., -row]
     change, *_ = np.linalg.lstsq(linear.base.reshape(rest.size, -1), rest.ravel(), rcond=None)
-    return State(state.errors + change, effects, shapes)
+    return State(state.deviations + change, effects, shapes)
 
 
 def _between(first, second, share):
@@ -85,7 +85,7 @@ def _between(first, second, share):
         name: {k: first.shapes[name][k] + share * (value - first.shapes[name][k]) for k, value in shape.items()}
         for name, shape in second.shapes.items()
     }
-    return State(first.errors + share * (second.errors - first.errors), effects, shapes)
+    return State(first.deviations + share * (second.deviations - first.deviations), effects, shapes)
 
 
 def _cost(case, state):

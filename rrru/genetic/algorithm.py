@@ -88,7 +88,7 @@ class GeneticResult:
     feasible.
     """
 
-    errors: np.ndarray
+    deviations: np.ndarray
     objective: float
     generations: int
     evaluations: int
@@ -235,7 +235,7 @@ class _Step:
         """The GeneticResult of a finished run."""
         genes, fitness, _ = ga.best_solution(ga.last_generation_fitness)
         return GeneticResult(
-            errors=self._decode(genes),
+            deviations=self._decode(genes),
             objective=float(-fitness),
             generations=int(ga.generations_completed),
             evaluations=self.evaluations,

@@ -45,7 +45,7 @@ def study_set(
         return None
     reduced = select(measurements, identifiable, patterns, use_near_singularity)
     fit, fit_seconds = _timed(lambda: least_squares(reduced))
-    best, polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.errors))
+    best, polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.deviations))
     optimum = best.mean_mm
     names, bounds = tied.parameters.names, (tied.parameters.low, tied.parameters.high)
     # the compiled objective is loaded before anything is timed
@@ -56,7 +56,7 @@ def study_set(
         start = perf_counter()
         result = minimise(residuals.mean_distance, *bounds, settings, seed)
         seconds.append(perf_counter() - start)
-        values = dict(zip(names, result.errors.tolist(), strict=True))
+        values = dict(zip(names, result.deviations.tolist(), strict=True))
         shared = identifiable_truth(identifiable, values)
         polish = least_mean_distance(reduced, identifiable.parameters.vector(shared))
         runs.append(

@@ -47,7 +47,7 @@ def run_sweep(objective, low, high, settings, parameter, value, seeds, names, st
             labels
             | {"objective_mm": result.objective, "generations": result.generations}
             | {"evaluations": result.evaluations, "stopped": result.stopped}
-            | dict(zip(names, result.errors.tolist(), strict=True))
+            | dict(zip(names, result.deviations.tolist(), strict=True))
         )
         kept = kept_generations(result.generations)
         columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}

@@ -35,11 +35,11 @@ class TripodGeometry:
         return position if not np.ndim(change.frame) else into_frame(position, change.frame)
 
 
-def corrected_sim(mechanism, errors, actuators, command_mm, change):
-    """Positions (n, 3) in mm of a mechanism with errors (p,) at actuator values (n, 3) near commands (n, 3), under a
+def corrected_sim(mechanism, deviations, actuators, command_mm, change):
+    """Positions (n, 3) in mm of a mechanism with deviations (p,) at actuator values (n, 3) near commands (n, 3), under a
     Contribution.
     """
-    legs = mechanism.legs(errors)
+    legs = mechanism.legs(deviations)
     if not isinstance(mechanism, Rrru3):
         return TripodGeometry(mechanism, legs).solve_under(actuators, change)
     radial = np.full((3, 1), mechanism.R_mm)

@@ -46,12 +46,12 @@ class SpatialGeometry:
     """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) where they change from point to point, and
     displacements.
 
-    deviations: (3 legs, 6 PLACES, 6) = shift in mm, rotation vector in rad, in the leg's frame at that place.
+    axis_deviations: (3 legs, 6 PLACES, 6) = shift in mm, rotation vector in rad, in the leg's frame at that place.
     """
 
     azimuth_rad: np.ndarray
     lengths_mm: np.ndarray
-    deviations: np.ndarray
+    axis_deviations: np.ndarray
 
     def solve(self, theta_rad, passive_guess_rad, joint_shift_mm=None):
         """Close the chains at drive angles (n, 3).
@@ -63,12 +63,12 @@ class SpatialGeometry:
         n = len(theta_rad)
         shift = np.zeros((n, 3, 3)) if joint_shift_mm is None else np.broadcast_to(joint_shift_mm, (n, 3, 3))
         rotations = (
-            Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+            Rotation.from_rotvec(self.axis_deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
         )
         position, turned, residual = _solve_points(
             np.ascontiguousarray(self.azimuth_rad, dtype=float),
             np.ascontiguousarray(np.broadcast_to(self.lengths_mm, (n, 3, 5)), dtype=float),
-            np.ascontiguousarray(self.deviations[..., :3], dtype=float),
+            np.ascontiguousarray(self.axis_deviations[..., :3], dtype=float),
             np.ascontiguousarray(rotations),
             np.ascontiguousarray(theta_rad, dtype=float),
             np.ascontiguousarray(passive_guess_rad, dtype=float).reshape(n, 12),
@@ -83,7 +83,9 @@ class SpatialGeometry:
         angles.
         """
         changed = replace(
-            self, lengths_mm=self.lengths_mm + change.length_mm, deviations=self.deviations + change.displacement
+            self,
+            lengths_mm=self.lengths_mm + change.length_mm,
+            axis_deviations=self.axis_deviations + change.displacement,
         )
         solution = changed.solve(theta_rad + change.drive, passive_guess_rad, change.joint_mm)
         return (
@@ -97,7 +99,7 @@ class SpatialGeometry:
         in units of 500 mm.
         """
         rotations = (
-            Rotation.from_rotvec(self.deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
+            Rotation.from_rotvec(self.axis_deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
         )
         jacobian, residual = np.empty((12, 12)), np.empty(12)
         result = []
@@ -106,7 +108,7 @@ class SpatialGeometry:
             _closure(
                 np.asarray(self.azimuth_rad, dtype=float),
                 np.ascontiguousarray(lengths, dtype=float),
-                np.ascontiguousarray(self.deviations[..., :3], dtype=float),
+                np.ascontiguousarray(self.axis_deviations[..., :3], dtype=float),
                 np.ascontiguousarray(rotations),
                 np.ascontiguousarray(theta, dtype=float),
                 np.ascontiguousarray(passive, dtype=float).reshape(12),

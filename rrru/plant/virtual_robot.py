@@ -14,11 +14,11 @@ from rrru.errors import ConfigError
 from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
 from rrru.robots.dynamics import Masses
-from rrru.robots.rrru3 import ERROR_NAMES, Rrru3
+from rrru.robots.rrru3 import PARAMETER_NAMES, Rrru3
 
 
 class DrivenRobot:
-    """What virtual robots share: they drive plans and are measured. They add mechanism, wobble_mm, the three masses and
+    """What virtual robots share: they drive plans and are measured. They add mechanism, non_repeatability_mm, the three masses and
     `positions`.
     """
 
@@ -36,7 +36,7 @@ class DrivenRobot:
         motion = self.motion(plan, controller)
         position, turned = self.positions(motion, target)
         solved = np.isfinite(position).all(axis=1)
-        position = position + self.wobble_mm * wobble(generator, len(target))
+        position = position + self.non_repeatability_mm * non_repeatability(generator, len(target))
         measured = measure(position, noise_mm, generator)
         measurements = commands.assign(
             **dict(zip(actuator_columns(self.mechanism.drive_unit), motion.drive.T, strict=True)),
@@ -73,16 +73,16 @@ class DrivenRobot:
 class VirtualRobot(DrivenRobot):
     """A 3-RRRU whose truth is known.
 
-    errors: published names of the 14 errors (or the tied ones) to values; deviations (3 legs, 6 places, 6):
-    displacements of every axis; effects: active effects; wobble_mm: radius of the ball in which the platform lies at
-    random, see `wobble`; masses in kg; rotation_limit_rad: a larger platform rotation counts as unsolved.
+    deviations: published names of the 14 errors (or the tied ones) to values; axis_deviations (3 legs, 6 places, 6):
+    displacements of every axis; effects: active effects; non_repeatability_mm: radius of the ball in which the platform lies at
+    random, see `non_repeatability`; masses in kg; rotation_limit_rad: a larger platform rotation counts as unsolved.
     """
 
     mechanism: Rrru3 = field(default_factory=Rrru3)
-    errors: dict = field(default_factory=dict)
-    deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
+    deviations: dict = field(default_factory=dict)
+    axis_deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
     effects: tuple = ()
-    wobble_mm: float = 0.0
+    non_repeatability_mm: float = 0.0
     platform_mass_kg: float = 3.0
     forearm_mass_kg: float = 1.2
     arm_mass_kg: float = 2.0
@@ -91,7 +91,7 @@ class VirtualRobot(DrivenRobot):
     @property
     def drive_errors_rad(self):
         """Constant errors (3,) of the drive angles."""
-        return np.array([self.errors.get(f"dtheta{k}", 0.0) for k in (1, 2, 3)])
+        return np.array([self.deviations.get(f"dtheta{k}", 0.0) for k in (1, 2, 3)])
 
     @property
     def geometry(self):
@@ -101,10 +101,10 @@ class VirtualRobot(DrivenRobot):
         lengths = np.tile(nominal, (3, 1))
         for leg in range(3):
             for link in (1, 2, 3):
-                lengths[leg, link] += self.errors.get(f"dL{leg + 1}{link}", self.errors.get(f"dL{link}", 0.0))
-            lengths[leg, 0] += self.errors.get("dR", 0.0)
-            lengths[leg, 4] += self.errors.get("dr", 0.0)
-        return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.deviations)
+                lengths[leg, link] += self.deviations.get(f"dL{leg + 1}{link}", self.deviations.get(f"dL{link}", 0.0))
+            lengths[leg, 0] += self.deviations.get("dR", 0.0)
+            lengths[leg, 4] += self.deviations.get("dr", 0.0)
+        return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.axis_deviations)
 
     def positions(self, motion, target):
         """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion
@@ -120,7 +120,7 @@ class VirtualRobot(DrivenRobot):
         return np.where(solved[:, None], solution.position_mm, np.nan), turned
 
 
-def wobble(generator, count):
+def non_repeatability(generator, count):
     """Points (count, 3) uniform in the unit ball: what clearance lets the platform do from stop to stop, bounded unlike
     instrument noise.
     """
@@ -131,16 +131,16 @@ def wobble(generator, count):
 
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
-    known = tuple(dict.fromkeys((*ERROR_NAMES["tied"], *ERROR_NAMES["published"])))
+    known = tuple(dict.fromkeys((*PARAMETER_NAMES["tied"], *PARAMETER_NAMES["published"])))
     for name in section["errors"]:
         if name not in known:
             raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")
     return VirtualRobot(
         mechanism=mechanism,
-        errors={name: float(value) for name, value in section["errors"].items()},
-        deviations=_deviations(section["axis_errors"]),
+        deviations={name: float(value) for name, value in section["errors"].items()},
+        axis_deviations=_deviations(section["axis_errors"]),
         effects=active_effects(section["effects"]),
-        wobble_mm=section["wobble_mm"],
+        non_repeatability_mm=section["wobble_mm"],
         platform_mass_kg=section["platform_mass_kg"],
         forearm_mass_kg=section["forearm_mass_kg"],
         arm_mass_kg=section["arm_mass_kg"],

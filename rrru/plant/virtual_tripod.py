@@ -20,15 +20,15 @@ _TRUTH = {"ptt3": "rails", "delta": "legs"}
 class VirtualTripod(DrivenRobot):
     """A tripod whose truth is known.
 
-    mechanism: the nominal robot; errors: names of its richest error set ("rails" of the 3-PTT, "legs" of the Delta) to
-    values; effects: active effects; wobble_mm: radius of the ball in which the platform lies at random; masses in kg,
+    mechanism: the nominal robot; deviations: names of its richest error set ("rails" of the 3-PTT, "legs" of the Delta) to
+    values; effects: active effects; non_repeatability_mm: radius of the ball in which the platform lies at random; masses in kg,
     the arm's being the 3-PTT's carriage.
     """
 
     mechanism: object
-    errors: dict = field(default_factory=dict)
+    deviations: dict = field(default_factory=dict)
     effects: tuple = ()
-    wobble_mm: float = 0.0
+    non_repeatability_mm: float = 0.0
     platform_mass_kg: float = 3.0
     forearm_mass_kg: float = 1.2
     arm_mass_kg: float = 2.0
@@ -36,8 +36,8 @@ class VirtualTripod(DrivenRobot):
     @property
     def geometry(self):
         """The real legs; raises ConfigError for an unknown error."""
-        rich = replace(self.mechanism, errors=_TRUTH[self.mechanism.name])
-        return TripodGeometry(rich, rich.legs(rich.parameters.vector(self.errors)))
+        rich = replace(self.mechanism, parameter_set=_TRUTH[self.mechanism.name])
+        return TripodGeometry(rich, rich.legs(rich.parameters.vector(self.deviations)))
 
     def positions(self, motion, target=None):
         """Platform centres (n, 3) in the tracker's frame and its rotations (n,), zero, at the points of a motion; NaN

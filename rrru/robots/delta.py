@@ -31,7 +31,7 @@ from rrru.robots.tripod import Tripod
 COLUMNS = ("dtheta_rad", "l1_mm", "l2_mm", "a_mm")
 _LEGS = (1, 2, 3)
 _DRIVES = tuple(f"dtheta{leg}" for leg in _LEGS)
-ERROR_NAMES = {
+PARAMETER_NAMES = {
     "zero": _DRIVES,
     "tied": (*_DRIVES, "dl1", "dl2", "da"),
     "legs": (
@@ -54,7 +54,7 @@ class Delta(Tripod):
     l2_mm: float = 900.0
     a_mm: float = 125.0
     azimuth_rad: tuple[float, float, float] = (-np.pi / 6.0, np.pi / 2.0, 7.0 * np.pi / 6.0)
-    errors: str = "zero"
+    parameter_set: str = "zero"
     angle_limit_rad: float = 0.05
     length_limit_mm: float = 10.0
     name: str = field(default="delta", init=False)
@@ -64,7 +64,7 @@ class Delta(Tripod):
 
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
     ANGLES = ("dtheta",)
-    ERROR_NAMES = ERROR_NAMES
+    PARAMETER_NAMES = PARAMETER_NAMES
     SOURCE = "paper C, 1.1; bounds assumed"
 
     def __post_init__(self):
@@ -143,7 +143,7 @@ class Delta(Tripod):
         angle = (theta_rad + legs[:, 0])[..., None]
         return legs[:, 1, None] * (np.cos(angle) * self.radial - np.sin(angle) * np.array([0.0, 0.0, 1.0]))
 
-    def couples(self, position_mm, theta_rad, errors=None):
+    def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg's parallelogram keeps the platform from turning."""
-        across = np.cross(self.tangent, self.link_directions(position_mm, theta_rad, errors))
+        across = np.cross(self.tangent, self.link_directions(position_mm, theta_rad, deviations))
         return across / np.linalg.norm(across, axis=-1, keepdims=True)

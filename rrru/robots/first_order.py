@@ -23,28 +23,28 @@ from rrru.robots.first_order_tripod import TripodFirstOrder
 from rrru.robots.rrru3 import Rrru3
 
 
-def first_order(mechanism, position_mm, actuators, errors=None):
-    """The map from leg errors to the platform of any mechanism at n poses (n, 3), (n, 3) that fit its errors (p,)."""
+def first_order(mechanism, position_mm, actuators, deviations=None):
+    """The map from leg errors to the platform of any mechanism at n poses (n, 3), (n, 3) that fit its deviations (p,)."""
     kind = FirstOrder if isinstance(mechanism, Rrru3) else TripodFirstOrder
-    return kind(mechanism, position_mm, actuators, errors)
+    return kind(mechanism, position_mm, actuators, deviations)
 
 
 class FirstOrder:
     """The map from leg errors to the platform's centre at n poses of a mechanism.
 
-    position_mm, theta_rad: (n, 3), a pose that fits the errors (p,) of the mechanism.
+    position_mm, theta_rad: (n, 3), a pose that fits the deviations (p,) of the mechanism.
     """
 
-    def __init__(self, mechanism, position_mm, theta_rad, errors=None):
-        legs = mechanism.legs(errors)
-        passive = mechanism.passive_angles(position_mm, theta_rad, errors)
+    def __init__(self, mechanism, position_mm, theta_rad, deviations=None):
+        legs = mechanism.legs(deviations)
+        passive = mechanism.passive_angles(position_mm, theta_rad, deviations)
         arm = np.asarray(theta_rad) + legs[:, 0]
         plane = arm + passive[..., 0]
         cx, cy = mechanism.turn
         zero, down = np.zeros(3), np.array([0.0, 0.0, 1.0])
         radial, tangent = np.stack([cx, cy, zero], axis=-1), np.stack([-cy, cx, zero], axis=-1)
-        self.forearm = singularity.leg_forces(mechanism, position_mm, theta_rad, errors)
-        self.couple = mechanism.couples(position_mm, theta_rad, errors)
+        self.forearm = singularity.leg_forces(mechanism, position_mm, theta_rad, deviations)
+        self.couple = mechanism.constraint_moments(position_mm, theta_rad, deviations)
         self.position_mm = np.asarray(position_mm, dtype=float)
         # local axes (n, 3 legs, 3 axes, 3) at the six places of the chain, and the lever (n, 3 legs, 3) from each to C
         leg_axes = np.stack([radial, tangent, np.broadcast_to(down, (3, 3))], axis=-2)

@@ -20,13 +20,13 @@ import numpy as np
 class TripodFirstOrder:
     """The map from leg errors to the platform's centre at n poses of a `rrru.robots.tripod.Tripod`.
 
-    position_mm, actuators: (n, 3), a pose that fits the errors (p,) of the mechanism.
+    position_mm, actuators: (n, 3), a pose that fits the deviations (p,) of the mechanism.
     """
 
-    def __init__(self, mechanism, position_mm, actuators, errors=None):
-        legs = mechanism.legs(errors)
+    def __init__(self, mechanism, position_mm, actuators, deviations=None):
+        legs = mechanism.legs(deviations)
         self.position_mm = np.asarray(position_mm, dtype=float)
-        self.link = mechanism.link_directions(position_mm, actuators, errors)
+        self.link = mechanism.link_directions(position_mm, actuators, deviations)
         self.radial = mechanism.radial
         self.axes = mechanism.leg_axes
         rates = mechanism.end_rates(np.asarray(actuators, dtype=float), legs)

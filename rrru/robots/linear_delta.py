@@ -32,11 +32,11 @@ class LinearDelta(Ptt3):
         return legs
 
 
-def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, errors, angle_limit_rad=1.0, length_limit_mm=1e4):
+def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, parameter_set, angle_limit_rad=1.0, length_limit_mm=1e4):
     """The mechanism of a printer, whose sliders stand at minus the way down from their endstops.
 
     radius_mm: tower circle less joint offsets. azimuth_rad, arms_mm, endstop_mm: (3,) per tower. errors: "heights" or
-    "distances" (ERROR_NAMES of the 3-PTT). The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
+    "distances" (PARAMETER_NAMES of the 3-PTT). The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
     Raises ConfigError for arms that are too short.
     """
     arms = np.asarray(arms_mm, dtype=float)
@@ -50,7 +50,7 @@ def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, errors, angle_limi
         r_mm=_PLATFORM_MM,
         rail_inclination_rad=np.pi / 2.0,
         azimuth_rad=tuple(azimuth_rad),
-        errors=errors,
+        parameter_set=parameter_set,
         angle_limit_rad=angle_limit_rad,
         length_limit_mm=length_limit_mm,
         arms_mm=tuple(arms),

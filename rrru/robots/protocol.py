@@ -27,35 +27,37 @@ class Mechanism(Protocol):
     angle_arm_mm: float
     lengths_mm: np.ndarray
 
-    def inverse(self, position_mm: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
+    def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
         """Actuator values (n, k) for positions (n, 3); NaN where out of reach."""
 
     def forward(
-        self, actuators: np.ndarray, errors: np.ndarray | None = None, guess_mm: np.ndarray | None = None
+        self, actuators: np.ndarray, deviations: np.ndarray | None = None, guess_mm: np.ndarray | None = None
     ) -> np.ndarray:
         """Positions (n, 3) for actuator values (n, k); NaN where there is none near the guess."""
 
     def forward_batch(
-        self, actuators: np.ndarray, errors: np.ndarray, guess_mm: np.ndarray | None = None
+        self, actuators: np.ndarray, deviations: np.ndarray, guess_mm: np.ndarray | None = None
     ) -> np.ndarray:
         """Positions (m, n, 3) for n actuator triples under m error vectors (m, p)."""
 
     def actuator_jacobian(
-        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
     ) -> np.ndarray:
         """Derivative (n, 3, k) of the position by the actuator values."""
 
-    def error_jacobian(
-        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+    def parameter_jacobian(
+        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
     ) -> np.ndarray:
         """Derivative (n, 3, p) of the position by the errors."""
 
     def closure_jacobians(
-        self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None
+        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
     ) -> tuple:
         """Derivatives of the legs' closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
 
-    def couples(self, position_mm: np.ndarray, actuators: np.ndarray, errors: np.ndarray | None = None) -> np.ndarray:
+    def constraint_moments(
+        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
+    ) -> np.ndarray:
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
 
 

@@ -36,7 +36,7 @@ _SLIDERS = tuple(f"db{leg}" for leg in _LEGS)
 _LINKS = tuple(f"dL{leg}" for leg in _LEGS)
 # The gauges: "tied" leaves out a = R - r, which horizontal rails cannot tell from the sliders' zeros; "heights" and
 # "distances" fix the third azimuth, the base's free rotation, which neither kind of measurement sees.
-ERROR_NAMES = {
+PARAMETER_NAMES = {
     "zero": _SLIDERS,
     "tied": (*_SLIDERS, "dL"),
     "legs": (*_SLIDERS, *_LINKS),
@@ -49,7 +49,7 @@ _KINDS = {"db": 0, "dL": 1, "da": 2, "dphi": 3, "rise": 4, "swing": 5}
 
 @dataclass(frozen=True)
 class Ptt3(Tripod):
-    """The robot with its nominal dimensions in mm and the choice of error parameters, a key of ERROR_NAMES.
+    """The robot with its nominal dimensions in mm and the choice of error parameters, a key of PARAMETER_NAMES.
 
     rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. errors: "zero" (3), "tied" (4), "legs" (6), "rails"
     (15), "heights" (6), "distances" (9).
@@ -60,7 +60,7 @@ class Ptt3(Tripod):
     r_mm: float = 60.0
     rail_inclination_rad: float = 0.0
     azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
-    errors: str = "tied"
+    parameter_set: str = "tied"
     angle_limit_rad: float = 0.05
     length_limit_mm: float = 10.0
     name: str = field(default="ptt3", init=False)
@@ -71,7 +71,7 @@ class Ptt3(Tripod):
 
     DIMENSIONS = ("L_mm", "R_mm", "r_mm")
     ANGLES = ("dphi", "rise", "swing")
-    ERROR_NAMES = ERROR_NAMES
+    PARAMETER_NAMES = PARAMETER_NAMES
     SOURCE = "paper B, 2.2; bounds assumed"
 
     def __post_init__(self):
@@ -141,24 +141,24 @@ class Ptt3(Tripod):
         """Vectors (n, 3 legs, 3) in mm from the rails' zero marks to the carriages."""
         return (slider_mm + legs[:, 0])[..., None] * self._directions(legs)[2]
 
-    def rails(self, errors=None):
+    def rails(self, deviations=None):
         """Unit directions (3 legs, 3) in which the sliders count up."""
-        return self._directions(self.legs(errors))[2]
+        return self._directions(self.legs(deviations))[2]
 
-    def couples(self, position_mm, slider_mm, errors=None):
+    def constraint_moments(self, position_mm, slider_mm, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
 
         # ASSUME both U joints have their outer axes tangential: the leg then resists turning about the link's part in
         the plane across them.
         """
-        link = self.link_directions(position_mm, slider_mm, errors)
+        link = self.link_directions(position_mm, slider_mm, deviations)
         flat = link - (link * self.tangent).sum(axis=-1, keepdims=True) * self.tangent
         return flat / np.linalg.norm(flat, axis=-1, keepdims=True)
 
-    def jacobian(self, position_mm, slider_mm, errors=None):
+    def jacobian(self, position_mm, slider_mm, deviations=None):
         """J (n, 3, 3) of db = J dp, exact at slider positions that fit the position (eqs. 4, 10)."""
-        link = self.link_directions(position_mm, slider_mm, errors)
-        return link / (link * self.rails(errors)).sum(axis=-1, keepdims=True)
+        link = self.link_directions(position_mm, slider_mm, deviations)
+        return link / (link * self.rails(deviations)).sum(axis=-1, keepdims=True)
 
     def determinant_factors(self, position_mm):
         """Z, kappa and D (3) of det J = -Z kappa / (D_1 D_2 D_3), each over n points, D (n, 3); horizontal rails only.

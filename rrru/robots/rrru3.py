@@ -31,7 +31,7 @@ _SOURCE = "paper A, section 2.2; bounds assumed"
 _ANGLES = ("dtheta1", "dtheta2", "dtheta3")
 # The gauge: R and r shift every leg by the same r - R, so that in the identifiable set one number, da = dr - dR, stands
 # for both.
-ERROR_NAMES = {
+PARAMETER_NAMES = {
     "published": (*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr"),
     "tied": (*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr"),
     "identifiable": (*_ANGLES, "dL1", "dL2", "dL3", "da"),
@@ -88,7 +88,7 @@ class Rrru3(ThreeLegs):
     R_mm: float = 400.0
     r_mm: float = 400.0
     azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
-    errors: str = "identifiable"
+    parameter_set: str = "identifiable"
     angle_limit_rad: float = ANGLE_LIMIT_RAD
     length_limit_mm: float = LENGTH_LIMIT_MM
     name: str = field(default="rrru3", init=False)
@@ -101,8 +101,8 @@ class Rrru3(ThreeLegs):
         for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
             if not getattr(self, key) > 0.0:
                 raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive number")
-        if self.errors not in ERROR_NAMES:
-            raise ConfigError(f"rrru3: errors is {self.errors!r}; allowed: {', '.join(ERROR_NAMES)}")
+        if self.parameter_set not in PARAMETER_NAMES:
+            raise ConfigError(f"rrru3: parameter_set is {self.parameter_set!r}; allowed: {', '.join(PARAMETER_NAMES)}")
 
     @property
     def angle_arm_mm(self):
@@ -119,7 +119,8 @@ class Rrru3(ThreeLegs):
         """The error parameters: the meaning of every `errors` vector."""
         return ParameterSet(
             tuple(
-                _error_parameter(name, self.angle_limit_rad, self.length_limit_mm) for name in ERROR_NAMES[self.errors]
+                _error_parameter(name, self.angle_limit_rad, self.length_limit_mm)
+                for name in PARAMETER_NAMES[self.parameter_set]
             )
         )
 
@@ -133,12 +134,12 @@ class Rrru3(ThreeLegs):
         """Numbers of the legs (3, 5), LEG_COLUMNS, without errors."""
         return np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
 
-    def inverse(self, position_mm, errors=None, elbow="out"):
+    def inverse(self, position_mm, deviations=None, elbow="out"):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm; NaN where a leg cannot reach (eqs. 5, 6).
 
         `elbow` is "out" (the robot's assembly), "in", or one of these per leg.
         """
-        return self.inverse_of_legs(position_mm, self.legs(errors), elbow)
+        return self.inverse_of_legs(position_mm, self.legs(deviations), elbow)
 
     def inverse_of_legs(self, position_mm, legs, elbow="out"):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
@@ -153,17 +154,17 @@ class Rrru3(ThreeLegs):
             # beyond the reach arccos gives NaN, which is the mask the callers rely on
             return np.arctan2(position[:, 2:], reach) + signs * np.arccos(cosine) - legs[:, 0]
 
-    def forward(self, theta_rad, errors=None, guess_mm=None):
+    def forward(self, theta_rad, deviations=None, guess_mm=None):
         """Positions (n, 3) in mm of drive angles (n, 3); NaN where Newton does not converge (eq. 8).
 
         `guess_mm` (n, 3) selects the assembly; without it Newton starts from the lower intersection of three spheres,
         see `first_guess`.
         """
-        return self.forward_batch(theta_rad, None if errors is None else np.asarray(errors)[None], guess_mm)[0]
+        return self.forward_batch(theta_rad, None if deviations is None else np.asarray(deviations)[None], guess_mm)[0]
 
-    def forward_batch(self, theta_rad, errors=None, guess_mm=None):
+    def forward_batch(self, theta_rad, deviations=None, guess_mm=None):
         """Positions (m, n, 3) in mm of n drive-angle triples under m error vectors (m, p); see `forward`."""
-        legs = self.legs(errors) if errors is not None else self.legs()[None]
+        legs = self.legs(deviations) if deviations is not None else self.legs()[None]
         return self.forward_of_legs(theta_rad, legs, guess_mm)
 
     def first_guess(self, theta_rad):
@@ -202,16 +203,16 @@ class Rrru3(ThreeLegs):
         )
         return solved.transpose(0, 2, 1)
 
-    def closure(self, position_mm, theta_rad, errors=None):
+    def closure(self, position_mm, theta_rad, deviations=None):
         """Left sides (n, 3) of eq. (8) in mm^2, zero where position and drive angles fit."""
-        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.legs(errors))
+        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.legs(deviations))
         return big_x**2 + big_z**2 - rho**2
 
-    def closure_jacobians(self, position_mm, theta_rad, errors=None):
+    def closure_jacobians(self, position_mm, theta_rad, deviations=None):
         """Derivatives of the closures with respect to the position (n, 3, 3) in mm and to the legs' numbers (n, 3,
         5).
         """
-        legs = self.legs(errors)
+        legs = self.legs(deviations)
         big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
         cx, cy = self.turn
         by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
@@ -228,12 +229,12 @@ class Rrru3(ThreeLegs):
         )
         return by_position, by_leg
 
-    def passive_angles(self, position_mm, theta_rad, errors=None):
+    def passive_angles(self, position_mm, theta_rad, deviations=None):
         """Angles (n, 3 legs, 4) of joints 2 to 5 in rad; theta3 = arcsin(v / L3) keeps the sign that eq. (6) loses.
 
         Joint 4 undoes joint 3 and joint 5 undoes joints 1 and 2, so that the platform does not turn.
         """
-        legs = self.legs(errors)
+        legs = self.legs(deviations)
         big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
         _, v = self._radial_tangential(points(position_mm))
         plane = np.arctan2(big_z, big_x)
@@ -241,14 +242,14 @@ class Rrru3(ThreeLegs):
         third = np.arcsin(v / legs[:, 3])
         return np.stack([second, third, -third, -(angle + second)], axis=-1)
 
-    def couples(self, position_mm, theta_rad, errors=None):
+    def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
 
         b_i = t_i x a_3i, where t_i is the direction of joints 1, 2 and 5 and a_3i that of joints 3 and 4; it points
         from joint 2 along L2.
         """
-        passive = self.passive_angles(position_mm, theta_rad, errors)
-        plane = np.asarray(theta_rad, dtype=float) + self.legs(errors)[:, 0] + passive[..., 0]
+        passive = self.passive_angles(position_mm, theta_rad, deviations)
+        plane = np.asarray(theta_rad, dtype=float) + self.legs(deviations)[:, 0] + passive[..., 0]
         cx, cy = self.turn
         return np.stack([np.cos(plane) * cx, np.cos(plane) * cy, np.sin(plane)], axis=-1)
 

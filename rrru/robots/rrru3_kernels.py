@@ -141,7 +141,7 @@ def forward(legs, turn, cosine, sine, start):
 
 
 @_compiled
-def mean_distance(errors, legs, turn, cosine, sine, start, slope, measured):
+def mean_distance(deviations, legs, turn, cosine, sine, start, slope, measured):
     """Mean distance between model and measured positions (eq. 11) for m error vectors.
 
     errors: (m, p); legs: (m, 3, 5), the same errors applied to the legs; start: (3, n) positions without errors; slope:
@@ -157,7 +157,7 @@ def mean_distance(errors, legs, turn, cosine, sine, start, slope, measured):
             for j in range(n):
                 position[axis, j] = start[axis, j]
             for q in range(slope.shape[0]):
-                error = errors[k, q]
+                error = deviations[k, q]
                 for j in range(n):
                     position[axis, j] += error * slope[q, axis, j]
         _solve(legs[k], turn, cosine, sine, position, work)

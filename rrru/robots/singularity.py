@@ -9,29 +9,29 @@ platform that only translates do not see the second kind.
 import numpy as np
 
 
-def leg_forces(mechanism, position_mm, actuators, errors=None):
+def leg_forces(mechanism, position_mm, actuators, deviations=None):
     """Unit directions (n, 3 legs, 3) in which each leg pushes the platform: rows of the normalised closure Jacobian."""
-    gradient, _ = mechanism.closure_jacobians(position_mm, actuators, errors)
+    gradient, _ = mechanism.closure_jacobians(position_mm, actuators, deviations)
     return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
 
 
-def translational_measure(mechanism, position_mm, actuators, errors=None):
+def translational_measure(mechanism, position_mm, actuators, deviations=None):
     """Smallest singular value (n,) of the three unit force directions; 0 where the platform can move with all drives
     locked.
     """
-    return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, errors))
+    return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, deviations))
 
 
-def constraint_measure(mechanism, position_mm, actuators, errors=None):
+def constraint_measure(mechanism, position_mm, actuators, deviations=None):
     """Smallest singular value (n,) of the three unit couple directions; 0 where the platform can turn with all drives
     locked.
     """
-    return _smallest_singular_value(mechanism.couples(position_mm, actuators, errors))
+    return _smallest_singular_value(mechanism.constraint_moments(position_mm, actuators, deviations))
 
 
-def constraint_determinant(mechanism, position_mm, actuators, errors=None):
+def constraint_determinant(mechanism, position_mm, actuators, deviations=None):
     """Determinant (n,) of the couple directions; its sign changes across a constraint singularity."""
-    return np.linalg.det(mechanism.couples(position_mm, actuators, errors))
+    return np.linalg.det(mechanism.constraint_moments(position_mm, actuators, deviations))
 
 
 def _smallest_singular_value(matrices):

@@ -21,15 +21,15 @@ class ThreeLegs:
         """Cosines and sines of the legs' azimuths, shape (2, 3)."""
         return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
 
-    def legs(self, errors=None):
+    def legs(self, deviations=None):
         """Numbers of the legs, shape (..., 3, k), under errors of shape (..., p)."""
-        if errors is None:
+        if deviations is None:
             return self.nominal_legs
-        return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(errors, dtype=float))
+        return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(deviations, dtype=float))
 
-    def require_reachable(self, position_mm, errors=None):
+    def require_reachable(self, position_mm, deviations=None):
         """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
-        values = self.inverse(position_mm, errors)
+        values = self.inverse(position_mm, deviations)
         bad = np.flatnonzero(np.isnan(values).any(axis=1))
         if bad.size:
             point = np.asarray(position_mm, dtype=float)[bad[0]]
@@ -40,18 +40,18 @@ class ThreeLegs:
             )
         return values
 
-    def leg_jacobian(self, position_mm, actuators, errors=None):
+    def leg_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position with respect to the legs' numbers, shape (n, 3 axes, 3 legs, k)."""
-        by_position, by_leg = self.closure_jacobians(position_mm, actuators, errors)
+        by_position, by_leg = self.closure_jacobians(position_mm, actuators, deviations)
         return -np.einsum("nal,nlc->nalc", np.linalg.inv(by_position), by_leg)
 
-    def actuator_jacobian(self, position_mm, actuators, errors=None):
+    def actuator_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position with respect to the actuator values, shape (n, 3, 3)."""
-        return self.leg_jacobian(position_mm, actuators, errors)[..., 0]
+        return self.leg_jacobian(position_mm, actuators, deviations)[..., 0]
 
-    def error_jacobian(self, position_mm, actuators, errors=None):
+    def parameter_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position with respect to the errors, shape (n, 3, p)."""
-        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, actuators, errors), self.leg_map)
+        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, actuators, deviations), self.leg_map)
 
 
 def points(array):

@@ -22,7 +22,7 @@ ELBOW_SIGN = {"out": 1.0, "in": -1.0}
 
 
 class Tripod(ThreeLegs):
-    """Base of these mechanisms: they add ERROR_NAMES, `inverse_of_legs`, `ends`, `end_rates`, `levers`, and the columns
+    """Base of these mechanisms: they add PARAMETER_NAMES, `inverse_of_legs`, `ends`, `end_rates`, `levers`, and the columns
     of the legs' numbers that hold the link (LINK), the driven arm (ARM, None without one) and R - r (OFFSET).
     """
 
@@ -38,13 +38,15 @@ class Tripod(ThreeLegs):
         for key in (*self.DIMENSIONS, "angle_limit_rad", "length_limit_mm"):
             if not getattr(self, key) > 0.0:
                 raise ConfigError(f"{self.name}: {key} is {getattr(self, key)}; allowed: a positive number")
-        if self.errors not in self.ERROR_NAMES:
-            raise ConfigError(f"{self.name}: errors is {self.errors!r}; allowed: {', '.join(self.ERROR_NAMES)}")
+        if self.parameter_set not in self.PARAMETER_NAMES:
+            raise ConfigError(
+                f"{self.name}: parameter_set is {self.parameter_set!r}; allowed: {', '.join(self.PARAMETER_NAMES)}"
+            )
 
     @cached_property
     def parameters(self):
         """The error parameters, nominally zero: the meaning of every `errors` vector."""
-        return ParameterSet(tuple(self._parameter(name) for name in self.ERROR_NAMES[self.errors]))
+        return ParameterSet(tuple(self._parameter(name) for name in self.PARAMETER_NAMES[self.parameter_set]))
 
     def _parameter(self, name):
         """One error parameter."""
@@ -69,23 +71,23 @@ class Tripod(ThreeLegs):
         """Frames of the legs, radial, tangential and up, as rows of (3 legs, 3 axes, 3)."""
         return np.stack([self.radial, self.tangent, np.broadcast_to([0.0, 0.0, 1.0], (3, 3))], axis=1)
 
-    def inverse(self, position_mm, errors=None, elbow="out"):
+    def inverse(self, position_mm, deviations=None, elbow="out"):
         """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach.
 
         `elbow` is "out" (carriages outside of the platform or above it, knees outwards: the robots' assembly) or "in".
         """
-        return self.inverse_of_legs(points(position_mm), self.legs(errors), ELBOW_SIGN[elbow])
+        return self.inverse_of_legs(points(position_mm), self.legs(deviations), ELBOW_SIGN[elbow])
 
-    def forward(self, actuators, errors=None, guess_mm=None):
+    def forward(self, actuators, deviations=None, guess_mm=None):
         """Positions (n, 3) in mm of actuator values (n, 3), in closed form; NaN where the links do not meet.
 
         guess_mm is not needed: of the two assemblies the platform is in the lower one.
         """
-        return self.forward_of_legs(actuators, self.legs(errors))
+        return self.forward_of_legs(actuators, self.legs(deviations))
 
-    def forward_batch(self, actuators, errors, guess_mm=None):
+    def forward_batch(self, actuators, deviations, guess_mm=None):
         """Positions (m, n, 3) in mm of n actuator triples under m error vectors (m, p); see `forward`."""
-        return self.forward_of_legs(actuators, self.legs(errors)[:, None])
+        return self.forward_of_legs(actuators, self.legs(deviations)[:, None])
 
     def forward_of_legs(self, actuators, legs, shift_mm=0.0):
         """Positions (..., 3) in mm of actuator values (n, 3) under leg numbers (..., 3, k) that broadcast against them.
@@ -110,24 +112,24 @@ class Tripod(ThreeLegs):
         """
         return np.zeros(rates.shape[:-1]) if self.ARM is None else rates[..., self.ARM]
 
-    def closure(self, position_mm, actuators, errors=None):
+    def closure(self, position_mm, actuators, deviations=None):
         """Left sides (n, 3) of the closures in mm^2, zero where position and actuator values fit."""
-        legs = self.legs(errors)
+        legs = self.legs(deviations)
         link = points(position_mm)[:, None, :] - self.ends(points(actuators), legs)
         return (link**2).sum(axis=-1) - legs[:, self.LINK] ** 2
 
-    def closure_jacobians(self, position_mm, actuators, errors=None):
+    def closure_jacobians(self, position_mm, actuators, deviations=None):
         """Derivatives of the closures with respect to the position (n, 3, 3) in mm and to the legs' numbers (n, 3,
         k).
         """
-        legs = self.legs(errors)
+        legs = self.legs(deviations)
         actuators = points(actuators)
         by_position = 2.0 * (points(position_mm)[:, None, :] - self.ends(actuators, legs))
         by_leg = -np.einsum("nlk,nlkc->nlc", by_position, self.end_rates(actuators, legs))
         by_leg[..., self.LINK] = -2.0 * legs[:, self.LINK]
         return by_position, by_leg
 
-    def link_directions(self, position_mm, actuators, errors=None):
+    def link_directions(self, position_mm, actuators, deviations=None):
         """Unit vectors (n, 3 legs, 3) along the links, from the driven end to the platform."""
-        gradient, _ = self.closure_jacobians(position_mm, actuators, errors)
+        gradient, _ = self.closure_jacobians(position_mm, actuators, deviations)
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)

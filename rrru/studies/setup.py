@@ -52,7 +52,7 @@ def check(config):
             raise ConfigError(f"sweep.populations.{kind} is {sizes}; allowed: one size for one, several for islands")
 
 
-def mechanism(config, campaign, errors=None):
+def mechanism(config, campaign, parameter_set=None):
     """The nominal robot of a campaign with the configuration's bounds and the chosen error parameters, by default the
     identifiable ones.
     """
@@ -61,7 +61,7 @@ def mechanism(config, campaign, errors=None):
     return make_mechanism(
         name,
         {**config["robots"].get(name, {}), **section.get("dimensions", {})},
-        errors=errors or MECHANISMS[name].TRACKED,
+        parameter_set=parameter_set or MECHANISMS[name].TRACKED,
         angle_limit_rad=bounds["angle_rad"],
         length_limit_mm=bounds["length_mm"],
     )

@@ -29,7 +29,7 @@ def campaign():
         Spiral("spiral", (-200.0, 0.0), (50.0, 200.0), (600.0, 750.0), 3.0, 40),
     )
     plan = make_plan(curves, [{"reverse": False, "payload_kg": 0.0}] * 3, 80.0, 40.0, 60.0)
-    robot = VirtualRobot(errors=_ERRORS)
+    robot = VirtualRobot(deviations=_ERRORS)
     return robot, plan, robot.run(plan, 0.01, np.random.default_rng(0))[0]
 
 

@@ -6,7 +6,7 @@ import pytest
 from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.robots.ptt3 import Ptt3
 
-ROBOT = Ptt3(errors="rails")
+ROBOT = Ptt3(parameter_set="rails")
 
 
 @pytest.fixture
@@ -17,9 +17,9 @@ def positions():
 
 def test_the_exact_inverse_puts_the_real_robot_on_the_target_to_second_order(positions):
     """A robot with errors e stands at p + dp(p); commanded to p - dp(p) it is off by dp'(p) dp, some micrometres."""
-    errors = 0.3 * ROBOT.parameters.vector({"db1": 1.0, "db2": -0.7, "dL2": 0.8, "rise3": 1e-3})
-    stands = ROBOT.forward(ROBOT.inverse(positions), errors)
-    again = ROBOT.forward(through_inverse(ROBOT, positions, stands - positions), errors)
+    deviations = 0.3 * ROBOT.parameters.vector({"db1": 1.0, "db2": -0.7, "dL2": 0.8, "rise3": 1e-3})
+    stands = ROBOT.forward(ROBOT.inverse(positions), deviations)
+    again = ROBOT.forward(through_inverse(ROBOT, positions, stands - positions), deviations)
     before, after = (np.linalg.norm(where - positions, axis=1) for where in (stands, again))
     assert (after < 0.01 * before.max()).all() and before.max() > 0.2
 

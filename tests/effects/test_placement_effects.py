@@ -51,8 +51,8 @@ def test_seats_on_a_leaning_base_lean_the_whole_robot():
     cosine, sine = np.cos(ROBOT.azimuth_rad), np.sin(ROBOT.azimuth_rad)
     effects = {"axis_tilt": per_leg("tilt_x", lean * cosine), "base_placement": per_leg("height", 400.0 * lean * sine)}
     # about the leg's own y the base turns by -lean sin(azimuth), the drive by -theta about the same axis
-    errors = {f"dtheta{k + 1}": lean * sine[k] for k in range(3)}
-    _, position, turned = drive(effects, _PLAN, errors=errors)
+    deviations = {f"dtheta{k + 1}": lean * sine[k] for k in range(3)}
+    _, position, turned = drive(effects, _PLAN, deviations=deviations)
     np.testing.assert_allclose(
         position, _PLAN.targets() @ Rotation.from_rotvec([lean, 0.0, 0.0]).as_matrix().T, atol=2e-5
     )
@@ -76,7 +76,7 @@ def test_a_common_azimuth_turns_the_whole_robot_about_the_vertical():
 
 def test_a_common_radius_is_the_papers_error_of_the_base():
     motion, position, _ = drive({"base_placement": per_leg("radius", -1.4)}, _PLAN)
-    paper = Rrru3(errors="published")
+    paper = Rrru3(parameter_set="published")
     exact = paper.forward(motion.drive, paper.parameters.vector({"dR": -1.4}), _PLAN.targets())
     np.testing.assert_allclose(position, exact, atol=1e-8)
 

@@ -113,7 +113,7 @@ def test_a_leaning_rail_carries_its_slider_off_in_proportion_to_its_way():
     rise, swing = 2e-3, -1e-3
     change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([0.0, rise, swing, *np.zeros(6)]))
     moved = corrected_sim(mechanism, np.zeros(4), motion.drive, motion.position_mm, change)
-    rich = Ptt3(errors="rails")
+    rich = Ptt3(parameter_set="rails")
     expected = rich.forward(motion.drive, rich.parameters.vector({"rise1": rise, "swing1": swing}))
     np.testing.assert_allclose(moved, expected, atol=2e-4)
     assert np.abs(expected - motion.position_mm).max() > 0.02
@@ -132,7 +132,7 @@ def test_an_upright_rail_leans_to_the_side_where_a_level_one_swings():
     mechanism, motion = ROBOTS["upright"][0], MOTIONS["upright"]
     change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([1e-3, *np.zeros(8)]))
     moved = corrected_sim(mechanism, np.zeros(4), motion.drive, motion.position_mm, change)
-    rich = Ptt3(rail_inclination_rad=np.pi / 2, errors="rails")
+    rich = Ptt3(rail_inclination_rad=np.pi / 2, parameter_set="rails")
     # lean turns about the outward axis: z goes to minus the tangent
     expected = rich.forward(motion.drive, rich.parameters.vector({"swing1": -1e-3}))
     np.testing.assert_allclose(moved, expected, atol=2e-4)

@@ -26,7 +26,7 @@ def _campaign(points, theta, noise_mm=0.0, seed=0):
 
 def test_noise_free_rich_poses_give_the_seven_numbers_back(rich_poses):
     fit = least_squares(_campaign(*rich_poses))
-    np.testing.assert_allclose(fit.errors, _TRUTH, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(fit.deviations, _TRUTH, rtol=0.0, atol=1e-6)
     assert fit.identifiability.rank == 7 and not fit.at_bound.any()
 
 
@@ -35,7 +35,7 @@ def test_standard_errors_cover_the_truth_in_95_of_100(rich_poses):
     inside = []
     for seed in range(200):
         fit = least_squares(_campaign(*rich_poses, noise_mm=0.05, seed=seed))
-        inside.append(np.abs(fit.errors - _TRUTH) < 2.0 * fit.standard_errors)
+        inside.append(np.abs(fit.deviations - _TRUTH) < 2.0 * fit.standard_errors)
     share = np.array(inside).mean(axis=0)
     # four binomial deviations of 200 draws at 95.4 %
     assert (np.abs(share - 0.954) < 4.0 * np.sqrt(0.954 * 0.046 / 200)).all(), share
@@ -56,7 +56,7 @@ def test_bounded_fit_stays_in_the_box_and_says_so(rich_poses):
     narrow = Rrru3(length_limit_mm=0.5)
     residuals = _campaign(points, theta)
     fit = least_squares(Residuals(narrow, theta, residuals.measured_mm, points))
-    assert (np.abs(fit.errors[3:6]) <= 0.5).all() and abs(fit.errors[6]) <= 1.0
+    assert (np.abs(fit.deviations[3:6]) <= 0.5).all() and abs(fit.deviations[6]) <= 1.0
     assert fit.at_bound[6] and not fit.at_bound[:3].any()
 
 
@@ -68,8 +68,8 @@ def test_a_robust_loss_survives_a_broken_beam(rich_poses, loss):
     spoilt = Residuals(residuals.mechanism, residuals.actuators, measured, residuals.start_mm)
     plain, robust = least_squares(spoilt), least_squares(spoilt, loss=loss, loss_scale_mm=0.05)
     scale = 6.0 * least_squares(residuals, 0.02).standard_errors
-    assert (np.abs(robust.errors - _TRUTH) < scale).all()
-    assert (np.abs(plain.errors - _TRUTH) > scale).any()
+    assert (np.abs(robust.deviations - _TRUTH) < scale).all()
+    assert (np.abs(plain.deviations - _TRUTH) > scale).any()
 
 
 def _simplex_search(residuals, centre, scale):
@@ -77,8 +77,8 @@ def _simplex_search(residuals, centre, scale):
     parameters = residuals.mechanism.parameters
 
     def objective(q):
-        errors = centre + scale * q
-        return residuals.mean_distance(errors[None])[0] if parameters.hold(errors) else 1e6
+        deviations = centre + scale * q
+        return residuals.mean_distance(deviations[None])[0] if parameters.hold(deviations) else 1e6
 
     options = {"maxiter": 40_000, "maxfev": 40_000, "xatol": 1e-6, "fatol": 1e-12, "adaptive": True}
     return min(
@@ -93,8 +93,8 @@ def test_least_mean_distance_equals_a_derivative_free_search(rich_poses, count):
     points, theta = rich_poses
     residuals = _campaign(points[:count], theta[:count], noise_mm=0.3)
     start = least_squares(residuals)
-    fit = least_mean_distance(residuals, start.errors)
-    assert fit.mean_mm == pytest.approx(residuals.mean_distance(fit.errors[None])[0], rel=1e-10)
+    fit = least_mean_distance(residuals, start.deviations)
+    assert fit.mean_mm == pytest.approx(residuals.mean_distance(fit.deviations[None])[0], rel=1e-10)
     assert fit.mean_mm < start.mean_mm and fit.evaluations > 0
     scale = np.where(np.isfinite(start.standard_errors), start.standard_errors, 1e-3)
     assert fit.mean_mm <= _simplex_search(residuals, parameters_inside(residuals, fit), scale) * (1.0 + 1e-5)
@@ -102,22 +102,22 @@ def test_least_mean_distance_equals_a_derivative_free_search(rich_poses, count):
 
 def parameters_inside(residuals, fit):
     """Fitted errors, off the bounds by a hair."""
-    return residuals.mechanism.parameters.inside(fit.errors)
+    return residuals.mechanism.parameters.inside(fit.deviations)
 
 
 def test_least_mean_distance_does_not_depend_on_the_start(rich_poses):
     residuals = _campaign(*rich_poses, noise_mm=0.3)
     first, second = (least_mean_distance(residuals, start) for start in (np.zeros(7), 2.0 * _TRUTH))
-    np.testing.assert_allclose(first.errors, second.errors, atol=1e-5)
+    np.testing.assert_allclose(first.deviations, second.deviations, atol=1e-5)
 
 
 def test_least_mean_distance_stays_in_the_bounds(rich_poses):
     points, theta = rich_poses
     free = _campaign(points, theta, noise_mm=0.3)
     residuals = Residuals(Rrru3(length_limit_mm=0.5), theta, free.measured_mm, points)
-    fit = least_mean_distance(residuals, least_squares(residuals).errors)
+    fit = least_mean_distance(residuals, least_squares(residuals).deviations)
     parameters = residuals.mechanism.parameters
-    assert parameters.hold(fit.errors) and fit.at_bound[6] and np.isnan(fit.standard_errors[6])
+    assert parameters.hold(fit.deviations) and fit.at_bound[6] and np.isnan(fit.standard_errors[6])
     scale = np.where(np.isfinite(fit.standard_errors), fit.standard_errors, 1e-3)
     assert fit.mean_mm <= _simplex_search(residuals, parameters_inside(residuals, fit), scale) * (1.0 + 1e-5)
     assert fit.mean_mm > least_mean_distance(free, np.zeros(7)).mean_mm
@@ -134,7 +134,7 @@ def test_standard_errors_are_the_scatter_of_repeated_fits(rich_poses, loss):
         if loss != "linear":
             measured[::20] += np.random.default_rng(seed + 1000).normal(0.0, 1.0, (3, 3))
         fit = least_squares(Residuals(residuals.mechanism, theta, measured, points), loss=loss, loss_scale_mm=0.05)
-        found.append(fit.errors)
+        found.append(fit.deviations)
         stated.append(fit.standard_errors)
     ratio = np.std(found, axis=0, ddof=1) / np.mean(stated, axis=0)
     assert ((ratio > 0.65) & (ratio < 1.45)).all(), ratio
@@ -147,7 +147,7 @@ def test_a_bounded_parameter_has_no_standard_error_and_the_others_are_those_with
     fit = least_squares(narrow, noise_mm=10.0)
     free = ~fit.at_bound
     assert 0 < free.sum() < 7 and np.isnan(fit.standard_errors[~free]).all()
-    jacobian = narrow.jacobian(fit.errors)[..., free].reshape(-1, free.sum())
+    jacobian = narrow.jacobian(fit.deviations)[..., free].reshape(-1, free.sum())
     np.testing.assert_allclose(
         fit.standard_errors[free], 10.0 * np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian))), rtol=1e-6
     )
@@ -166,7 +166,7 @@ def test_two_points_leave_a_direction_unseen():
     robot = Rrru3()
     points = np.array([[-400.0, 50.0, 600.0], [-300.0, 20.0, 700.0]])
     theta = robot.inverse(points)
-    ident = analyse(robot, robot.error_jacobian(points, theta))
+    ident = analyse(robot, robot.parameter_jacobian(points, theta))
     assert ident.rank == 6 and ident.condition > 1e6
     assert np.isinf(ident.standard_errors(0.02)).any() and ident.indices()["O1"] == 0.0
     measured = robot.forward(theta, _TRUTH, points)
@@ -180,8 +180,8 @@ def test_a_repeated_pose_fits_but_keeps_the_unseen_directions_at_their_nominal_v
     theta = robot.inverse(points)
     fit = least_squares(Residuals(robot, theta, robot.forward(theta, _TRUTH, points), points))
     assert fit.identifiability.rank == 3 and fit.rms_mm < 1e-6
-    nominal = analyse(robot, robot.error_jacobian(points, theta))
-    np.testing.assert_allclose(nominal.directions[3:] @ (fit.errors / nominal.scale), 0.0, atol=1e-9)
+    nominal = analyse(robot, robot.parameter_jacobian(points, theta))
+    np.testing.assert_allclose(nominal.directions[3:] @ (fit.deviations / nominal.scale), 0.0, atol=1e-9)
 
 
 def test_covariance_equals_the_inverse_normal_matrix(rich_poses):

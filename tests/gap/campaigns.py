@@ -44,9 +44,9 @@ def plan_of(passes=FULL, trajectories=TRAJECTORIES):
     return make_plan(trajectories, passes, 80.0, 40.0, 60.0)
 
 
-def robot_of(effects=(), errors=None):
+def robot_of(effects=(), deviations=None):
     """The virtual robot with errors and active effects."""
-    return VirtualRobot(errors=ERRORS if errors is None else errors, effects=tuple(effects))
+    return VirtualRobot(deviations=ERRORS if deviations is None else deviations, effects=tuple(effects))
 
 
 def active(name, coordinates, shape=0):
@@ -56,9 +56,9 @@ def active(name, coordinates, shape=0):
     return ActiveEffect(effect, effect.parameters.mapping(values))
 
 
-def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, errors=None):
+def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, deviations=None):
     """Measurements of a virtual robot as a frame; every point must have been reached."""
-    measurements, _ = robot_of(effects, errors).run(plan or plan_of(), noise_mm, np.random.default_rng(seed))
+    measurements, _ = robot_of(effects, deviations).run(plan or plan_of(), noise_mm, np.random.default_rng(seed))
     assert (measurements["status"] == "ok").all()
     return measurements
 

@@ -167,7 +167,7 @@ def test_what_the_columns_do_not_tell_is_not_tested():
 
 def test_a_calibration_without_noise_finds_the_robots_errors():
     found = calibrate(case_of(measure(noise_mm=0.0)))
-    np.testing.assert_allclose(found.errors, STATE_ERRORS, atol=1e-6)
+    np.testing.assert_allclose(found.deviations, STATE_ERRORS, atol=1e-6)
     assert found.effects == {}
 
 

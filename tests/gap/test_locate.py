@@ -161,7 +161,7 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
 
 @pytest.fixture(scope="module")
 def identified(case):
-    plain = case.linearise(State(calibrate(case).errors, {}))
+    plain = case.linearise(State(calibrate(case).deviations, {}))
     return plain, tables.check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index(
         "effect"
     )

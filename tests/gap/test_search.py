@@ -64,7 +64,7 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
     state, covariance = refine(case, start, _hypothesis(Term(name)), 0)
-    before = np.abs(case.measured_mm - case.sim(start.errors)[case.used])
+    before = np.abs(case.measured_mm - case.sim(start.deviations)[case.used])
     after = np.abs(case.measured_mm - case.exact(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth),) * 2

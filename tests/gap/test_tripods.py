@@ -16,12 +16,12 @@ from rrru.store import tables
 NOISE_MM = 0.005
 
 
-def _diagnosed(mechanism, height, errors, effects, payloads=(0.0, 2.0, 5.0), seed=1):
+def _diagnosed(mechanism, height, deviations, effects, payloads=(0.0, 2.0, 5.0), seed=1):
     curve = Spiral("curve", (0.0, 0.0), (80.0, 80.0), (height - 20.0, height + 20.0), 1.0, 120)
     plan = make_plan(
         [curve], [{"payload_kg": load, "reverse": k % 2 == 1} for k, load in enumerate(payloads)], 80.0, 400.0, 5.0
     )
-    robot = VirtualTripod(mechanism, errors, active_effects(effects, mechanism.drive_unit))
+    robot = VirtualTripod(mechanism, deviations, active_effects(effects, mechanism.drive_unit))
     measurements, _ = robot.run(plan, NOISE_MM, np.random.default_rng(seed))
     return diagnose(measurements, mechanism, Masses(), noise_mm=NOISE_MM, name="test")
 

@@ -30,7 +30,7 @@ class Lines:
     """
 
     def __init__(self):
-        self.robot = Rrru3(errors="tied")
+        self.robot = Rrru3(parameter_set="tied")
         self.low, self.high = self.robot.parameters.low, self.robot.parameters.high
         line = np.linspace(-800.0, -300.0, 26)
         sides = (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5)
@@ -39,21 +39,21 @@ class Lines:
         self.truth = self.robot.parameters.vector(TABLE_5_RAD | TABLE_5_MM)
         noise = np.random.default_rng(5).normal(0.0, 0.3, self.commanded.shape)
         self.measured = self.robot.forward(self.theta, self.truth, self.commanded) + noise
-        slope = self.robot.error_jacobian(self.commanded, self.theta).transpose(2, 1, 0)
+        slope = self.robot.parameter_jacobian(self.commanded, self.theta).transpose(2, 1, 0)
         arrays = np.cos(self.theta).T, np.sin(self.theta).T, self.commanded.T, slope, self.measured.T
         self._arrays = tuple(np.ascontiguousarray(array) for array in arrays)
         self.seen = []
 
-    def __call__(self, errors):
+    def __call__(self, deviations):
         """Objective (m,) in mm of errors (m, 8)."""
-        self.seen.append(errors.copy())
-        return kernels.mean_distance(errors, self.robot.legs(errors), self.robot.turn, *self._arrays)
+        self.seen.append(deviations.copy())
+        return kernels.mean_distance(deviations, self.robot.legs(deviations), self.robot.turn, *self._arrays)
 
     def best_possible(self):
         """Objective at the least-squares solution, which is within noise of the mean distance's own minimum."""
 
-        def residuals(errors):
-            return (self.robot.forward(self.theta, errors, self.commanded) - self.measured).ravel()
+        def residuals(deviations):
+            return (self.robot.forward(self.theta, deviations, self.commanded) - self.measured).ravel()
 
         found = least_squares(residuals, np.zeros(8), x_scale=[1e-3] * 3 + [1.0] * 5, bounds=(self.low, self.high)).x
         return self(found[None])[0]
@@ -70,13 +70,13 @@ def lines(shared):
     return shared
 
 
-def sphere(errors):
-    return ((errors - 0.3) ** 2).sum(axis=1)
+def sphere(deviations):
+    return ((deviations - 0.3) ** 2).sum(axis=1)
 
 
-def holed(errors):
+def holed(deviations):
     """Feasible in less than half of its box only."""
-    return np.where(errors[:, 0] + errors[:, 1] > 0.2, np.inf, sphere(errors))
+    return np.where(deviations[:, 0] + deviations[:, 1] > 0.2, np.inf, sphere(deviations))
 
 
 def run(objective=sphere, genes=3, seed=1, **settings):
@@ -84,7 +84,7 @@ def run(objective=sphere, genes=3, seed=1, **settings):
 
 
 def same_bytes(first, second):
-    arrays = ("errors", "best_history", "mean_history")
+    arrays = ("deviations", "best_history", "mean_history")
     plain = ("objective", "generations", "evaluations", "stopped")
     return all(getattr(first, a).tobytes() == getattr(second, a).tobytes() for a in arrays) and all(
         getattr(first, p) == getattr(second, p) for p in plain
@@ -238,7 +238,7 @@ def test_the_histories_and_counts_tell_what_happened(lines, populations):
     assert result.best_history.shape == result.mean_history.shape == (76,)
     assert (np.diff(result.best_history) <= 0.0).all()
     assert (result.mean_history >= result.best_history).all()
-    assert result.objective == result.best_history[-1] == lines(result.errors[None])[0] == lines(every).min()
+    assert result.objective == result.best_history[-1] == lines(result.deviations[None])[0] == lines(every).min()
     assert (every >= lines.low).all()
     assert (every <= lines.high).all()
 
@@ -273,13 +273,13 @@ def test_a_stalled_run_stops_where_the_rule_says_first(lines):
 
 
 def test_equal_individuals_stall_without_harm():
-    result = run(lambda errors: np.full(len(errors), 0.5), populations=(5, 4))
+    result = run(lambda deviations: np.full(len(deviations), 0.5), populations=(5, 4))
     assert (result.stopped, result.generations, result.objective) == ("stalled", 50, 0.5)
-    assert run(lambda errors: np.full(len(errors), 0.5), stall_generations=0, generations=60).generations == 60
+    assert run(lambda deviations: np.full(len(deviations), 0.5), stall_generations=0, generations=60).generations == 60
 
 
 def test_nowhere_feasible_is_said_and_does_not_stall():
-    result = run(lambda errors: np.full(len(errors), np.inf), generations=70)
+    result = run(lambda deviations: np.full(len(deviations), np.inf), generations=70)
     assert (result.stopped, result.generations, result.objective) == ("generations", 70, np.inf)
     assert (result.best_history == np.inf).all()
 
@@ -296,7 +296,7 @@ def test_a_known_minimum_is_found(objective):
     # the minimum of the holed one lies on the edge of the hole: 0.1, 0.1, 0.3
     expected = [0.3, 0.3, 0.3] if objective is sphere else [0.1, 0.1, 0.3]
     result = run(objective, stall_generations=0, populations=(60,))
-    np.testing.assert_allclose(result.errors, expected, atol=0.03)
+    np.testing.assert_allclose(result.deviations, expected, atol=0.03)
 
 
 def test_the_calibration_comes_near_the_best_possible_fit(lines):

@@ -14,8 +14,8 @@ from rrru.seeds import run_seed
 LOW, HIGH, NAMES = [-1.0, -2.0], [1.0, 2.0], ("a_mm", "b_rad")
 
 
-def valley(errors):
-    return 0.5 + np.hypot(errors[:, 0] - 0.2, 5.0 * (errors[:, 0] + errors[:, 1]))
+def valley(deviations):
+    return 0.5 + np.hypot(deviations[:, 0] - 0.2, 5.0 * (deviations[:, 0] + deviations[:, 1]))
 
 
 def swept(parameter="crossover_fraction", value=0.5, seeds=range(3), study_seed=7, **settings):
@@ -51,7 +51,7 @@ def test_a_sweep_s_rows_are_single_runs():
         settings = GeneticSettings(0.3, populations=(10, 10), generations=25)
         single = minimise(valley, LOW, HIGH, settings, run_seed(7, "crossover_fraction", "islands", 0.3, row.seed))
         assert (row.population, row.objective_mm, row.evaluations) == ("islands", single.objective, single.evaluations)
-        assert (row.a_mm, row.b_rad) == tuple(single.errors)
+        assert (row.a_mm, row.b_rad) == tuple(single.deviations)
         own = history[history["seed"] == row.seed]
         np.testing.assert_array_equal(own["best_mm"], single.best_history)
         np.testing.assert_array_equal(own["mean_mm"], single.mean_history)

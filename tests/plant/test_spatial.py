@@ -20,15 +20,15 @@ def _solve(points, theta, lengths=_LENGTHS, deviations=None, **options):
 def test_parallel_axes_give_eq_8_for_any_lengths(rich_poses):
     points, theta = rich_poses
     generator = np.random.default_rng(0)
-    robot = Rrru3(errors="published")
-    errors = generator.uniform(-1, 1, 14) * np.r_[[0.01] * 3, [2.0] * 11]
+    robot = Rrru3(parameter_set="published")
+    deviations = generator.uniform(-1, 1, 14) * np.r_[[0.01] * 3, [2.0] * 11]
     lengths = _LENGTHS.copy()
-    lengths[:, 1:4] += errors[3:12].reshape(3, 3)
-    lengths[:, 0] += errors[12]
-    lengths[:, 4] += errors[13]
-    solution = _solve(points, theta + errors[:3], lengths)
+    lengths[:, 1:4] += deviations[3:12].reshape(3, 3)
+    lengths[:, 0] += deviations[12]
+    lengths[:, 4] += deviations[13]
+    solution = _solve(points, theta + deviations[:3], lengths)
     assert solution.converged.all()
-    np.testing.assert_allclose(solution.position_mm, robot.forward(theta, errors, points), atol=1e-8)
+    np.testing.assert_allclose(solution.position_mm, robot.forward(theta, deviations, points), atol=1e-8)
     assert np.abs(solution.rotation_rad).max() < 1e-12
 
 

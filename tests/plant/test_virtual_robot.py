@@ -99,9 +99,11 @@ def test_crooked_axes_near_the_singularity_are_unsolved_not_guessed():
 
 def test_same_seed_same_bytes_and_a_lost_point_changes_no_other():
     plan = _plan()
-    runs = [VirtualRobot(wobble_mm=0.3).run(plan, 0.02, np.random.default_rng(7))[0] for _ in range(2)]
+    runs = [VirtualRobot(non_repeatability_mm=0.3).run(plan, 0.02, np.random.default_rng(7))[0] for _ in range(2)]
     assert runs[0].equals(runs[1])
-    strict = VirtualRobot(wobble_mm=0.3, rotation_limit_rad=1e-18).run(plan, 0.02, np.random.default_rng(7))[0]
+    strict = VirtualRobot(non_repeatability_mm=0.3, rotation_limit_rad=1e-18).run(plan, 0.02, np.random.default_rng(7))[
+        0
+    ]
     kept = strict["measured_x_mm"].notna()
     assert 0 < kept.sum() < len(kept) or kept.sum() == 0
     assert strict.loc[kept, "measured_x_mm"].equals(runs[0].loc[kept, "measured_x_mm"])
@@ -109,7 +111,7 @@ def test_same_seed_same_bytes_and_a_lost_point_changes_no_other():
 
 def test_noise_and_wobble_have_the_stated_size():
     plan = make_plan((Line("line_1", (-600.0, 0.0, 600.0), (-300.0, 0.0, 600.0), 5000),), _ONCE, 80.0, 40.0, 0.0)
-    measurements, truth = VirtualRobot(wobble_mm=0.6).run(plan, 0.02, np.random.default_rng(0))
+    measurements, truth = VirtualRobot(non_repeatability_mm=0.6).run(plan, 0.02, np.random.default_rng(0))
     command = measurements[[f"command_{a}_mm" for a in "xyz"]].to_numpy()
     true = truth[[f"true_{a}_mm" for a in "xyz"]].to_numpy()
     measured = measurements[[f"measured_{a}_mm" for a in "xyz"]].to_numpy()
@@ -159,7 +161,7 @@ def test_every_part_of_a_contribution_reaches_the_loop_closure():
         displacement=generator.normal(size=(3, 6, 6)) * np.repeat([0.3, 0.001], 3),
         frame=np.array([3.0, -1.0, 2.0, 0.01, -0.02, 0.015]),
     )
-    robot = VirtualRobot(errors={"dtheta2": 0.002, "dL13": 0.7, "dr": -0.5}, effects=(_Everything(change),))
+    robot = VirtualRobot(deviations={"dtheta2": 0.002, "dL13": 0.7, "dr": -0.5}, effects=(_Everything(change),))
     position, _ = robot.positions(robot.motion(plan, robot.mechanism.inverse), target)
     theta = robot.mechanism.inverse(target)
     passive = robot.mechanism.passive_angles(target, theta)

@@ -25,15 +25,15 @@ def _plan(height, passes=({"payload_kg": 0.0, "reverse": False},)):
 
 @pytest.mark.parametrize("name", ERRORS)
 def test_a_robot_with_errors_stands_where_the_three_links_are_as_long_as_they_are(name):
-    mechanism, height, errors = ERRORS[name]
-    measurements, truth = VirtualTripod(mechanism, errors).run(_plan(height), 0.0, np.random.default_rng(0))
+    mechanism, height, deviations = ERRORS[name]
+    measurements, truth = VirtualTripod(mechanism, deviations).run(_plan(height), 0.0, np.random.default_rng(0))
     columns = [f"slider{k}_mm" if name == "ptt3" else f"theta{k}_rad" for k in (1, 2, 3)]
     actuators = measurements[columns].to_numpy()
     position = truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()
     np.testing.assert_allclose(
         actuators, mechanism.inverse(measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy())
     )
-    rich = VirtualTripod(mechanism, errors).geometry
+    rich = VirtualTripod(mechanism, deviations).geometry
     lengths = np.linalg.norm(position[:, None] - rich.mechanism.ends(actuators, rich.legs), axis=-1)
     np.testing.assert_allclose(lengths, np.broadcast_to(rich.legs[:, mechanism.LINK], lengths.shape), atol=1e-9)
     assert 0.1 < np.abs(position - measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()).max() < 3.0

@@ -38,7 +38,7 @@ def test_zero_errors_move_the_platform_as_eqs_3_to_6_say(closed):
     theta, position, links = closed
     slow = [tripods_slow.delta_zero_jacobian(t, BETA, 375.0, w) for t, w in zip(theta, links, strict=True)]
     robot = Delta()
-    np.testing.assert_allclose(robot.error_jacobian(position, theta), slow, rtol=1e-8, atol=1e-7)
+    np.testing.assert_allclose(robot.parameter_jacobian(position, theta), slow, rtol=1e-8, atol=1e-7)
     step = np.array([1e-6, -2e-6, 1.5e-6])
     moved = [
         tripods_slow.delta_close(t + step, BETA, 375.0, 900.0, 125.0, _DEPTH, p)[0] - p
@@ -49,12 +49,14 @@ def test_zero_errors_move_the_platform_as_eqs_3_to_6_say(closed):
 
 def test_a_zero_error_is_a_shift_of_the_drive(closed):
     theta = closed[0]
-    errors = np.array([0.003, -0.002, 0.001])
-    np.testing.assert_allclose(Delta().forward(theta, errors), Delta().forward(theta + errors), rtol=0.0, atol=1e-10)
+    deviations = np.array([0.003, -0.002, 0.001])
+    np.testing.assert_allclose(
+        Delta().forward(theta, deviations), Delta().forward(theta + deviations), rtol=0.0, atol=1e-10
+    )
 
 
 def test_errors_of_every_leg_are_errors_of_its_dimensions():
-    robot = Delta(errors="tied")
+    robot = Delta(parameter_set="tied")
     theta = robot.inverse(_inside())
     moved = robot.forward(theta, robot.parameters.vector({"dl1": 0.5, "dl2": -0.7, "da": 0.3}))
     other = Delta(l1_mm=375.5, l2_mm=899.3, a_mm=125.3)
@@ -117,10 +119,10 @@ def test_a_parallelogram_resists_turning_about_its_couple_only():
     """
     robot, points = Delta(), _inside()
     theta = robot.inverse(points)
-    couples, links = robot.couples(points, theta), robot.link_directions(points, theta)
+    constraint_moments, links = robot.constraint_moments(points, theta), robot.link_directions(points, theta)
     for leg in range(3):
         for axis, about in (
-            (couples[:, leg], True),
+            (constraint_moments[:, leg], True),
             (links[:, leg], False),
             (np.tile(robot.tangent[leg], (len(points), 1)), False),
         ):

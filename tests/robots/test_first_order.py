@@ -17,20 +17,20 @@ LENGTH, ANGLE = 1e-2, 1e-5
 @pytest.fixture(scope="module", params=[None, ERRORS], ids=["nominal", "with errors"])
 def setting(request, rich_poses):
     """Positions, drive angles, errors and the map at some poses that fit one another."""
-    position, errors = rich_poses[0][:COUNT], request.param
-    theta = ROBOT.inverse(position, errors)
-    return position, theta, errors, FirstOrder(ROBOT, position, theta, errors)
+    position, deviations = rich_poses[0][:COUNT], request.param
+    theta = ROBOT.inverse(position, deviations)
+    return position, theta, deviations, FirstOrder(ROBOT, position, theta, deviations)
 
 
 def _closed(setting, contribution):
     """Positions (n, 3) of the spatial closure under a contribution; r - R is changed by R."""
-    position, theta, errors, _ = setting
-    legs = ROBOT.legs(errors)
+    position, theta, deviations, _ = setting
+    legs = ROBOT.legs(deviations)
     lengths = np.stack([ROBOT.r_mm - legs[:, 4], *legs.T[1:4], np.full(3, ROBOT.r_mm)], axis=-1)
     geometry = SpatialGeometry(
         np.array(ROBOT.azimuth_rad), lengths + contribution.length_mm, np.zeros((3, 6, 6)) + contribution.displacement
     )
-    guess = ROBOT.passive_angles(position, theta, errors)
+    guess = ROBOT.passive_angles(position, theta, deviations)
     solution = geometry.solve(theta + legs[:, 0] + contribution.drive, guess, contribution.joint_mm)
     assert solution.converged.all()
     return solution.position_mm
@@ -111,15 +111,15 @@ def test_random_contributions_add_up_to_first_order(setting):
 
 
 def test_the_response_without_turning_is_the_actuator_jacobian(setting):
-    position, theta, errors, first_order = setting
+    position, theta, deviations, first_order = setting
     by_drive = first_order.response[..., 0] * first_order.drive[:, None, :]
-    np.testing.assert_allclose(by_drive, ROBOT.actuator_jacobian(position, theta, errors), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(by_drive, ROBOT.actuator_jacobian(position, theta, deviations), rtol=1e-9, atol=1e-9)
 
 
 def test_the_errors_of_the_calibration_are_contributions_too(setting):
     """dL1 to dL3 on all legs and da as a change of r: columns of the error Jacobian."""
-    position, theta, errors, first_order = setting
-    expected = ROBOT.error_jacobian(position, theta, errors)
+    position, theta, deviations, first_order = setting
+    expected = ROBOT.parameter_jacobian(position, theta, deviations)
     for column, link in ((3, 1), (4, 2), (5, 3), (6, 4)):
         length = np.zeros((COUNT, 3, 5))
         length[..., link] = 1.0

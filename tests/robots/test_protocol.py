@@ -28,9 +28,9 @@ class Case:
     travel: tuple
     section: dict = field(default_factory=dict)
 
-    def mechanism(self, errors):
+    def mechanism(self, parameter_set):
         """The mechanism with an error set."""
-        return make_mechanism(self.robot, self.section, errors=errors)
+        return make_mechanism(self.robot, self.section, parameter_set=parameter_set)
 
 
 CASES = {
@@ -40,8 +40,8 @@ CASES = {
     "ptt3_upright": Case("ptt3", _HANGING, (-1500.0, 1500.0), {"rail_inclination_deg": 90.0}),
     "delta": Case("delta", ((-300.0, -300.0, -150.0), (300.0, 300.0, 150.0)), (-np.pi, np.pi)),
 }
-_ERROR_NAMES = {"rrru3": rrru3.ERROR_NAMES, "ptt3": ptt3.ERROR_NAMES, "delta": delta.ERROR_NAMES}
-PAIRS = [(name, kind) for name, case in CASES.items() for kind in _ERROR_NAMES[case.robot]]
+_PARAMETER_NAMES = {"rrru3": rrru3.PARAMETER_NAMES, "ptt3": ptt3.PARAMETER_NAMES, "delta": delta.PARAMETER_NAMES}
+PAIRS = [(name, kind) for name, case in CASES.items() for kind in _PARAMETER_NAMES[case.robot]]
 # combinations of errors that no position shows: R and r; along level rails R - r and a common slider zero
 GAUGES = {
     ("rrru3", "published"): 1,
@@ -81,7 +81,7 @@ def _size(mechanism):
 
 def _first(case):
     """First error set of a case."""
-    return next(iter(_ERROR_NAMES[case.robot]))
+    return next(iter(_PARAMETER_NAMES[case.robot]))
 
 
 def _slope(function, width, steps):
@@ -100,51 +100,51 @@ def test_the_cases_cover_every_mechanism():
 
 @every_set
 def test_forward_undoes_inverse(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind)
+    mechanism, points, drives, deviations = _clear(name, kind)
     np.testing.assert_allclose(mechanism.forward(drives, guess_mm=points), points, atol=1e-9)
-    moved = mechanism.inverse(points, errors)
-    np.testing.assert_allclose(mechanism.forward(moved, errors, points), points, atol=1e-9)
+    moved = mechanism.inverse(points, deviations)
+    np.testing.assert_allclose(mechanism.forward(moved, deviations, points), points, atol=1e-9)
     assert np.abs(moved - drives).max() > 1e-3
 
 
 @every_set
-def test_actuator_and_error_jacobians_equal_finite_differences(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind)
-    position = mechanism.forward(drives, errors, points)
+def test_actuator_and_parameter_jacobians_equal_finite_differences(name, kind):
+    mechanism, points, drives, deviations = _clear(name, kind)
+    position = mechanism.forward(drives, deviations, points)
     steps = 1e-2 * _size(mechanism)
-    numeric = _slope(lambda step: mechanism.forward(drives, errors + step, position), len(errors), steps)
-    _same(mechanism.error_jacobian(position, drives, errors), numeric)
+    numeric = _slope(lambda step: mechanism.forward(drives, deviations + step, position), len(deviations), steps)
+    _same(mechanism.parameter_jacobian(position, drives, deviations), numeric)
     step = 1e-5 if mechanism.drive_unit == "rad" else 1e-2
-    numeric = _slope(lambda change: mechanism.forward(drives + change, errors, position), 3, step)
-    _same(mechanism.actuator_jacobian(position, drives, errors), numeric)
+    numeric = _slope(lambda change: mechanism.forward(drives + change, deviations, position), 3, step)
+    _same(mechanism.actuator_jacobian(position, drives, deviations), numeric)
 
 
 @every_set
 def test_closure_jacobians_equal_finite_differences(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind)
-    by_position, by_leg = mechanism.closure_jacobians(points, drives, errors)
-    _same(by_position, _slope(lambda step: mechanism.closure(points + step, drives, errors), 3, 1e-2))
+    mechanism, points, drives, deviations = _clear(name, kind)
+    by_position, by_leg = mechanism.closure_jacobians(points, drives, deviations)
+    _same(by_position, _slope(lambda step: mechanism.closure(points + step, drives, deviations), 3, 1e-2))
     steps = 1e-2 * _size(mechanism)
-    numeric = _slope(lambda step: mechanism.closure(points, drives, errors + step), len(errors), steps)
+    numeric = _slope(lambda step: mechanism.closure(points, drives, deviations + step), len(deviations), steps)
     _same(np.einsum("nlc,lcp->nlp", by_leg, mechanism.leg_map), numeric)
 
 
 @every_set
 def test_errors_are_recovered_or_known_to_be_a_gauge(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind)
-    residuals = Residuals(mechanism, drives, mechanism.forward(drives, errors, points), points)
+    mechanism, points, drives, deviations = _clear(name, kind)
+    residuals = Residuals(mechanism, drives, mechanism.forward(drives, deviations, points), points)
     seen = analyse(mechanism, residuals.jacobian(mechanism.parameters.nominal)).rank
-    assert seen == len(errors) - GAUGES.get((name, kind), 0)
+    assert seen == len(deviations) - GAUGES.get((name, kind), 0)
     fit = least_squares(residuals)
     assert fit.identifiability.rank == seen and fit.rms_mm < 1e-8
-    if seen == len(errors):
-        np.testing.assert_allclose(fit.errors, errors, rtol=0.0, atol=1e-6)
+    if seen == len(deviations):
+        np.testing.assert_allclose(fit.deviations, deviations, rtol=0.0, atol=1e-6)
 
 
 @every_set
 def test_a_batch_of_errors_equals_a_loop(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind)
-    batch = np.random.default_rng(1).uniform(-1.0, 1.0, (5, len(errors))) * _size(mechanism)
+    mechanism, points, drives, deviations = _clear(name, kind)
+    batch = np.random.default_rng(1).uniform(-1.0, 1.0, (5, len(deviations))) * _size(mechanism)
     result = mechanism.forward_batch(drives, batch, points)
     assert result.shape == (5, len(points), 3)
     for one, vector in zip(result, batch, strict=True):
@@ -153,9 +153,9 @@ def test_a_batch_of_errors_equals_a_loop(name, kind):
 
 @every_set
 def test_mean_distance_equals_a_loop(name, kind):
-    mechanism, points, drives, errors = _clear(name, kind, 12)
-    residuals = Residuals(mechanism, drives, mechanism.forward(drives, errors, points), points)
-    batch = np.random.default_rng(2).uniform(-1.0, 1.0, (4, len(errors))) * _size(mechanism)
+    mechanism, points, drives, deviations = _clear(name, kind, 12)
+    residuals = Residuals(mechanism, drives, mechanism.forward(drives, deviations, points), points)
+    batch = np.random.default_rng(2).uniform(-1.0, 1.0, (4, len(deviations))) * _size(mechanism)
     slow = []
     for vector in batch:
         model = [
@@ -235,8 +235,8 @@ def test_bad_dimensions_sets_and_keys_are_refused(name):
         for value in (0.0, -1.0, float("nan")):
             with pytest.raises(ConfigError, match=f"{case.robot}: {key} is {value}; allowed: a positive number"):
                 kind(**{key: value})
-    with pytest.raises(ConfigError, match=f"{case.robot}: errors is 'all'; allowed: "):
-        kind(errors="all")
+    with pytest.raises(ConfigError, match=f"{case.robot}: parameter_set is 'all'; allowed: "):
+        kind(parameter_set="all")
     with pytest.raises(ConfigError, match=f"robot {case.robot}: unknown key 'L9_mm'; known: "):
         make_mechanism(case.robot, {"L9_mm": 1.0})
 

@@ -43,7 +43,7 @@ def test_forward_equals_a_general_solver_point_by_point(degrees):
 
 def test_upright_rails_are_a_linear_delta():
     """Carriage heights by Pythagoras, platform by linear algebra on three spheres, each tower with its own errors."""
-    robot = Ptt3(rail_inclination_rad=np.pi / 2.0, errors="distances")
+    robot = Ptt3(rail_inclination_rad=np.pi / 2.0, parameter_set="distances")
     points = _inside(40)
     heights = robot.inverse(points)
     np.testing.assert_allclose(
@@ -74,7 +74,7 @@ def test_a_rail_that_leans_moves_its_carriage_along_the_leaning_line():
     """Rise lifts the rail, swing and dphi turn it about the vertical: about its zero mark and about the base's
     centre.
     """
-    robot = Ptt3(errors="rails")
+    robot = Ptt3(parameter_set="rails")
     slider = np.array([[50.0, 50.0, 50.0]])
 
     def end(**values):
@@ -95,10 +95,10 @@ def test_jacobian_of_eq_10_equals_finite_differences_of_the_inverse(degrees):
 
 
 def test_jacobian_of_eq_10_undoes_the_actuator_jacobian():
-    robot, points = Ptt3(errors="legs"), _inside()
-    errors = np.array([0.4, -0.3, 0.8, 0.5, -0.6, 0.7])
-    sliders = robot.inverse(points, errors)
-    product = robot.jacobian(points, sliders, errors) @ robot.actuator_jacobian(points, sliders, errors)
+    robot, points = Ptt3(parameter_set="legs"), _inside()
+    deviations = np.array([0.4, -0.3, 0.8, 0.5, -0.6, 0.7])
+    sliders = robot.inverse(points, deviations)
+    product = robot.jacobian(points, sliders, deviations) @ robot.actuator_jacobian(points, sliders, deviations)
     np.testing.assert_allclose(product, np.tile(np.eye(3), (len(points), 1, 1)), atol=1e-12)
 
 
@@ -184,11 +184,11 @@ def test_radii_do_not_enter_the_jacobian_at_a_position():
 def test_couples_stand_across_both_axes_of_the_u_joints():
     robot, points = Ptt3(rail_inclination_rad=0.4), _inside()
     sliders = robot.inverse(points)
-    couples, links = robot.couples(points, sliders), robot.link_directions(points, sliders)
+    constraint_moments, links = robot.constraint_moments(points, sliders), robot.link_directions(points, sliders)
     inner = np.cross(robot.tangent, links)
     for axis in (robot.tangent, inner):
-        assert np.abs((couples * axis).sum(axis=-1)).max() < 1e-12
-    np.testing.assert_allclose(np.linalg.norm(couples, axis=-1), 1.0)
+        assert np.abs((constraint_moments * axis).sum(axis=-1)).max() < 1e-12
+    np.testing.assert_allclose(np.linalg.norm(constraint_moments, axis=-1), 1.0)
 
 
 def test_turning_the_robot_by_a_third_passes_the_sliders_on():

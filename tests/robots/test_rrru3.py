@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
 from rrru.robots import singularity
-from rrru.robots.rrru3 import ERROR_NAMES, Rrru3, to_identifiable
+from rrru.robots.rrru3 import PARAMETER_NAMES, Rrru3, to_identifiable
 from tests.reference import rrru3_slow
 
 # computed apart from this project: elbow out, y = 0, z = 600 (degrees)
@@ -38,15 +38,15 @@ def test_elbow_out_is_the_smaller_drive_angle(rich_poses):
 @settings(max_examples=60, deadline=None)
 @given(
     position=st.tuples(st.floats(-500, 500), st.floats(-300, 300), st.floats(500, 900)),
-    errors=st.tuples(*[st.floats(-0.01, 0.01)] * 3, *[st.floats(-2, 2)] * 4),
+    deviations=st.tuples(*[st.floats(-0.01, 0.01)] * 3, *[st.floats(-2, 2)] * 4),
 )
-def test_forward_undoes_inverse_under_any_errors(position, errors):
+def test_forward_undoes_inverse_under_any_errors(position, deviations):
     robot = Rrru3()
-    theta = robot.inverse([position], errors)
+    theta = robot.inverse([position], deviations)
     # at a singularity, as over the base's centre with upright arms, rounding is all that the closures leave of the
     # position
-    if np.isfinite(theta).all() and singularity.translational_measure(robot, [position], theta, errors) > 1e-3:
-        np.testing.assert_allclose(robot.forward(theta, errors, [position])[0], position, atol=1e-9)
+    if np.isfinite(theta).all() and singularity.translational_measure(robot, [position], theta, deviations) > 1e-3:
+        np.testing.assert_allclose(robot.forward(theta, deviations, [position])[0], position, atol=1e-9)
 
 
 def test_forward_without_guess_finds_the_commanded_pose(rich_poses):
@@ -56,38 +56,38 @@ def test_forward_without_guess_finds_the_commanded_pose(rich_poses):
 
 def test_forward_equals_a_general_solver_point_by_point(rich_poses):
     points, theta = rich_poses
-    robot = Rrru3(errors="published")
-    errors = np.random.default_rng(0).uniform(-1, 1, 14) * np.r_[[0.02] * 3, [2.0] * 11]
-    legs = robot.legs(errors)
+    robot = Rrru3(parameter_set="published")
+    deviations = np.random.default_rng(0).uniform(-1, 1, 14) * np.r_[[0.02] * 3, [2.0] * 11]
+    legs = robot.legs(deviations)
     slow = [rrru3_slow.forward(t, legs, p) for t, p in zip(theta[:40], points[:40], strict=True)]
-    np.testing.assert_allclose(robot.forward(theta[:40], errors, points[:40]), slow, atol=1e-9)
+    np.testing.assert_allclose(robot.forward(theta[:40], deviations, points[:40]), slow, atol=1e-9)
 
 
 def test_batch_over_errors_equals_one_at_a_time(rich_poses):
     points, theta = rich_poses
-    robot = Rrru3(errors="tied")
-    errors = np.random.default_rng(1).uniform(-1, 1, (5, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
-    batch = robot.forward_batch(theta, errors, points)
+    robot = Rrru3(parameter_set="tied")
+    deviations = np.random.default_rng(1).uniform(-1, 1, (5, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
+    batch = robot.forward_batch(theta, deviations, points)
     assert batch.shape == (5, len(points), 3)
-    for one, vector in zip(batch, errors, strict=True):
+    for one, vector in zip(batch, deviations, strict=True):
         np.testing.assert_array_equal(one, robot.forward(theta, vector, points))
 
 
-@pytest.mark.parametrize("kind", ERROR_NAMES)
-def test_error_jacobian_equals_finite_differences(rich_poses, kind):
+@pytest.mark.parametrize("kind", PARAMETER_NAMES)
+def test_parameter_jacobian_equals_finite_differences(rich_poses, kind):
     points, theta = rich_poses
-    robot = Rrru3(errors=kind)
-    errors = np.random.default_rng(2).uniform(-1, 1, len(robot.parameters)) * np.where(
+    robot = Rrru3(parameter_set=kind)
+    deviations = np.random.default_rng(2).uniform(-1, 1, len(robot.parameters)) * np.where(
         [u == "rad" for u in robot.parameters.units], 0.005, 1.0
     )
-    position = robot.forward(theta, errors, points)
-    analytic = robot.error_jacobian(position, theta, errors)
+    position = robot.forward(theta, deviations, points)
+    analytic = robot.parameter_jacobian(position, theta, deviations)
     for k, unit in enumerate(robot.parameters.units):
-        step = np.zeros(len(errors))
+        step = np.zeros(len(deviations))
         step[k] = 1e-5 if unit == "rad" else 1e-2
-        numeric = (robot.forward(theta, errors + step, position) - robot.forward(theta, errors - step, position)) / (
-            2 * step[k]
-        )
+        numeric = (
+            robot.forward(theta, deviations + step, position) - robot.forward(theta, deviations - step, position)
+        ) / (2 * step[k])
         np.testing.assert_allclose(analytic[..., k], numeric, rtol=1e-5, atol=1e-5 * np.abs(numeric).max())
 
 
@@ -127,7 +127,7 @@ def test_theta3_keeps_the_sign_that_eq_6_loses():
 
 def test_R_and_r_enter_only_as_their_difference(rich_poses):
     points, theta = rich_poses
-    robot = Rrru3(errors="tied")
+    robot = Rrru3(parameter_set="tied")
     both = robot.parameters.vector({"dR": 1.3, "dr": 1.3})
     np.testing.assert_allclose(robot.forward(theta, both, points), points, atol=1e-9)
 
@@ -139,7 +139,7 @@ def test_published_tied_and_identifiable_errors_say_the_same(rich_poses):
     published |= {f"dL{leg}3": -0.2 for leg in (1, 2, 3)}
     positions = []
     for kind, values in (("tied", tied), ("published", published), ("identifiable", to_identifiable(tied))):
-        robot = Rrru3(errors=kind)
+        robot = Rrru3(parameter_set=kind)
         positions.append(robot.forward(theta, robot.parameters.vector(values), points))
     np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
     np.testing.assert_allclose(positions[0], positions[2], atol=1e-9)
@@ -166,5 +166,5 @@ def test_wrong_shapes_and_dimensions_are_refused():
         Rrru3().inverse([0.0, 0.0, 600.0])
     with pytest.raises(ConfigError, match="L1_mm is -1"):
         Rrru3(L1_mm=-1.0)
-    with pytest.raises(ConfigError, match="errors is 'all'"):
-        Rrru3(errors="all")
+    with pytest.raises(ConfigError, match="parameter_set is 'all'"):
+        Rrru3(parameter_set="all")

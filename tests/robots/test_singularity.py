@@ -46,8 +46,8 @@ def test_closure_determinant_is_the_product_of_both_singularities(rich_poses):
     robot = Rrru3()
     full = VirtualRobot().geometry.closure_determinant(theta, robot.passive_angles(points, theta))
     forces = np.linalg.det(singularity.leg_forces(robot, points, theta))
-    couples = np.linalg.det(robot.couples(points, theta))
-    ratio = np.abs(full / (forces * couples))
+    constraint_moments = np.linalg.det(robot.constraint_moments(points, theta))
+    ratio = np.abs(full / (forces * constraint_moments))
     assert ratio.min() > 0.2 * np.median(ratio)
 
 

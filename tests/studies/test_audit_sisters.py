@@ -81,8 +81,8 @@ def test_what_distances_see_by_driving_the_robot_with_wrong_zeros():
     robot, points = Delta(), audit_paper_c._spread(100.0, 200.0, 20)
     theta = robot.inverse(points)
 
-    def seen(errors):
-        moved = robot.forward(theta, errors)
+    def seen(deviations):
+        moved = robot.forward(theta, deviations)
         return moved, np.linalg.norm(moved[1:] - moved[0], axis=1)
 
     step = 1e-5
@@ -102,12 +102,12 @@ def test_what_wrong_lengths_leave_by_drawing_robots():
     Squares of few normal numbers scatter as much as their mean does, at most sqrt(2) times it: the rms of forty within
     4 x 1.41 / 2 / sqrt(40).
     """
-    robot, legs, points = Delta(), Delta(errors="legs"), audit_paper_c._spread(0.0, 300.0, 200)
+    robot, legs, points = Delta(), Delta(parameter_set="legs"), audit_paper_c._spread(0.0, 300.0, 200)
     theta = robot.inverse(points)
     generator, squares = np.random.default_rng(0), []
     for _ in range(40):
-        errors = np.r_[np.zeros(3), generator.normal(0.0, 0.1, 9)]
-        squares.append(least_squares(Residuals(robot, theta, legs.forward(theta, errors), points)).rms_mm ** 2)
+        deviations = np.r_[np.zeros(3), generator.normal(0.0, 0.1, 9)]
+        squares.append(least_squares(Residuals(robot, theta, legs.forward(theta, deviations), points)).rms_mm ** 2)
     exact, left = _row(audit_paper_c, "best zero offsets")
     assert exact == 0.0 and left == pytest.approx(
         np.sqrt(np.mean(squares)), rel=4.0 * np.sqrt(2.0) / 2.0 / np.sqrt(40.0)

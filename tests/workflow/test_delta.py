@@ -76,7 +76,7 @@ def test_errors_on_the_plane_are_those_of_a_robot_driven_again(finished, config)
     """
     points, section = _table(finished, "points"), config["delta"]
     found = _table(finished, "calibrations").set_index("variant")
-    truth = Delta(errors="legs")
+    truth = Delta(parameter_set="legs")
     for variant, rows in points.groupby("variant"):
         command = _columns(rows, "command")
         angles = Delta().inverse(command)
@@ -200,9 +200,9 @@ def test_the_vision_job_is_given_images_only(finished):
 
 def test_a_step_of_the_search_stays_near_the_configured_robot(finished, config):
     text = (finished[0] / "twin/delta.yaml").read_text()
-    errors = yaml.safe_load(text)["delta"]["errors"]
+    deviations = yaml.safe_load(text)["delta"]["errors"]
     misfit = float(re.search(r"misfit ([\d.]+)", text)[1])
-    for name, value in errors.items():
+    for name, value in deviations.items():
         reach = config["delta"]["search"]["share"] * (0.02 if name.startswith("dtheta") else 0.3)
         assert abs(value - config["delta"]["errors"][name]) <= reach + 1e-6
     # the misfit is that of the four published numbers, medians over the draws
@@ -213,7 +213,7 @@ def test_a_step_of_the_search_stays_near_the_configured_robot(finished, config):
     noise = draws.centre_noise_px(own, truth, _table(finished, "dots"))
     first = (truth["plane"] == "first").to_numpy()
     drawn = [one["centre"][first] for one in draws.drawn_errors(own, truth, noise, 2, "search")]
-    small = own | {"delta": own["delta"] | {"errors": errors}}
+    small = own | {"delta": own["delta"] | {"errors": deviations}}
     here = search.numbers(robot.twin(small), _columns(truth, "command")[first], drawn)
     published = {"before_mean": 0.932, "before_max": 1.442, "after_mean": 0.211, "after_max": 0.374}
     assert misfit == pytest.approx(np.sqrt(np.mean([(here[k] / v - 1.0) ** 2 for k, v in published.items()])), abs=2e-4)

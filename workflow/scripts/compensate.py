@@ -18,14 +18,14 @@ def main(config, campaign, inputs, outputs):
     virtual = study.virtual_campaign(config, campaign) if study.is_virtual(config, campaign) else None
     frames = [evaluate.before(measurements)]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):
-        errors = errors_vector(parameters, calibration, method, mechanism)
-        frames.append(evaluate.model_residual(measurements, mechanism, errors, calibration, method))
+        deviations = errors_vector(parameters, calibration, method, mechanism)
+        frames.append(evaluate.model_residual(measurements, mechanism, deviations, calibration, method))
         if virtual is not None:
             # every calibration is driven with the same draws, so that differences are the calibrations'
             generator = virtual.generator("closed_loop")
             frames.append(
                 evaluate.closed_loop(
-                    virtual.robot, virtual.plan, errors, virtual.noise_mm, generator, calibration, method
+                    virtual.robot, virtual.plan, deviations, virtual.noise_mm, generator, calibration, method
                 )
             )
     result = pd.concat(frames, ignore_index=True)

@@ -21,9 +21,9 @@ def main(config, inputs, output):
         twin, truth, draws.drawn_errors(config, truth, noise, section["draws"], "search"), section
     )
     logging.info("misfit %.4f", misfit)
-    errors = {name: round(value, 6) for name, value in twin.truth.parameters.mapping(found).items()}
+    deviations = {name: round(value, 6) for name, value in twin.truth.parameters.mapping(found).items()}
     partial = Path(f"{output}.partial")
-    partial.write_text(f"# misfit {misfit:.4f}\n" + yaml.safe_dump({"delta": {"errors": errors}}, sort_keys=False))
+    partial.write_text(f"# misfit {misfit:.4f}\n" + yaml.safe_dump({"delta": {"errors": deviations}}, sort_keys=False))
     partial.replace(output)
 
 

@@ -107,7 +107,7 @@ def _planar_jacobians(robot):
     distances (19, 1, 3).
     """
     points = _spread(100.0, _CALIBRATED_MM, 20)
-    position = robot.error_jacobian(points, robot.inverse(points))
+    position = robot.parameter_jacobian(points, robot.inverse(points))
     moved, way = position[1:] - position[0], points[1:] - points[0]
     distance = np.einsum("na,nak->nk", way / np.linalg.norm(way, axis=1, keepdims=True), moved)
     return position, moved[:, :2], distance[:, None]
@@ -157,8 +157,8 @@ def _what_remains():
     """Errors of arms, links and base that the zero errors cannot take up, and what the error before calibration
     says.
     """
-    robot, points = Delta(errors="legs"), _spread(0.0, _CHECKED_MM, 200)
-    jacobian = robot.error_jacobian(points, robot.inverse(points)).reshape(-1, len(robot.parameters))
+    robot, points = Delta(parameter_set="legs"), _spread(0.0, _CHECKED_MM, 200)
+    jacobian = robot.parameter_jacobian(points, robot.inverse(points)).reshape(-1, len(robot.parameters))
     angle = np.array([unit == "rad" for unit in robot.parameters.units])
     zeros, lengths = jacobian[:, angle], jacobian[:, ~angle]
     kept = lengths - zeros @ np.linalg.lstsq(zeros, lengths, rcond=None)[0]

@@ -139,7 +139,7 @@ def fit(variant, mechanism, command_mm, places_mm):
 
 def paper_fit(mechanism, centres):
     """The paper's zero errors (3,) from rows of `delta_centres` on its plane."""
-    return fit(VARIANTS[0], mechanism, columns(centres, "command"), columns(centres, "centre"))[0].errors
+    return fit(VARIANTS[0], mechanism, columns(centres, "command"), columns(centres, "centre"))[0].deviations
 
 
 def chosen(variant, planes):
@@ -175,7 +175,7 @@ def study(twin, centres, truth, length_error_mm):
     for variant in VARIANTS:
         command, seen = places(variant, twin, centres, truth)
         result, covariance, fitted = fit(variant, twin.mechanism, command, seen)
-        points.append(_points(twin, variant.name, result.errors))
+        points.append(_points(twin, variant.name, result.deviations))
         legs = residuals(variant, twin.truth, command, fitted.actuators, seen).jacobian(twin.truth.parameters.nominal)[
             ..., 3:
         ]
@@ -210,9 +210,9 @@ def _calibration(variant, twin, result, poses, lengths_rad):
         "noise_mm": result.noise_mm,
     }
     for k, name in enumerate(twin.mechanism.parameters.names):
-        row |= {f"{name}_true_rad": twin.zero_errors_rad[k], f"{name}_found_rad": result.errors[k]}
+        row |= {f"{name}_true_rad": twin.zero_errors_rad[k], f"{name}_found_rad": result.deviations[k]}
         row |= {
-            f"{name}_error_rad": result.errors[k] - twin.zero_errors_rad[k],
+            f"{name}_error_rad": result.deviations[k] - twin.zero_errors_rad[k],
             f"{name}_standard_error_rad": result.standard_errors[k],
         }
         row[f"{name}_length_error_rad"] = np.linalg.norm(lengths_rad[k])

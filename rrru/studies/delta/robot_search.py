@@ -38,8 +38,8 @@ def numbers(twin, command_mm, centre_errors_mm):
         own = replace(twin, labels=("search", number))
         found = one_step(Distances(twin.mechanism, actuators, places + errors, alike=True))
         sizes = {
-            label: np.linalg.norm(own.plane_errors(errors, own.generator("plane", variant))[0], axis=1)
-            for label, variant, errors in (("before", "none", None), ("after", "paper", found))
+            label: np.linalg.norm(own.plane_errors(deviations, own.generator("plane", variant))[0], axis=1)
+            for label, variant, deviations in (("before", "none", None), ("after", "paper", found))
         }
         draws.append(
             {
@@ -66,15 +66,17 @@ def search(twin, truth, centre_errors, section):
     command, seen = columns(truth, "command")[first], [errors["centre"][first] for errors in centre_errors]
     angle = np.array(twin.truth.parameters.units) == "rad"
 
-    def price(errors):
-        lengths = errors[~angle] / _LENGTH_MM
-        return misfit(numbers(replace(twin, errors=errors), command, seen)) + _PRICE * (lengths**4).mean() ** 0.25
+    def price(deviations):
+        lengths = deviations[~angle] / _LENGTH_MM
+        return (
+            misfit(numbers(replace(twin, deviations=deviations), command, seen)) + _PRICE * (lengths**4).mean() ** 0.25
+        )
 
     limit = np.where(angle, _ZERO_RAD, _LENGTH_MM)
-    low, high = (np.clip(twin.errors + side * section["share"] * limit, -limit, limit) for side in (-1.0, 1.0))
+    low, high = (np.clip(twin.deviations + side * section["share"] * limit, -limit, limit) for side in (-1.0, 1.0))
     bounds = list(zip(low, high, strict=True))
     generator = twin.generator("search")
     result = differential_evolution(
         price, bounds, maxiter=section["generations"], popsize=5, tol=0.0, polish=False, rng=generator
     )
-    return result.x, misfit(numbers(replace(twin, errors=result.x), command, seen))
+    return result.x, misfit(numbers(replace(twin, deviations=result.x), command, seen))

@@ -40,8 +40,8 @@ def other_robots(twin, truth, errors, section):
         sizes = {}
         for robot in range(section["robots"]):
             own = replace(twin, labels=("robots", robot))
-            unit = own.generator().standard_normal(len(twin.errors))
-            own = replace(own, errors=np.concatenate([section["zero_rad"] * unit[:3], length * unit[3:]]))
+            unit = own.generator().standard_normal(len(twin.deviations))
+            own = replace(own, deviations=np.concatenate([section["zero_rad"] * unit[:3], length * unit[3:]]))
             _measure(own, truth, errors[robot % len(errors)], sizes)
         shares = {"median": 50.0, "high": 90.0}
         for name, of in sizes.items():
@@ -61,9 +61,11 @@ def _measure(twin, truth, draw, sizes):
     seen = _seen(twin, truth, draw)
     found = {"none": None}
     for variant in fits.VARIANTS:
-        found[variant.name] = fits.fit(variant, twin.mechanism, *fits.places(variant, twin, *seen))[0].errors
-    for name, errors in found.items():
-        lengths = [np.linalg.norm(error, axis=1) for error in twin.plane_errors(errors, twin.generator("plane", name))]
+        found[variant.name] = fits.fit(variant, twin.mechanism, *fits.places(variant, twin, *seen))[0].deviations
+    for name, deviations in found.items():
+        lengths = [
+            np.linalg.norm(error, axis=1) for error in twin.plane_errors(deviations, twin.generator("plane", name))
+        ]
         sizes.setdefault(name, []).append([of(length) for length in lengths for of in (np.mean, np.max)])
 
 

@@ -30,7 +30,7 @@ class DeltaTwin:
 
     mechanism: Delta
     truth: Delta
-    errors: np.ndarray
+    deviations: np.ndarray
     plane_mm: np.ndarray
     axes_mm: np.ndarray
     tracker_noise_mm: float
@@ -40,7 +40,7 @@ class DeltaTwin:
     @property
     def zero_errors_rad(self):
         """The drives' true zero errors (3,)."""
-        return self.errors[:3]
+        return self.deviations[:3]
 
     def generator(self, *labels):
         """Random stream of the study for a purpose."""
@@ -50,7 +50,7 @@ class DeltaTwin:
         """Where the robot really stands (n, 3) in the base frame for the drive angles (n, 3) that its controller
         commands.
         """
-        return self.truth.forward(actuators, self.errors)
+        return self.truth.forward(actuators, self.deviations)
 
     def drive(self, command_mm, found=None):
         """Where the robot really goes (n, 3) for commands (n, 3) when the zero errors `found` (3,) are fed back, base
@@ -74,7 +74,8 @@ def twin(config):
     """
     section = config["delta"]
     mechanism, truth = (
-        make_mechanism("delta", config["robots"]["delta"], errors=errors) for errors in ("zero", "legs")
+        make_mechanism("delta", config["robots"]["delta"], parameter_set=parameter_set)
+        for parameter_set in ("zero", "legs")
     )
     plane = section["plane"]
     found = DeltaTwin(

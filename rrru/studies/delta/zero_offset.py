@@ -53,15 +53,15 @@ class Distances:
         """Inverse Cholesky factor (n-1, n-1) of the covariance, or the unit matrix where all count alike."""
         return np.eye(len(self)) if self.alike else np.linalg.inv(np.linalg.cholesky(self.covariance))
 
-    def residual(self, errors):
+    def residual(self, deviations):
         """Measured less model distances (n-1, 1) in mm, whitened."""
-        difference = _apart(self.measured_mm)[0] - _apart(self.mechanism.forward(self.actuators, errors))[0]
+        difference = _apart(self.measured_mm)[0] - _apart(self.mechanism.forward(self.actuators, deviations))[0]
         return (self.whitener @ difference)[:, None]
 
-    def jacobian(self, errors):
+    def jacobian(self, deviations):
         """Derivative (n-1, 1, p) of the residual."""
-        places = self.mechanism.forward(self.actuators, errors)
-        slope = self.mechanism.error_jacobian(places, self.actuators, errors)
+        places = self.mechanism.forward(self.actuators, deviations)
+        slope = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
         rows = np.einsum("na,nap->np", _apart(places)[1], slope[1:] - slope[0])
         return -(self.whitener @ rows)[:, None]
 
@@ -88,24 +88,24 @@ class Shape:
         motions = np.concatenate([np.tile(np.eye(3), (len(self), 1, 1)), turned], axis=1)
         return linalg.null_space(motions.transpose(1, 0, 2).reshape(6, -1)).T
 
-    def _turned(self, errors):
+    def _turned(self, deviations):
         """Model places (n, 3) moved onto the measured ones, the rotation (3, 3) of it and the places before."""
-        places = self.mechanism.forward(self.actuators, errors)
+        places = self.mechanism.forward(self.actuators, deviations)
         middle = self.measured_mm.mean(axis=0)
         turn = Rotation.align_vectors(self.measured_mm - middle, places - places.mean(axis=0))[0].as_matrix()
         return (places - places.mean(axis=0)) @ turn.T + middle, turn, places
 
-    def residual(self, errors):
+    def residual(self, deviations):
         """Measured less model places, (3n - 6, 1) in mm."""
-        moved, _, _ = self._turned(errors)
+        moved, _, _ = self._turned(deviations)
         return (self._rest @ (self.measured_mm - moved).ravel())[:, None]
 
-    def jacobian(self, errors):
+    def jacobian(self, deviations):
         """Derivative (3n - 6, 1, p) of the residual, but for the part by which the best rotation follows, which `_rest`
         takes away.
         """
-        _, turn, places = self._turned(errors)
-        slope = turn @ self.mechanism.error_jacobian(places, self.actuators, errors)
+        _, turn, places = self._turned(deviations)
+        slope = turn @ self.mechanism.parameter_jacobian(places, self.actuators, deviations)
         return -(self._rest @ slope.reshape(-1, slope.shape[-1]))[:, None]
 
 
@@ -113,13 +113,13 @@ class Shape:
 class Heights(Residuals):
     """Measured heights alone, z of the robot's base frame."""
 
-    def residual(self, errors):
+    def residual(self, deviations):
         """Measured less model heights, (n, 1) in mm."""
-        return super().residual(errors)[:, 2:]
+        return super().residual(deviations)[:, 2:]
 
-    def jacobian(self, errors):
+    def jacobian(self, deviations):
         """Derivative (n, 1, p) of the residual."""
-        return super().jacobian(errors)[:, 2:]
+        return super().jacobian(deviations)[:, 2:]
 
 
 def one_step(residuals):
@@ -138,14 +138,14 @@ def step_fit(distances):
     squared residuals over the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in every
     other fit.
     """
-    errors = one_step(distances)
-    plain, nominal = make_fit(distances, errors, 1), distances.mechanism.parameters.nominal
+    deviations = one_step(distances)
+    plain, nominal = make_fit(distances, deviations, 1), distances.mechanism.parameters.nominal
     jacobian = distances.jacobian(nominal)[:, 0]
     inverse = np.linalg.pinv(jacobian)
     left = distances.covariance - jacobian @ (inverse @ distances.covariance)
     noise = np.sqrt((plain.residual_mm**2).sum() / np.trace(left))
     covariance = noise**2 * inverse @ distances.covariance @ inverse.T
-    seen = analyse(distances.mechanism, replace(distances, alike=False).jacobian(errors))
+    seen = analyse(distances.mechanism, replace(distances, alike=False).jacobian(deviations))
     deviation = np.sqrt(np.diag(covariance))
     return replace(plain, noise_mm=float(noise), standard_errors=deviation, identifiability=seen), covariance
 

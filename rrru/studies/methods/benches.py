@@ -96,7 +96,7 @@ def _robot(config, name):
         return replace(robot, mechanism=replace(robot.mechanism, **limits))
     twin = delta_robot.twin(config)
     return VirtualTripod(
-        make_mechanism("delta", config["robots"]["delta"], errors="tied", **limits),
-        twin.truth.parameters.mapping(twin.errors),
+        make_mechanism("delta", config["robots"]["delta"], parameter_set="tied", **limits),
+        twin.truth.parameters.mapping(twin.deviations),
         active_effects(config["methods"]["delta_effects"]),
     )

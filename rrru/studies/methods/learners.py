@@ -46,9 +46,11 @@ class Points:
     actuators: np.ndarray
     measured_mm: np.ndarray
 
-    def residuals(self, errors):
+    def residuals(self, parameter_set):
         """Residuals of the points for a set of error parameters."""
-        return Residuals(replace(self.mechanism, errors=errors), self.actuators, self.measured_mm, self.command_mm)
+        return Residuals(
+            replace(self.mechanism, parameter_set=parameter_set), self.actuators, self.measured_mm, self.command_mm
+        )
 
 
 def points_of(mechanism, measurements):
@@ -57,13 +59,15 @@ def points_of(mechanism, measurements):
     return Points(mechanism, rows.command(frame), rows.actuators(frame), rows.measured(frame))
 
 
-def parameters(points, errors):
+def parameters(points, parameter_set):
     """Least squares of a set of error parameters, their bounds those of the mechanism."""
-    residuals = points.residuals(errors)
+    residuals = points.residuals(parameter_set)
     found = least_squares(residuals)
     mechanism = residuals.mechanism
     return Learned(
-        lambda path: mechanism.inverse(path, found.errors), len(found.errors), found.evaluations * len(residuals)
+        lambda path: mechanism.inverse(path, found.deviations),
+        len(found.deviations),
+        found.evaluations * len(residuals),
     )
 
 
@@ -79,7 +83,9 @@ def genetic(points, config, seed):
         seed,
     )
     return Learned(
-        lambda path: mechanism.inverse(path, found.errors), len(found.errors), found.evaluations * len(residuals)
+        lambda path: mechanism.inverse(path, found.deviations),
+        len(found.deviations),
+        found.evaluations * len(residuals),
     )
 
 
@@ -93,10 +99,10 @@ def rbf_after_parameters(points, section, generator):
     """Least squares first, then a network for what it leaves."""
     residuals = points.residuals(points.mechanism.TRACKED)
     found, mechanism = least_squares(residuals), residuals.mechanism
-    network, numbers = _network(points.command_mm, residuals.residual(found.errors), section, generator)
+    network, numbers = _network(points.command_mm, residuals.residual(found.deviations), section, generator)
     return Learned(
-        lambda path: through_inverse(mechanism, path, network(path), found.errors),
-        numbers + len(found.errors),
+        lambda path: through_inverse(mechanism, path, network(path), found.deviations),
+        numbers + len(found.deviations),
         found.evaluations * len(residuals),
     )
 
@@ -119,7 +125,7 @@ def jacobian_step(mechanism, path_index, points):
 
 def offsets(mechanism, values):
     """Drive offsets (3,) that another measurement has found."""
-    zero = replace(mechanism, errors="zero")
+    zero = replace(mechanism, parameter_set="zero")
     return Learned(lambda path: zero.inverse(path, np.asarray(values, dtype=float)), 3, 0)
 
 

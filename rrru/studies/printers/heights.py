@@ -55,22 +55,22 @@ class HeightResiduals:
         """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
         return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
 
-    def predicted_mm(self, errors):
-        """Readings (n + m,) of the robot under errors (p,)."""
-        return self._of_places(self.mechanism.forward(self.actuators, errors))[0]
+    def predicted_mm(self, deviations):
+        """Readings (n + m,) of the robot under deviations (p,)."""
+        return self._of_places(self.mechanism.forward(self.actuators, deviations))[0]
 
-    def gradient(self, errors):
-        """Derivative (n + m, n + 2 m, 3) of the readings by the places at which the robot stands under errors (p,)."""
-        return self._of_places(self.mechanism.forward(self.actuators, errors))[1]
+    def gradient(self, deviations):
+        """Derivative (n + m, n + 2 m, 3) of the readings by the places at which the robot stands under deviations (p,)."""
+        return self._of_places(self.mechanism.forward(self.actuators, deviations))[1]
 
-    def residual(self, errors):
-        """Measured less predicted readings times the roots of their weights, (n + m, 1), under errors (p,)."""
-        return (self.root_weight * (self.measured_mm - self.predicted_mm(errors)))[:, None]
+    def residual(self, deviations):
+        """Measured less predicted readings times the roots of their weights, (n + m, 1), under deviations (p,)."""
+        return (self.root_weight * (self.measured_mm - self.predicted_mm(deviations)))[:, None]
 
-    def jacobian(self, errors):
+    def jacobian(self, deviations):
         """Derivative (n + m, 1, p) of the residual by the errors."""
-        places = self.mechanism.forward(self.actuators, errors)
-        moved = self.mechanism.error_jacobian(places, self.actuators, errors)
+        places = self.mechanism.forward(self.actuators, deviations)
+        moved = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
         return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self._of_places(places)[1], moved)[:, None]
 
     def without(self, reading):

@@ -43,9 +43,9 @@ def left_out(result):
     difference, ratio = np.empty(len(residuals)), np.full(len(residuals), np.nan)
     for reading, weight in enumerate(residuals.root_weight):
         fit = least_squares(residuals.without(reading))
-        difference[reading] = residuals.measured_mm[reading] - residuals.predicted_mm(fit.errors)[reading]
-        if freedom > 0 and fit.identifiability.rank == len(fit.errors):
-            row = residuals.jacobian(fit.errors)[reading, 0]
+        difference[reading] = residuals.measured_mm[reading] - residuals.predicted_mm(fit.deviations)[reading]
+        if freedom > 0 and fit.identifiability.rank == len(fit.deviations):
+            row = residuals.jacobian(fit.deviations)[reading, 0]
             variance = 1.0 + row @ fit.identifiability.covariance(1.0) @ row
             ratio[reading] = weight * difference[reading] / (fit.noise_mm * np.sqrt(variance))
     return LeftOut(difference, ratio, Evidence(result).reading_p())

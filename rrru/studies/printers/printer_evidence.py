@@ -31,14 +31,14 @@ def cause_columns(result):
     With distances: calipers with a wrong scale or offset, and a measured object that is stretched along x, shrunk along
     y, and skewed.
     """
-    residuals, errors = result.residuals, result.fit.errors
-    heights, between = len(residuals.height_mm), _between(residuals, errors)
-    places = residuals.mechanism.forward(residuals.actuators, errors)
-    moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, errors)
-    by_leg = np.einsum("rna,nalc->rlc", residuals.gradient(errors), moved)
-    steps = np.einsum("rna,nal,nl->rl", residuals.gradient(errors), moved[..., _SLIDER], residuals.actuators)
+    residuals, deviations = result.residuals, result.fit.deviations
+    heights, between = len(residuals.height_mm), _between(residuals, deviations)
+    places = residuals.mechanism.forward(residuals.actuators, deviations)
+    moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, deviations)
+    by_leg = np.einsum("rna,nalc->rlc", residuals.gradient(deviations), moved)
+    steps = np.einsum("rna,nal,nl->rl", residuals.gradient(deviations), moved[..., _SLIDER], residuals.actuators)
     found = {}
-    if result.printer.errors == "heights":
+    if result.printer.parameter_set == "heights":
         found["arms"] = by_leg[..., _ARM], ""
     else:
         distances = np.concatenate([np.zeros(heights), residuals.distance_mm])[:, None]
@@ -52,9 +52,9 @@ def cause_columns(result):
     return found
 
 
-def _between(residuals, errors):
+def _between(residuals, deviations):
     """Vectors (m, 3) between the places of each distance in mm."""
-    first, second = (residuals.mechanism.forward(residuals.distance_actuators[:, k], errors) for k in (0, 1))
+    first, second = (residuals.mechanism.forward(residuals.distance_actuators[:, k], deviations) for k in (0, 1))
     return first - second
 
 
@@ -111,13 +111,13 @@ class Evidence:
     @cached_property
     def readings_mm(self):
         """Readings (n,) less those of the answer."""
-        return self.result.residuals.measured_mm - self.result.residuals.predicted_mm(self.result.fit.errors)
+        return self.result.residuals.measured_mm - self.result.residuals.predicted_mm(self.result.fit.deviations)
 
     @cached_property
     def weighings(self):
         """Under the firmware's ratio, and where there are distances under the others."""
         residuals = self.result.residuals
-        jacobian = -residuals.jacobian(self.result.fit.errors)[:, 0] / residuals.root_weight[:, None]
+        jacobian = -residuals.jacobian(self.result.fit.deviations)[:, 0] / residuals.root_weight[:, None]
         weights = [residuals.root_weight]
         if len(residuals.distance_mm):
             weights += [

@@ -34,21 +34,21 @@ _DENSE = 100
 _UNKNOWN = "unknown: no number is that of the readings, nor with other steps, arms or one other reading"
 
 
-def residuals_of(printer, errors=None):
+def residuals_of(printer, parameter_set=None):
     """Residuals of a printer's readings with the firmware's weights; errors: "heights" or "distances", by default those
     it calibrates.
     """
     heights, distances = len(printer.height_mm), len(printer.distance_mm)
     weight = _HEIGHTS_COUNT * distances / heights if distances else 1.0
-    mechanism = printer.mechanism(errors)
+    mechanism = printer.mechanism(parameter_set)
     return HeightResiduals(
         mechanism, -printer.height_drop_mm, printer.height_mm, -printer.distance_drop_mm, printer.distance_mm, weight
     )
 
 
-def own_numbers(mechanism, errors):
-    """A printer's own numbers (p,), NAMES in UNITS, under errors (p,), and their derivative (p, p) by the errors."""
-    legs = mechanism.legs(errors)
+def own_numbers(mechanism, deviations):
+    """A printer's own numbers (p,), NAMES in UNITS, under deviations (p,), and their derivative (p, p) by the errors."""
+    legs = mechanism.legs(deviations)
     arm, radius = legs[:, 1], legs[0, 2]
     root = np.sqrt(arm**2 - radius**2)
     angle = np.degrees(np.asarray(mechanism.azimuth_rad) + legs[:, 3])
@@ -57,13 +57,13 @@ def own_numbers(mechanism, errors):
     slope[1:3] = np.degrees(slope[1:3])
     slope[3:6, 0] = radius / root
     slope[3:6, 6:] = -np.diag(arm / root)
-    count = len(errors)
+    count = len(deviations)
     return numbers[:count], slope[:count, :count]
 
 
-def _own_jacobian(residuals, errors):
+def _own_jacobian(residuals, deviations):
     """Derivative (n, p) of the residual by the printer's own numbers."""
-    return residuals.jacobian(errors)[:, 0] @ np.linalg.inv(own_numbers(residuals.mechanism, errors)[1])
+    return residuals.jacobian(deviations)[:, 0] @ np.linalg.inv(own_numbers(residuals.mechanism, deviations)[1])
 
 
 def _stop(jacobian, step):
@@ -86,12 +86,12 @@ class PrinterFit:
     @property
     def names(self):
         """Names of the fitted numbers."""
-        return NAMES[: len(self.fit.errors)]
+        return NAMES[: len(self.fit.deviations)]
 
     @property
     def here(self):
         """Fitted numbers (p,) in mm and degrees."""
-        return own_numbers(self.residuals.mechanism, self.fit.errors)[0]
+        return own_numbers(self.residuals.mechanism, self.fit.deviations)[0]
 
     @property
     def there(self):
@@ -101,7 +101,7 @@ class PrinterFit:
     @cached_property
     def tolerance(self):
         """How far (p,) the other program's stop can lie from the best numbers, in mm and degrees; see the module."""
-        return _stop(_own_jacobian(self.residuals, self.fit.errors), self.stopping_step)
+        return _stop(_own_jacobian(self.residuals, self.fit.deviations), self.stopping_step)
 
     @property
     def agrees(self):
@@ -111,7 +111,7 @@ class PrinterFit:
     @property
     def freedom(self):
         """Readings less numbers."""
-        return len(self.residuals) - len(self.fit.errors)
+        return len(self.residuals) - len(self.fit.deviations)
 
     def reading_name(self, reading):
         """Kind and number from 1 of a reading, such as "distance 3", by its number from 0 over all."""
@@ -120,11 +120,11 @@ class PrinterFit:
 
     @property
     def standard_errors(self):
-        """Standard errors (p,) of the numbers in mm and degrees.
+        """Standard deviations (p,) of the numbers in mm and degrees.
 
         # ASSUME the noises of a height and a distance stand to each other as the firmware's weights say.
         """
-        slope = own_numbers(self.residuals.mechanism, self.fit.errors)[1]
+        slope = own_numbers(self.residuals.mechanism, self.fit.deviations)[1]
         return np.sqrt(np.diag(slope @ self.fit.identifiability.covariance(self.fit.noise_mm) @ slope.T))
 
     @property
@@ -200,7 +200,7 @@ def _changed_arms(result):
     empty.
     """
     printer = result.printer
-    if printer.errors != "heights":
+    if printer.parameter_set != "heights":
         return ""
 
     def with_arms(change):
@@ -257,13 +257,13 @@ def dense_arm_error(result):
 
 def _common_arm_error(result, actuators):
     """The same in mm for heights at actuators (n, 3)."""
-    errors = np.zeros(len(NAMES))
-    errors[: len(result.fit.errors)] = result.fit.errors
+    deviations = np.zeros(len(NAMES))
+    deviations[: len(result.fit.deviations)] = result.fit.deviations
     nothing = np.empty((0, 2, 3))
     heights = HeightResiduals(
         result.printer.mechanism("distances"), actuators, np.zeros(len(actuators)), nothing, nothing[:, 0, 0]
     )
-    jacobian = heights.jacobian(errors)
+    jacobian = heights.jacobian(deviations)
     both = np.concatenate([jacobian[..., :6], jacobian[..., 6:].sum(axis=-1, keepdims=True)], axis=-1)
     names, scale = heights.mechanism.parameters.names[:6], parameter_scale(heights.mechanism)
     noise = result.fit.noise_mm / np.sqrt(result.residuals.height_weight)

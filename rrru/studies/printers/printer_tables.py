@@ -104,7 +104,7 @@ def _printer_row(result, left, answers, twins):
 def _residuals(result):
     """Readings less the fitted and less the saved printer's, in mm, each (n,)."""
     residuals, start = result.residuals, result.residuals.mechanism.parameters.nominal
-    return [residuals.measured_mm - residuals.predicted_mm(errors) for errors in (result.fit.errors, start)]
+    return [residuals.measured_mm - residuals.predicted_mm(deviations) for deviations in (result.fit.deviations, start)]
 
 
 def _rms(result):
@@ -123,7 +123,7 @@ def _notes(result, answers, common, dense, twins):
     if result.freedom < _LITTLE_FREEDOM:
         widths = (result.half_widths / result.standard_errors)[0]
         yield f"readings exceed numbers by {result.freedom} only: 95 % intervals are {widths:.1f} standard errors wide to each side"
-    if result.printer.errors == "heights":
+    if result.printer.parameter_set == "heights":
         yield f"arms as saved: heights alone would give their common length with a standard error of {common:.1f} mm, 100 of them {dense:.2f} mm"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"

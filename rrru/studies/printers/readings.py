@@ -61,16 +61,20 @@ class Printer:
     distance_drop_mm: np.ndarray
 
     @property
-    def errors(self):
+    def parameter_set(self):
         """Which numbers its readings calibrate: "distances" where there are any, else "heights"."""
         return "distances" if len(self.distance_mm) else "heights"
 
-    def mechanism(self, errors=None):
+    def mechanism(self, parameter_set=None):
         """The printer with its saved numbers as nominal ones and the named error parameters, by default those that it
         calibrates.
         """
         return linear_delta(
-            self.radius_mm, np.radians(self.angle_deg), self.arm_mm, self.endstop_mm, errors or self.errors
+            self.radius_mm,
+            np.radians(self.angle_deg),
+            self.arm_mm,
+            self.endstop_mm,
+            parameter_set or self.parameter_set,
         )
 
 

@@ -160,7 +160,7 @@ def _first_order():
 
 def _relative_heights():
     """Vertical errors relative to the first point."""
-    robot = Ptt3(errors="tied")
+    robot = Ptt3(parameter_set="tied")
     moved = robot.forward(robot.inverse(_POINTS), robot.parameters.vector({"dL": 1.0}))[:, 2] - _POINTS[:, 2]
     relative = np.abs(moved - moved[0])[1:].mean()
     return (

@@ -116,7 +116,7 @@ class Learning:
     @cached_property
     def rest(self):
         """The network of a choice of its own, on what the calibration leaves."""
-        left = self.measured_mm - self.mechanism.forward(self.sliders_mm, self.calibration.errors)
+        left = self.measured_mm - self.mechanism.forward(self.sliders_mm, self.calibration.deviations)
         again = self.choose(left)
         return self.trained(left, again.spread_mm, again.neurons)
 
@@ -150,9 +150,9 @@ class Learning:
             "rbf_paper": lambda path: through_inverse(mechanism, path, self.paper["paper_scaled"](path)),
             "rbf_paper_mm": lambda path: through_inverse(mechanism, path, self.paper["paper_mm"](path)),
             "interpolator": lambda path: through_inverse(mechanism, path, self.spline(path)),
-            "parameters": lambda path: mechanism.inverse(path, self.calibration.errors),
+            "parameters": lambda path: mechanism.inverse(path, self.calibration.deviations),
             "rbf_after_parameters": lambda path: through_inverse(
-                mechanism, path, self.rest(path), self.calibration.errors
+                mechanism, path, self.rest(path), self.calibration.deviations
             ),
         }
 

@@ -45,9 +45,9 @@ def check(config):
     robot(config)
 
 
-def mechanism(config, errors="tied"):
+def mechanism(config, parameter_set="tied"):
     """The nominal 3-PTT with a choice of error parameters, see `rrru.robots.ptt3`."""
-    return make_mechanism("ptt3", config["robots"]["ptt3"], errors=errors)
+    return make_mechanism("ptt3", config["robots"]["ptt3"], parameter_set=parameter_set)
 
 
 def robot(config):
@@ -55,7 +55,7 @@ def robot(config):
     section, loads = config["ptt"]["robot"], config["loads"]
     return VirtualTripod(
         mechanism(config),
-        errors={name: float(value) for name, value in section["errors"].items()},
+        deviations={name: float(value) for name, value in section["errors"].items()},
         effects=active_effects(section["effects"], "mm"),
         platform_mass_kg=loads["platform_mass_kg"],
         forearm_mass_kg=loads["forearm_mass_kg"],

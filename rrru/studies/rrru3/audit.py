@@ -44,7 +44,7 @@ def _line(y=0.0, z=600.0, x=_LINE_X):
 
 def _predicted(values, points):
     """Position errors (n, 3) that errors by tied name predict at points (n, 3)."""
-    robot = Rrru3(errors="tied")
+    robot = Rrru3(parameter_set="tied")
     return robot.forward(robot.inverse(points), robot.parameters.vector(values), points) - points
 
 
@@ -204,7 +204,7 @@ def _gauge():
 def _migration():
     """Migration with one population, run: the same seed at P_m = 0.1 and 1.0."""
     points = _line()
-    robot = Rrru3(errors="tied")
+    robot = Rrru3(parameter_set="tied")
     theta = robot.inverse(points)
     residuals = Residuals(robot, theta, points + _predicted(TABLE_5, points), points)
     found = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rrru.robots.rrru3 import ERROR_NAMES
+from rrru.robots.rrru3 import PARAMETER_NAMES
 from rrru.studies.rrru3 import paper_a
 from rrru.studies.rrru3.published_sisters import row, sister_rows
 from rrru.studies.rrru3.study_numbers import TRAJECTORIES, group_orders, study_numbers
@@ -68,7 +68,7 @@ def _design(config):
         "population": sum(genetic["populations"]),
         "crossover_fraction": genetic["crossover_fraction"],
         "migration_fraction": genetic["migration_fraction"],
-        "errors": len(ERROR_NAMES["published"]),
+        "errors": len(PARAMETER_NAMES["published"]),
     }
     if shape:
         result |= {key: motion[key] for key in ("speed_mm_s", "acceleration_mm_s2")}

@@ -37,10 +37,10 @@ def _numbers(virtual, calibration, reproduce, number):
         residuals = select(measured, mechanism, patterns, calibration["use_near_singularity"])
         fits[key] = least_squares(residuals)
         if reproduce["method"] != "least_squares":
-            fits[key] = least_mean_distance(residuals, fits[key].errors)
+            fits[key] = least_mean_distance(residuals, fits[key].deviations)
         generator = virtual.generator("redraw", number, "closed_loop")
         again, _ = robot.run(
-            virtual.plan, virtual.noise_mm, generator, lambda x, e=fits[key].errors: mechanism.inverse(x, e)
+            virtual.plan, virtual.noise_mm, generator, lambda x, e=fits[key].deviations: mechanism.inverse(x, e)
         )
         after[key] = rows.measured(again) - rows.command(again)
     before = rows.measured(measured) - rows.command(measured)

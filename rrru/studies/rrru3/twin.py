@@ -87,9 +87,9 @@ class Twin:
         names = (*(f"dtheta{k}" for k in _LEGS), "dL1", "dL2", "dL3", "dr")
         return kind(
             mechanism=mechanism,
-            errors={name: self.values[name] for name in names},
+            deviations={name: self.values[name] for name in names},
             effects=active_effects(self.effects()),
-            wobble_mm=self.values["wobble_mm"],
+            non_repeatability_mm=self.values["wobble_mm"],
         )
 
 

@@ -19,7 +19,7 @@ from rrru.campaign.trajectories import line_groups
 from rrru.effects.effect import Contribution
 from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.fit.identifiability import RANK_TOLERANCE
-from rrru.plant.virtual_robot import VirtualRobot, wobble
+from rrru.plant.virtual_robot import VirtualRobot, non_repeatability
 from rrru.robots import singularity
 from rrru.studies.rrru3.paper_a import ERRORS_MM
 from rrru.studies.rrru3.study_numbers import UPPER_LIMITS, group_orders, study_numbers
@@ -41,10 +41,10 @@ class TranslationalRobot(VirtualRobot):
         """Platform centres (n, 3); clearance to first order."""
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
         drive = motion.drive + change.drive
-        errors = self.mechanism.parameters.vector(
-            {k: v for k, v in self.errors.items() if k != "dr"} | {"da": self.errors["dr"]}
+        deviations = self.mechanism.parameters.vector(
+            {k: v for k, v in self.deviations.items() if k != "dr"} | {"da": self.deviations["dr"]}
         )
-        solved = self.mechanism.forward(drive, errors, target)
+        solved = self.mechanism.forward(drive, deviations, target)
         along = np.einsum(
             "nlk,nlk->nl", motion.force_direction, np.broadcast_to(change.joint_mm, motion.force_direction.shape)
         )
@@ -55,7 +55,7 @@ def draw(generator, count):
     """Random numbers of one drive in the order in which a virtual robot draws them: unit wobble (count, 3) and unit
     noise (count, 3).
     """
-    return wobble(generator, count), generator.standard_normal((count, 3))
+    return non_repeatability(generator, count), generator.standard_normal((count, 3))
 
 
 def simulate(mechanism, twin, noise_mm, draws, line_calibration="group_1", kind=TranslationalRobot):
@@ -82,7 +82,7 @@ def simulate(mechanism, twin, noise_mm, draws, line_calibration="group_1", kind=
 
     def drive(controller, drawn):
         position, _ = robot.positions(robot.motion(plan, controller), target)
-        return position + robot.wobble_mm * drawn[0] + noise_mm * drawn[1]
+        return position + robot.non_repeatability_mm * drawn[0] + noise_mm * drawn[1]
 
     measured = drive(mechanism.inverse, draws[0])
     fits = {}
@@ -120,18 +120,18 @@ def _linear_fit(mechanism, theta, measured, start):
 
     Raises FitError where the iteration leaves the reach.
     """
-    errors = mechanism.parameters.nominal
+    deviations = mechanism.parameters.nominal
     for _ in range(3):
-        residual = measured - mechanism.forward(theta, errors, start)
-        jacobian = mechanism.error_jacobian(measured - residual, theta, errors)
+        residual = measured - mechanism.forward(theta, deviations, start)
+        jacobian = mechanism.parameter_jacobian(measured - residual, theta, deviations)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             raise FitError("the candidate's calibration leaves the reach")
         flat = jacobian.reshape(-1, jacobian.shape[-1])
         step = np.linalg.lstsq(flat, residual.ravel(), rcond=RANK_TOLERANCE)[0]
-        errors = errors + step
+        deviations = deviations + step
     residual = residual - jacobian @ step
     # damped Newton on the mean distance of the linear model
-    width, q = np.linalg.qr(flat), np.zeros(len(errors))
+    width, q = np.linalg.qr(flat), np.zeros(len(deviations))
     basis = width.Q.reshape(jacobian.shape)
     value = np.linalg.norm(residual, axis=1).mean()
     for _ in range(30):
@@ -152,7 +152,7 @@ def _linear_fit(mechanism, theta, measured, start):
         previous, value = value, np.linalg.norm(residual - basis @ q, axis=1).mean()
         if previous - value < 1e-10:
             break
-    return errors + np.linalg.solve(width.R, q), value
+    return deviations + np.linalg.solve(width.R, q), value
 
 
 def misfit(numbers, orders):

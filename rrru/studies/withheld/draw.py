@@ -61,8 +61,8 @@ def fresh(robot, seed, mechanism):
 
 def _bare(name, generator, mechanism):
     """A robot with its campaign and errors drawn, and nothing acting."""
-    errors = np.repeat([_ANGLE_SD_RAD, _LENGTH_SD_MM], [3, 4]) * generator.standard_normal(7)
-    inside = mechanism.parameters.inside(errors)
+    deviations = np.repeat([_ANGLE_SD_RAD, _LENGTH_SD_MM], [3, 4]) * generator.standard_normal(7)
+    inside = mechanism.parameters.inside(deviations)
     return Robot(name, str(generator.choice(list(PASSES))), _trajectories(generator, mechanism), tuple(inside.tolist()))
 
 
@@ -175,6 +175,6 @@ def _first_order_gap_mm(robot, acting, mechanism):
         .move(acting.law.contribute(motion, acting.values))
         .ravel()
     )
-    base = mechanism.error_jacobian(motion.position_mm, motion.drive).reshape(moved.size, -1)
+    base = mechanism.parameter_jacobian(motion.position_mm, motion.drive).reshape(moved.size, -1)
     basis, _ = np.linalg.qr(base)
     return float(np.sqrt(((moved - basis @ (basis.T @ moved)) ** 2).sum() / len(motion)))

@@ -42,8 +42,8 @@ def with_truth(library, acting):
     return library | {f"{_TRUE}{one.effect}": one.law for one in acting}
 
 
-def limits(case, errors, acting, names):
-    """Limits of a campaign of a robot from its case, calibrated errors (p,), what acts, and the names of the effects
+def limits(case, deviations, acting, names):
+    """Limits of a campaign of a robot from its case, calibrated deviations (p,), what acts, and the names of the effects
     that may be rivals.
 
     The case's library holds the acting causes too, see `with_truth`.
@@ -57,7 +57,7 @@ def limits(case, errors, acting, names):
         if name in case.library
         for shape in range(len(case.library[name].coordinates.shapes))
     ]
-    reduced = _Reduced(case, errors, [*((name, 0) for name in own), *rivals])
+    reduced = _Reduced(case, deviations, [*((name, 0) for name in own), *rivals])
     free = [reduced.columns[name, 0][:, _free(one.law.coordinates, one.leg)] for name, one in own.items()]
     true = np.concatenate(free, axis=1)
     gain = float((reduced.data**2).sum() - _left(true, reduced.data))
@@ -85,9 +85,9 @@ def _left(columns, target):
 class _Reduced:
     """Data and columns in units of the noise, the calibration projected out, turned so that few rows are left."""
 
-    def __init__(self, case, errors, keys):
+    def __init__(self, case, deviations, keys):
         self._library = case.library
-        linear = case.linearise(State(errors, {}), list(keys))
+        linear = case.linearise(State(deviations, {}), list(keys))
         rows = linear.data.size
         base, _ = np.linalg.qr(linear.base.reshape(rows, -1))
         together = np.concatenate(

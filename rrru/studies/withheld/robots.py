@@ -101,7 +101,7 @@ class Robot:
         if None in active:
             return None
         errors = dict(zip(("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dr"), self.errors, strict=True))
-        return VirtualRobot(mechanism=mechanism, errors=errors, effects=active)
+        return VirtualRobot(mechanism=mechanism, deviations=errors, effects=active)
 
     def to_json(self):
         """The robot as text."""

@@ -8,19 +8,19 @@ from rrru.gap.case import State
 
 
 def state_row(robot, calibrated, state):
-    """Row of `withheld_states` from the calibrated errors (p,) and the corrected sim."""
+    """Row of `withheld_states` from the calibrated deviations (p,) and the corrected sim."""
     effects = [[name, int(shape), np.asarray(value).tolist()] for (name, shape), value in sorted(state.effects.items())]
     return {
         "robot": robot,
         "calibrated": json.dumps(np.asarray(calibrated).tolist()),
-        "errors": json.dumps(np.asarray(state.errors).tolist()),
+        "errors": json.dumps(np.asarray(state.deviations).tolist()),
         "effects": json.dumps(effects),
         "shapes": json.dumps(state.shapes, sort_keys=True),
     }
 
 
 def state_of(row):
-    """Calibrated errors (p,) and corrected sim of a row of `withheld_states`."""
+    """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`."""
     effects = {(name, shape): np.array(value) for name, shape, value in json.loads(row["effects"])}
     return np.array(json.loads(row["calibrated"])), State(
         np.array(json.loads(row["errors"])), effects, json.loads(row["shapes"])

@@ -14,7 +14,7 @@ from rrru.store.tables import check
 
 ROBOTS = {
     "ptt3": (Ptt3(), -250.0, {"db1": 0.3, "dL2": 0.2}),
-    "delta": (Delta(errors="tied"), 0.0, {"dtheta2": 1e-3, "da_1": 0.3}),
+    "delta": (Delta(parameter_set="tied"), 0.0, {"dtheta2": 1e-3, "da_1": 0.3}),
 }
 DRIVES = {"ptt3": [f"slider{k}_mm" for k in (1, 2, 3)], "delta": [f"theta{k}_rad" for k in (1, 2, 3)]}
 
@@ -22,12 +22,12 @@ DRIVES = {"ptt3": [f"slider{k}_mm" for k in (1, 2, 3)], "delta": [f"theta{k}_rad
 @pytest.fixture(params=ROBOTS)
 def measured(request):
     """Name, nominal robot and a measurement table without its status column."""
-    robot, height, errors = ROBOTS[request.param]
+    robot, height, deviations = ROBOTS[request.param]
     curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (height - 20.0, height + 20.0), 2.0, 50)
     plan = make_plan(
         [curve], [{"payload_kg": 0.0, "reverse": False}, {"payload_kg": 2.0, "reverse": True}], 80.0, 400.0, 5.0
     )
-    table, _ = VirtualTripod(robot, errors).run(plan, 0.01, np.random.default_rng(0))
+    table, _ = VirtualTripod(robot, deviations).run(plan, 0.01, np.random.default_rng(0))
     return request.param, robot, table.drop(columns="status")
 
 

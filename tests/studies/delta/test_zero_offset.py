@@ -10,7 +10,7 @@ from rrru.fit.residuals import Residuals
 from rrru.robots.delta import Delta
 from rrru.studies.delta.zero_offset import Distances, Heights, Shape, one_step, step_fit, taken_for_errors
 
-ROBOT, LEGS = Delta(), Delta(errors="legs")
+ROBOT, LEGS = Delta(), Delta(parameter_set="legs")
 COMMAND = np.array([[x, y, 100.0] for x in (-200.0, -70.0, 70.0, 200.0) for y in (-135.0, 0.0, 135.0)])
 THETA = ROBOT.inverse(COMMAND)
 TRUE = np.array([0.012, -0.008, 0.015])
@@ -27,7 +27,7 @@ def test_exact_places_in_any_frame_give_the_true_errors(kind):
     places = ROBOT.forward(THETA, TRUE)
     points = kind(ROBOT, THETA, moved(places))
     fit = least_squares(points)
-    np.testing.assert_allclose(fit.errors, TRUE, atol=1e-11)
+    np.testing.assert_allclose(fit.deviations, TRUE, atol=1e-11)
     assert fit.identifiability.rank == 3
     other = kind(ROBOT, THETA, moved(places, seed=2))
     # the frame does not count: sums of squares are the same for any errors
@@ -37,7 +37,7 @@ def test_exact_places_in_any_frame_give_the_true_errors(kind):
 def test_heights_and_positions_need_the_base_frame_and_give_the_true_errors():
     places = ROBOT.forward(THETA, TRUE)
     for kind in (Heights, Residuals):
-        np.testing.assert_allclose(least_squares(kind(ROBOT, THETA, places, COMMAND)).errors, TRUE, atol=1e-11)
+        np.testing.assert_allclose(least_squares(kind(ROBOT, THETA, places, COMMAND)).deviations, TRUE, atol=1e-11)
 
 
 @pytest.mark.parametrize("kind", [*KINDS, lambda *a: Heights(*a, COMMAND)])
@@ -58,7 +58,7 @@ def test_one_step_is_the_paper_s_equation_15():
     nominal = ROBOT.forward(THETA)
     for j in range(1, len(THETA)):
         length = np.linalg.norm(nominal[j] - nominal[0])
-        slopes = [ROBOT.error_jacobian(nominal[k : k + 1], THETA[k : k + 1])[0] for k in (0, j)]
+        slopes = [ROBOT.parameter_jacobian(nominal[k : k + 1], THETA[k : k + 1])[0] for k in (0, j)]
         h.append((nominal[j] - nominal[0]) @ (slopes[1] - slopes[0]) / length)
         b.append(np.linalg.norm(measured[j] - measured[0]) - length)
     h, b = np.array(h), np.array(b)
@@ -75,7 +75,7 @@ def test_standard_errors_are_the_scatter_under_noise(kind):
         least_squares(kind(ROBOT, THETA, places + noise * generator.standard_normal(places.shape)), noise)
         for _ in range(draws)
     ]
-    scatter = np.std([fit.errors for fit in fits], axis=0)
+    scatter = np.std([fit.deviations for fit in fits], axis=0)
     # four standard deviations of an estimated standard deviation
     np.testing.assert_allclose(scatter, fits[0].standard_errors, rtol=4.0 / np.sqrt(2.0 * draws))
 
@@ -96,7 +96,7 @@ def test_the_papers_step_is_as_uncertain_as_it_says():
     jacobian = noisy[0].jacobian(np.zeros(3))[:, 0]
     left = (np.eye(len(noisy[0])) - jacobian @ np.linalg.pinv(jacobian)) @ noisy[0].covariance
     assert scale == pytest.approx(noise, rel=4.0 * 0.5 * np.sqrt(2.0 * np.trace(left @ left) / draws) / np.trace(left))
-    scatter = np.std([fit.errors for fit, _ in fits], axis=0)
+    scatter = np.std([fit.deviations for fit, _ in fits], axis=0)
     expected = np.sqrt(np.mean([fit.standard_errors**2 for fit, _ in fits], axis=0))
     np.testing.assert_allclose(scatter, expected, rtol=tolerance)
     fit, covariance = fits[0]
@@ -109,9 +109,9 @@ def test_the_papers_step_is_as_uncertain_as_it_says():
 def test_what_is_taken_for_zero_errors_is_what_a_fit_finds():
     for kind in (Distances, Shape, lambda *a: Heights(*a, COMMAND)):
         length = 1e-3
-        errors = np.zeros(12)
-        errors[5] = length
-        found = least_squares(kind(ROBOT, THETA, LEGS.forward(THETA, errors))).errors
+        deviations = np.zeros(12)
+        deviations[5] = length
+        found = least_squares(kind(ROBOT, THETA, LEGS.forward(THETA, deviations))).deviations
         exact = ROBOT.forward(THETA)
         changes = -kind(LEGS, THETA, exact).jacobian(np.zeros(12))[..., [5]]
         np.testing.assert_allclose(

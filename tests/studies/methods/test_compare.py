@@ -27,7 +27,7 @@ SHORT = CONFIG | {
 def delta():
     bench = benches.bench(SHORT, "delta")
     offsets = {
-        "dtheta_rad": [bench.robot.errors[f"dtheta{k}"] for k in (1, 2, 3)],
+        "dtheta_rad": [bench.robot.deviations[f"dtheta{k}"] for k in (1, 2, 3)],
         "poses": 20,
         "measuring_time_s": 60.0,
     }
@@ -62,7 +62,8 @@ def test_before_is_the_distance_of_the_nominal_controllers_points(delta):
     for test in benches.TESTS:
         targets = bench.plan(bench.tests[test]).targets()
         true = bench.robot.geometry.mechanism.forward(
-            bench.robot.mechanism.inverse(targets), bench.robot.geometry.mechanism.parameters.vector(bench.robot.errors)
+            bench.robot.mechanism.inverse(targets),
+            bench.robot.geometry.mechanism.parameters.vector(bench.robot.deviations),
         )
         expected = np.linalg.norm(true - targets, axis=1)
         row = methods.query("test == @test").iloc[0]

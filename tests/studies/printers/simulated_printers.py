@@ -22,7 +22,7 @@ NOISE_MM = 0.05
 
 def simulated(
     printer,
-    errors,
+    deviations,
     noise_mm=0.0,
     generator=None,
     ratio=None,
@@ -40,7 +40,7 @@ def simulated(
     """
     own = printer_fit.residuals_of(printer, "distances")
     robot, sliders = own.mechanism, own.actuators * (1.0 + np.asarray(steps))
-    legs = robot.legs(errors)
+    legs = robot.legs(deviations)
     height = (sliders + legs[:, 0])[..., None]
     shift = 0.0 if lean is None else height * (lean[:, :1] * robot.radial + lean[:, 1:] * robot.tangent)
     places = robot.forward_of_legs(sliders, legs, shift)

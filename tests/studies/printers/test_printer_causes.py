@@ -35,8 +35,10 @@ def slow_p(result, columns, ratio, without=None):
     heights, residuals = len(result.printer.height_mm), result.residuals
     weight = np.where(np.arange(len(residuals)) < heights, 1.0 / ratio, 1.0)
     kept = np.delete(np.arange(len(residuals)), [] if without is None else [without])
-    jacobian = (residuals.jacobian(result.fit.errors)[:, 0] / residuals.root_weight[:, None] * weight[:, None])[kept]
-    readings = ((residuals.measured_mm - residuals.predicted_mm(result.fit.errors)) * weight)[kept]
+    jacobian = (residuals.jacobian(result.fit.deviations)[:, 0] / residuals.root_weight[:, None] * weight[:, None])[
+        kept
+    ]
+    readings = ((residuals.measured_mm - residuals.predicted_mm(result.fit.deviations)) * weight)[kept]
     more = np.concatenate([jacobian, (columns * weight[:, None])[kept]], axis=1)
     left = []
     for matrix in (jacobian, more):
@@ -51,7 +53,7 @@ def test_a_reading_left_out_is_judged_as_the_textbook_does():
     linear model.
     """
     result, left, _, _ = diagnosed(simulated(DISTANCES, np.zeros(9), 1e-4, np.random.default_rng(5)))
-    jacobian, residual = result.residuals.jacobian(result.fit.errors)[:, 0], result.fit.residual_mm[:, 0]
+    jacobian, residual = result.residuals.jacobian(result.fit.deviations)[:, 0], result.fit.residual_mm[:, 0]
     hat = np.diag(jacobian @ np.linalg.pinv(jacobian))
     others = (residual @ residual - residual**2 / (1.0 - hat)) / (result.freedom - 1)
     np.testing.assert_allclose(left.ratio, residual / np.sqrt(others * (1.0 - hat)), rtol=1e-3, atol=1e-4)
@@ -132,7 +134,9 @@ def test_an_error_of_the_calipers_is_seen_and_its_kind_is_not_decidable(caliper)
     assert abs(one.estimate - true) < 4.0 * one.standard_error
 
 
-@pytest.mark.parametrize("printer", [p for p in PRINTERS.values() if p.errors == "heights"], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "printer", [p for p in PRINTERS.values() if p.parameter_set == "heights"], ids=lambda p: p.name
+)
 def test_seven_heights_decide_nothing(printer):
     """One number is left of them, and every cause explains it whole."""
     result, left, answers, diagnosis = diagnosed(printer)
@@ -185,7 +189,7 @@ def test_a_cause_that_passes_by_one_reading_is_not_found(name):
 @pytest.mark.parametrize("printer", [HEIGHTS, DISTANCES], ids=["heights", "distances"])
 def test_columns_of_causes_are_finite_differences(printer):
     result = printer_fit.fit_printer(printer, STEP)
-    saved = replace(result, fit=replace(result.fit, errors=np.zeros_like(result.fit.errors)))
+    saved = replace(result, fit=replace(result.fit, deviations=np.zeros_like(result.fit.deviations)))
     found, step = printer_evidence.cause_columns(saved), 1e-5
     # a tower that leans outwards rises less
     leans = [step * np.eye(6)[k].reshape(2, 3).T * (-1.0 if k < 3 else 1.0) for k in range(6)]
@@ -194,7 +198,7 @@ def test_columns_of_causes_are_finite_differences(printer):
         "step_scale": [{"steps": step * one} for one in np.eye(3)],
     }
     if printer is HEIGHTS:
-        planted["arms"] = [{"errors": step * np.eye(9)[k]} for k in (6, 7, 8)]
+        planted["arms"] = [{"deviations": step * np.eye(9)[k]} for k in (6, 7, 8)]
     else:
         planted["object_shape"] = [{"shape": step * one} for one in np.eye(2)]
     assert set(planted) == set(found) - {"caliper_scale", "caliper_offset"}
@@ -202,7 +206,7 @@ def test_columns_of_causes_are_finite_differences(printer):
         slope = []
         for change in changes:
             ends = [
-                simulated(printer, **{"errors": np.zeros(9)} | {k: sign * v for k, v in change.items()})
+                simulated(printer, **{"deviations": np.zeros(9)} | {k: sign * v for k, v in change.items()})
                 for sign in (1.0, -1.0)
             ]
             high, low = (np.concatenate([p.height_mm, p.distance_mm]) for p in ends)
@@ -217,7 +221,7 @@ def test_what_is_said_to_be_detectable_passes_nine_times_of_ten(name):
     evidence = evidence_of(simulated(DISTANCES, np.zeros(9), NOISE_MM, generator))
     size_mm = evidence.detectable_mm(name, limit) / evidence.result.fit.noise_mm * NOISE_MM
     weight = evidence.result.residuals.root_weight
-    jacobian = evidence.result.residuals.jacobian(evidence.result.fit.errors)[:, 0]
+    jacobian = evidence.result.residuals.jacobian(evidence.result.fit.deviations)[:, 0]
     for _ in range(200):
         if name == "bad_reading":
             effect = np.eye(19)[generator.integers(19)]

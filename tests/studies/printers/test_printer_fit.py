@@ -88,7 +88,7 @@ def test_a_known_truth_is_recovered(printer):
     """True numbers by hand: the radius and the arms are the saved ones with their errors added, the endstop the zero
     less the arm's rise.
     """
-    truth = NINE if printer.errors == "distances" else np.append(NINE[:6], np.zeros(3))
+    truth = NINE if printer.parameter_set == "distances" else np.append(NINE[:6], np.zeros(3))
     result = printer_fit.fit_printer(simulated(printer, truth), STEP)
     arms, radius = printer.arm_mm + truth[6:], printer.radius_mm + 0.6
     zeros = printer.endstop_mm + np.sqrt(printer.arm_mm**2 - printer.radius_mm**2) + truth[3:6]
@@ -112,7 +112,7 @@ def test_standard_errors_and_intervals_are_those_of_repeated_measurements(printe
         result = printer_fit.fit_printer(simulated(printer, np.zeros(9), NOISE_MM, generator), STEP)
         draws.append(result.here)
         inside.append(np.abs(result.here - truth.here) < result.half_widths)
-    slope = printer_fit.own_numbers(truth.residuals.mechanism, truth.fit.errors)[1]
+    slope = printer_fit.own_numbers(truth.residuals.mechanism, truth.fit.deviations)[1]
     expected = np.sqrt(np.diag(slope @ truth.fit.identifiability.covariance(NOISE_MM) @ slope.T))
     # four standard deviations of a standard deviation, and of a share, from 300 draws
     np.testing.assert_allclose(np.std(draws, axis=0), expected, rtol=4.0 / np.sqrt(600.0))

@@ -69,7 +69,7 @@ def test_a_microstep_is_the_turn_over_steps_and_gears_or_as_given(drive, step_mm
     (printer,) = read(written(tmp_path, content))
     np.testing.assert_allclose(printer.step_mm, [0.0015625, step_mm, 0.0015625], rtol=1e-15)
     np.testing.assert_allclose(printer.height_drop_mm, read(SOURCE)[0].height_drop_mm, rtol=1e-12)
-    assert printer.errors == "heights" and printer.source == ""
+    assert printer.parameter_set == "heights" and printer.source == ""
 
 
 @pytest.mark.parametrize(

@@ -55,11 +55,11 @@ def test_the_linearised_fit_is_the_pipelines(rich_poses):
     truth = np.array([0.004, -0.003, 0.002, 0.8, -0.6, 0.5, 2.0])
     measured = robot.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.3, points.shape)
     residuals = Residuals(robot, theta, measured, points)
-    fit = least_mean_distance(residuals, least_squares(residuals).errors)
+    fit = least_mean_distance(residuals, least_squares(residuals).deviations)
     fast, fast_value = twin_search._linear_fit(robot, theta, measured, points)
     assert fast_value == pytest.approx(fit.mean_mm, abs=1e-4)
     np.testing.assert_allclose(
-        fast / residuals.mechanism.parameters.high, fit.errors / residuals.mechanism.parameters.high, atol=2e-3
+        fast / residuals.mechanism.parameters.high, fit.deviations / residuals.mechanism.parameters.high, atol=2e-3
     )
 
 
@@ -93,7 +93,7 @@ def test_the_overlay_is_the_twin():
         robot["errors"]["dr"] == 1.5 and robot["effects"]["backlash"]["width2"] == 0.001 and robot["wobble_mm"] == 0.6
     )
     candidate = twin.Twin(_VALUES).robot(Rrru3())
-    assert replace(candidate, effects=()).errors == robot["errors"]
+    assert replace(candidate, effects=()).deviations == robot["errors"]
     offsets = overlay["trajectories"]["paper"]["lines"]["offsets_y_mm"]
     assert offsets[0] == 0.0 and np.allclose(np.add(offsets[1::2], offsets[2::2]), 0.0)
 

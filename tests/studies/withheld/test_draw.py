@@ -27,13 +27,13 @@ _MECHANISM = nominal({})
 def _calibrated(measurements):
     """Errors (7,) and rms distance in mm of a calibration by repeated linear least squares."""
     theta, measured = rows.actuators(measurements), rows.measured(measurements)
-    errors = np.zeros(7)
+    deviations = np.zeros(7)
     for _ in range(6):
-        model = _MECHANISM.forward(theta, errors, rows.command(measurements))
-        slope = _MECHANISM.error_jacobian(model, theta, errors).reshape(-1, 7)
-        errors = errors + np.linalg.lstsq(slope, (measured - model).ravel(), rcond=None)[0]
-    left = measured - _MECHANISM.forward(theta, errors, rows.command(measurements))
-    return errors, np.sqrt((left**2).sum(axis=1).mean())
+        model = _MECHANISM.forward(theta, deviations, rows.command(measurements))
+        slope = _MECHANISM.parameter_jacobian(model, theta, deviations).reshape(-1, 7)
+        deviations = deviations + np.linalg.lstsq(slope, (measured - model).ravel(), rcond=None)[0]
+    left = measured - _MECHANISM.forward(theta, deviations, rows.command(measurements))
+    return deviations, np.sqrt((left**2).sum(axis=1).mean())
 
 
 def _bare(number, kind="paper"):
@@ -131,16 +131,16 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     acting = draw._draw_acting(bare, name, False, (2.0, 2.001), np.random.default_rng(1), _MECHANISM)
     robot = replace(bare, acting=(acting,))
     assert answer(robot, _MECHANISM)["truth"] == f"outside:{name}"
-    virtual = replace(robot.virtual(_MECHANISM), errors={})
+    virtual = replace(robot.virtual(_MECHANISM), deviations={})
     motion = virtual.motion(robot.plan, _MECHANISM.inverse)
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
     first = FirstOrder(_MECHANISM, motion.position_mm, motion.drive).move(acting.law.contribute(motion, acting.values))
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements = measure(robot, 1, _MECHANISM)
-    errors, _ = _calibrated(measurements)
+    deviations, _ = _calibrated(measurements)
     case = make_case(measurements, _MECHANISM, Masses(), NOISE_MM, with_truth(EFFECTS, robot.acting))
-    found = limits(case, errors, robot.acting, list(EFFECTS))
+    found = limits(case, deviations, robot.acting, list(EFFECTS))
     # a library that could make this gap would leave 50 once in a million noises
     assert found.detects and found.rival_chi2 > 50.0
 

@@ -38,7 +38,7 @@ def robots():
         residuals = Residuals(
             _MECHANISM, rows.actuators(measurements), rows.measured(measurements), rows.command(measurements)
         )
-        result[robot.name] = (robot, measurements, least_squares(residuals).errors)
+        result[robot.name] = (robot, measurements, least_squares(residuals).deviations)
     return result
 
 
@@ -113,7 +113,7 @@ def test_states_survive_as_text():
     )
     calibrated, again = state_of(state_row("a", [0.5, 0.25], state))
     np.testing.assert_array_equal(calibrated, [0.5, 0.25])
-    np.testing.assert_array_equal(again.errors, state.errors)
+    np.testing.assert_array_equal(again.deviations, state.deviations)
     assert set(again.effects) == set(state.effects) and again.shapes == state.shapes
     assert all((again.effects[key] == value).all() for key, value in state.effects.items())
 
