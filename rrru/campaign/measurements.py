@@ -10,14 +10,24 @@ ENOUGH_REPEATS = 30
 USED = ("ok", "near_singularity")
 
 
+def vectors(frame, name):
+    """Positions (n, 3) in mm that a table holds in the columns name_x_mm, name_y_mm and name_z_mm."""
+    return frame[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+
+
+def vector_columns(name, values):
+    """Columns of a table by name from positions (n, 3) in mm; see `vectors`."""
+    return {f"{name}_{axis}_mm": values[:, k] for k, axis in enumerate("xyz")}
+
+
 def command(measurements):
     """Commanded positions (n, 3)."""
-    return measurements[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+    return vectors(measurements, "command")
 
 
 def measured(measurements):
     """Measured positions (n, 3), NaN where not measured."""
-    return measurements[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+    return vectors(measurements, "measured")
 
 
 def actuator_columns(drive_unit):
