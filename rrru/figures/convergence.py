@@ -11,7 +11,9 @@ _FLOOR_MM = 1e-6
 
 @style.printed
 def convergence(tables, options):
-    """Excess of the best objective over the least mean distance per generation, one panel per calibration set."""
+    """Convergence of the genetic algorithm: excess of the best mean distance so far over the least one, for every
+    seed, their median and quartiles; a run that has stopped keeps what it reached.
+    """
     campaign = options["campaign"]
     history = choose.of_campaign(tables, "genetic_history", campaign, "convergence")
     runs = choose.of_campaign(tables, "genetic", campaign, "convergence")

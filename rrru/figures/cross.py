@@ -14,8 +14,8 @@ _SIDE_BY_SIDE = 9
 
 @style.printed
 def cross(tables, options):
-    """Mean and largest error of one campaign: calibrated on (rows, the first is before any calibration), applied to
-    (columns).
+    """Every calibration applied to every trajectory: (a) mean and (b) largest position error. The first row is
+    before any calibration.
     """
     summary = choose.of_campaign(tables, "error_summary", options["campaign"], "cross")
     mode = choose.mode_of(summary, options)

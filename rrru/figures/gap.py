@@ -28,8 +28,10 @@ _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
 
 @style.printed
 def gap(tables, options):
-    """One campaign: (a) map of the gap, (b) probable causes, (c) the gap before and after by trajectory, (d) residuals
-    along the runs.
+    """The gap between the calibrated sim and the measurement. (a) Where: measured minus calibrated sim at the
+    points from above and from the side, magnified as stated. (b) Why: probability of every effect, those of the
+    verdict in colour. (c) How far it shrinks: gap on runs that were not fitted on, under the calibrated and the
+    corrected sim, with the share closed. (d) Residual of every point.
     """
     campaign = options["campaign"]
     verdict = choose.of_campaign(tables, "gap_verdicts", campaign, "gap").iloc[0]

@@ -11,7 +11,9 @@ _WRITTEN_FROM = 0.15
 
 @style.printed
 def observability(tables, options):
-    """Directions of parameter space of every calibration set: their weights, and the standard error along each."""
+    """What every set of trajectories can see: directions of parameter space from the best seen to the worst, what
+    each is made of (weights below 0.15 are not written), the standard error along it and its singular value.
+    """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     names = list(dict.fromkeys(rows["calibration"]))
     columns = min(len(names), 2)

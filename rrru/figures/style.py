@@ -152,12 +152,15 @@ def plain_log(axis):
     axis.set_minor_formatter(NullFormatter())
 
 
-def save(figure, pdf, png):
-    """Write both files of a figure; they carry no date, and none is replaced before both are whole.
+def save(figure, pdf, png, caption=""):
+    """Write both files of a figure; they carry its caption but no date, and none is replaced before both are whole.
 
     pdf, png: paths. The same tables give the same bytes under the same versions of Matplotlib and its font library.
     """
-    formats = {"pdf": (Path(pdf), {"CreationDate": None}), "png": (Path(png), {"Software": None})}
+    formats = {
+        "pdf": (Path(pdf), {"CreationDate": None, "Subject": caption}),
+        "png": (Path(png), {"Software": None, "Description": caption}),
+    }
     partial = {kind: path.parent / f".{path.name}.partial" for kind, (path, _) in formats.items()}
     try:
         with print_style():

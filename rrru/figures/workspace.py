@@ -17,7 +17,9 @@ _MEASURES = {"translational_measure": "translational measure", "constraint_measu
 
 @style.printed
 def workspace(tables, options):
-    """Slices of the reachable workspace with both singularity measures, the commanded points projected on them."""
+    """Distance from both kinds of singularity over the reachable workspace, and the commanded paths projected on
+    it. Hatched is out of reach; on the line the constraint determinant changes its sign.
+    """
     campaign = options["campaign"]
     grid_rows = choose.of_campaign(tables, "workspace", campaign, "workspace")
     slices = [name for name in _SLICES if (grid_rows["slice"] == name).any()]
@@ -66,7 +68,7 @@ def _grid(rows, name):
 def _points(tables, campaign):
     """Commanded points of the campaign with their singularity status."""
     singular = choose.of_campaign(tables, "singularity", campaign, "workspace")[["run", "point", "status"]]
-    paths = tables["paths"][["run", "trajectory", "point", *(f"command_{axis}_mm" for axis in "xyz")]]
+    paths = tables["measurements"][["run", "trajectory", "point", *(f"command_{axis}_mm" for axis in "xyz")]]
     return paths.merge(singular, on=["run", "point"], how="left", validate="one_to_one")
 
 

@@ -2,23 +2,31 @@
 
 import logging
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 from rrru.errors import RrruError
 
 
-@contextmanager
-def job(log_path):
-    """Log to a file; an RrruError ends the process with its message instead of a traceback."""
-    Path(log_path).parent.mkdir(parents=True, exist_ok=True)
-    logging.basicConfig(filename=log_path, filemode="w", level=logging.INFO, format="%(message)s", force=True)
+def run(main, snakemake):
+    """Call main(settings, inputs, outputs) with a job's part of the configuration and its files by name.
+
+    It logs to the job's file; an RrruError ends the process with its message instead of a traceback.
+    """
+    log = Path(snakemake.log[0])
+    log.parent.mkdir(parents=True, exist_ok=True)
+    logging.basicConfig(filename=log, filemode="w", level=logging.INFO, format="%(message)s", force=True)
     logging.captureWarnings(True)
     try:
-        yield
+        main(snakemake.params.settings, dict(snakemake.input.items()), dict(snakemake.output.items()))
     except RrruError as error:
         logging.error("%s: %s", type(error).__name__, error)
         sys.exit(f"{type(error).__name__}: {error}")
     except Exception:
         logging.exception("unexpected error")
         raise
+
+
+def tell(message):
+    """A remark for the user: into the log and onto the screen."""
+    logging.warning(message)
+    print(message, file=sys.stderr)

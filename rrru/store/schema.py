@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import pandera.pandas as pa
-
 
 @dataclass(frozen=True)
 class Column:
@@ -28,21 +26,21 @@ class Table:
     columns: tuple[Column, ...]
     key: tuple[str, ...]
 
+    @property
+    def names(self):
+        """The columns' names in order."""
+        return [column.name for column in self.columns]
+
     def pandera(self):
         """Pandera schema: exactly these columns, typed, null only where allowed, key unique."""
-        return pa.DataFrameSchema(
-            {
-                column.name: pa.Column(
-                    column.kind,
-                    checks=[pa.Check.isin(column.allowed)] if column.allowed else None,
-                    nullable=column.nullable,
-                )
-                for column in self.columns
-            },
-            strict=True,
-            coerce=True,
-            unique=list(self.key) or None,
-        )
+        import pandera.pandas as pa
+
+        def checked(column):
+            values = pa.Check.isin(column.allowed) if column.allowed else None
+            return pa.Column(column.kind, checks=values, nullable=column.nullable)
+
+        columns = {column.name: checked(column) for column in self.columns}
+        return pa.DataFrameSchema(columns, strict=True, coerce=True, unique=list(self.key) or None)
 
 
 def xyz(prefix, suffix, text, nullable=False):

@@ -5,8 +5,8 @@ anything.
 import numpy as np
 import pandas as pd
 
-from rrru.store.schemas import TABLES
 from rrru.store.tables import check, columns
+from tests.schemas import TABLES
 
 CAMPAIGN = "made_up"
 OPTIONS = {
@@ -282,7 +282,7 @@ def all_tables(ground=None, **choices):
     path_rows, error_rows = paths(ground), errors(ground, **choices)
     runs, history = genetic()
     return {
-        "paths": path_rows,
+        "measurements": path_rows,
         "errors": error_rows,
         "error_summary": error_summary(error_rows),
         "singularity": singularity(path_rows),

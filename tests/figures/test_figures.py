@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.text import Text
+from rrru.figures.catalogue import FIGURES
 
 from rrru.errors import ConfigError, RrruError
 from rrru.figures import catalogue as figures
 from rrru.figures import choose, style
-from rrru.figures.catalogue import FIGURES
 from rrru.store import tables
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
@@ -185,7 +185,7 @@ def test_what_is_missing_is_named(name, options, word, frames):
 
 def test_missing_trajectories_and_items_are_named(frames):
     ground = synthetic.commanded(names=("circle_1",))
-    others = frames | {"paths": synthetic.paths(ground), "errors": synthetic.errors(ground)}
+    others = frames | {"measurements": synthetic.paths(ground), "errors": synthetic.errors(ground)}
     for name, word in (("fig09", "line_"), ("fig10", "line_"), ("fig12", "line_"), ("fig11", "spiral")):
         with pytest.raises(ConfigError, match=rf"{name}.*{word}.*circle_1"):
             draw(name, others)
@@ -211,7 +211,7 @@ def test_what_is_drawn_is_what_stands_in_the_tables(frames):
     np.testing.assert_array_equal(line(sizes, "before calibration").get_ydata(), rows["error_mm"])
     np.testing.assert_array_equal(line(sizes, "after line calibration").get_ydata(), after["error_mm"])
     factor = float(re.search(r"magnified ([\d.]+) times", plane.get_title(loc="left"))[1])
-    command = frames["paths"].query("trajectory == 'line_1'")
+    command = frames["measurements"].query("trajectory == 'line_1'")
     x, z = line(plane, "after line calibration").get_data()
     np.testing.assert_allclose(x, command["command_x_mm"].to_numpy() + factor * after["error_x_mm"].to_numpy())
     np.testing.assert_allclose(z, command["command_z_mm"].to_numpy() + factor * after["error_z_mm"].to_numpy())
@@ -237,7 +237,7 @@ def test_what_is_drawn_is_what_stands_in_the_tables(frames):
 def test_passes_are_laid_over_each_other_at_the_same_places():
     ground = synthetic.commanded(passes=2)
     frames = synthetic.all_tables(ground)
-    places = choose.stations(frames["paths"], "spiral")
+    places = choose.stations(frames["measurements"], "spiral")
     assert places["station"].tolist() == [*range(1, 10), *range(9, 0, -1)]
     errors = frames["errors"].query("mode == 'before' and trajectory == 'line_1'")
     forward, backward = (errors.loc[errors["run"] == run, "error_mm"].to_numpy() for run in (1, 9))
@@ -288,13 +288,13 @@ def test_a_sweep_without_visible_scatter_and_one_slice_are_drawn_too(frames):
     flat = frames | synthetic.sweeps(scatter_mm=0.0)
     draw("fig06", flat).draw_without_rendering()
     one = frames["workspace"].query("slice == 'xy'")
-    far = frames["paths"].assign(status="ok"), frames["singularity"].assign(status="ok")
-    figure = draw("workspace", frames | {"workspace": one, "paths": far[0], "singularity": far[1]})
+    far = frames["measurements"].assign(status="ok"), frames["singularity"].assign(status="ok")
+    figure = draw("workspace", frames | {"workspace": one, "measurements": far[0], "singularity": far[1]})
     assert len(figure.axes) == 3 and len(figure.legends[0].get_texts()) == 2
 
 
 def test_the_registry_names_tables_that_exist():
-    known = set(tables.TABLES) | {"paths"}
+    known = set(tables.TABLES) | {"measurements"}
     for name, (function, needed, caption) in FIGURES.items():
         assert function.__name__ == name and set(needed) <= known and caption.endswith(".")
 

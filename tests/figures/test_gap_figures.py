@@ -6,16 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
+from rrru.figures.catalogue import FIGURES
 from scipy.stats import binomtest
 
 from rrru.errors import ConfigError
 from rrru.figures import style
-from rrru.figures.catalogue import FIGURES
 from rrru.store import tables
-from rrru.store.schemas import TABLES
 from rrru.studies.withheld import figures as withheld
 from tests.figures import synthetic_gap as made_up
 from tests.figures import synthetic_tables as synthetic
+from tests.schemas import TABLES
 
 GROUND = synthetic.commanded(names=("line_1", "line_2", "spiral"), passes=2)
 
@@ -200,5 +200,5 @@ def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
 
 @pytest.mark.parametrize("name", [name for name in TABLES if name.startswith(("gap_", "withheld_"))])
 def test_tables_of_the_diagnosis_may_be_empty(name, tmp_path):
-    tables.write(name, pd.DataFrame(columns=tables.columns(name)), tmp_path / "t.parquet")
+    tables.write(TABLES[name], pd.DataFrame(columns=TABLES[name].names), tmp_path / "t.parquet")
     assert tables.read(tmp_path / "t.parquet").empty

@@ -11,9 +11,9 @@ from rrru.effects.library import EFFECTS, find
 from rrru.errors import ConfigError, FitError
 from rrru.gap.settings import GapSettings
 from rrru.parameters import Parameter, ParameterSet
-from rrru.store import tables
 from tests.gap import campaigns
 from tests.gap.campaigns import NOISE_MM, NOISE_RMS_MM, active, diagnosed, drawn, measure, plan_of, strong
+from tests.schemas import TABLES, check
 
 MEASURED = [f"measured_{axis}_mm" for axis in "xyz"]
 DETAILS = {
@@ -30,11 +30,11 @@ DETAILS = {
 
 def _checked(found):
     """The diagnosis with its verdict and every table accepted by the schemas."""
-    assert ["campaign", *found.verdict] == tables.columns("gap_verdicts")
-    tables.check("gap_verdicts", pd.DataFrame([found.verdict]).assign(campaign="made up"))
+    assert ["campaign", *found.verdict] == TABLES["gap_verdicts"].names
+    check("gap_verdicts", pd.DataFrame([found.verdict]).assign(campaign="made up"))
     assert set(found.tables) == DETAILS
     for name, frame in found.tables.items():
-        tables.check(name, frame if name == "gap_points" else frame.assign(campaign="made up"))
+        check(name, frame if name == "gap_points" else frame.assign(campaign="made up"))
     return found
 
 

@@ -14,8 +14,8 @@ from rrru.gap.case import State
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate, worst_spot
 from rrru.parameters import Parameter, ParameterSet
-from rrru.store import tables
 from tests.gap.campaigns import NOISE_MM, case_of, measure
+from tests.schemas import check
 
 FACTORS = {"trajectory", "region", "direction", "leg", "motion_direction", "speed", "payload", "time"}
 
@@ -32,7 +32,7 @@ def linear(case):
 
 def _located(case, residual, linear, seed=0):
     table = locate(case, residual, linear.drive, np.random.default_rng(seed), 40)
-    return tables.check("gap_locate", table.assign(campaign="made up"))
+    return check("gap_locate", table.assign(campaign="made up"))
 
 
 def _noise(case, seed):
@@ -161,10 +161,15 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
 
 @pytest.fixture(scope="module")
 def identified(case):
+<<<<<<< HEAD
     plain = case.linearise(State(calibrate(case).deviations, {}))
     return plain, tables.check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index(
         "effect"
     )
+=======
+    plain = case.linearise(State(calibrate(case).errors, {}))
+    return plain, check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index("effect")
+>>>>>>> be31a50 (workflow: what a rule reads and runs is handed over, and its code digest is its import closure; figures in one job a study)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -207,7 +212,7 @@ def test_a_gap_of_the_detectable_size_is_detected_nine_times_of_ten(case, identi
 def test_effects_that_cannot_be_tested_say_why():
     case = case_of(measure().assign(time_s=np.nan))
     table = identify(case, case.linearise(calibrate(case)))
-    table = tables.check("gap_identifiability", table.assign(campaign="made up")).set_index("effect")
+    table = check("gap_identifiability", table.assign(campaign="made up")).set_index("effect")
     assert (
         set(table.index) == set(EFFECTS)
         and not table.loc["servo_lag", "testable"]

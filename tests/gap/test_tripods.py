@@ -11,7 +11,7 @@ from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
-from rrru.store import tables
+from tests.schemas import check
 
 NOISE_MM = 0.005
 
@@ -54,7 +54,7 @@ def test_a_3_ptts_cause_is_named(effects, named):
     if effects:
         assert found.verdict["probability"] > 0.8 and found.verdict["share_closed"] > 0.85
     for name, frame in found.tables.items():
-        tables.check(name, frame if name == "gap_points" else frame.assign(campaign="test"))
+        check(name, frame if name == "gap_points" else frame.assign(campaign="test"))
 
 
 def test_a_deltas_cause_is_named():

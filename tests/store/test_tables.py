@@ -8,9 +8,10 @@ import pyarrow.parquet as parquet
 import pytest
 
 from rrru.errors import TableError
-from rrru.store import glossary, tables
-from rrru.store.schemas import TABLES
+from rrru.store import tables
+from rrru.studies import glossary
 from tests.places import ROOT
+from tests.schemas import TABLES
 
 _ROWS = pd.DataFrame(
     {
@@ -25,7 +26,7 @@ _ROWS = pd.DataFrame(
 
 def test_round_trip_keeps_values_types_and_nulls(tmp_path):
     path = tmp_path / "deep" / "t.parquet"
-    tables.write("correlations", _ROWS[list(_ROWS)[::-1]], path)
+    tables.write(TABLES["correlations"], _ROWS[list(_ROWS)[::-1]], path)
     pd.testing.assert_frame_equal(tables.read(path), _ROWS, check_dtype=False)
     schema = parquet.read_schema(path)
     assert [str(t) for t in schema.types] == ["string"] * 4 + ["double"] and schema.names == tables.columns(
@@ -36,7 +37,7 @@ def test_round_trip_keeps_values_types_and_nulls(tmp_path):
 
 def test_same_frame_same_bytes(tmp_path):
     for name in ("a", "b"):
-        tables.write("correlations", _ROWS, tmp_path / name)
+        tables.write(TABLES["correlations"], _ROWS, tmp_path / name)
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
@@ -52,13 +53,13 @@ def test_same_frame_same_bytes(tmp_path):
 )
 def test_what_does_not_fit_is_refused_and_named(tmp_path, change, message):
     with pytest.raises(TableError, match=message):
-        tables.write("correlations", change(_ROWS), tmp_path / "t.parquet")
+        tables.write(TABLES["correlations"], change(_ROWS), tmp_path / "t.parquet")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_failed_write_leaves_the_old_table_and_nothing_else(tmp_path, monkeypatch):
     path = tmp_path / "t.parquet"
-    tables.write("correlations", _ROWS, path)
+    tables.write(TABLES["correlations"], _ROWS, path)
     before = path.read_bytes()
 
     def broken(data, where, **options):
@@ -67,12 +68,12 @@ def test_a_failed_write_leaves_the_old_table_and_nothing_else(tmp_path, monkeypa
 
     monkeypatch.setattr(parquet, "write_table", broken)
     with pytest.raises(OSError, match="disk full"):
-        tables.write("correlations", _ROWS.assign(correlation=0.1), path)
+        tables.write(TABLES["correlations"], _ROWS.assign(correlation=0.1), path)
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
 
 
 def test_the_glossary_describes_every_table_and_column():
     text = (ROOT / "results" / "README.md").read_text()
-    assert text == glossary.text(), "run `python -m rrru.store.glossary`"
+    assert text == glossary.text(), "run `python -m rrru.studies.glossary`"
     for table in TABLES.values():
         assert table.path in text and all(f"`{column.name}`" in text for column in table.columns)

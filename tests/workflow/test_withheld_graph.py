@@ -50,7 +50,7 @@ def test_no_diagnosis_is_given_an_answer(jobs):
 
 
 def test_the_measurements_hold_no_answer():
-    from rrru.store.schemas import TABLES
+    from tests.schemas import TABLES
 
     given = {column.name for column in TABLES["withheld_measurements"].columns}
     assert given - {column.name for column in TABLES["measurements"].columns} == {"robot", "kind"}

@@ -1,72 +1,74 @@
+CALIBRATION_TABLES = ["calibrations", "parameters", "correlations", "observability"]
+GENETIC_TABLES = ["genetic", "genetic_history", "genetic_against_least_squares"]
+# tables of the whole study that are the campaigns' parts, one below the other
+CAMPAIGN_TABLES = ["campaigns", "singularity", *CALIBRATION_TABLES, *GENETIC_TABLES, "errors", "error_summary"]
+TARGETS += named(CAMPAIGN_TABLES).values()
+
+
+def calibrated(*keys):
+    """What a rule about one campaign's calibrations reads: its robots, and the configuration under dotted keys."""
+
+    def settings(wildcards):
+        name = wildcards.campaign
+        robots = {"nominal": parts.nominal(config, name), "virtual": parts.virtual(config, name)}
+        return {"campaign": name, **robots, **reads(*keys)}
+
+    return settings
+
+
 rule calibrate:
     input:
-        measurements=part("measurements"),
-        campaigns=part("campaigns"),
+        **named(["measurements", "campaigns"], part),
     output:
-        calibrations=part("calibrations"),
-        parameters=part("parameters"),
-        correlations=part("correlations"),
-        observability=part("observability"),
+        **named(CALIBRATION_TABLES, part),
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
-        settings=settings("robots", "calibration"),
-        code=script_code("calibrate"),
+        settings=calibrated(*(f"calibration.{key}" for key in ("sets", "loss", "loss_scale_mm", "use_near_singularity"))),
+        code=code("calibrate"),
     script:
         "../scripts/calibrate.py"
 
 
 rule genetic:
     input:
-        measurements=part("measurements"),
-        calibrations=part("calibrations"),
-        parameters=part("parameters"),
+        **named(["measurements", "calibrations", "parameters"], part),
     output:
-        genetic=part("genetic"),
-        genetic_history=part("genetic_history"),
-        genetic_against_least_squares=part("genetic_against_least_squares"),
+        **named(GENETIC_TABLES, part),
         timings=f"{RESULTS}/timings/{{campaign}}.parquet",
     log:
         f"{RESULTS}/logs/genetic/{{campaign}}.log",
     params:
-        settings=settings("seed", "robots", "calibration", "genetic"),
-        code=script_code("genetic"),
+        settings=calibrated("seed", "genetic", "calibration.sets", "calibration.use_near_singularity"),
+        code=code("genetic"),
     script:
         "../scripts/genetic.py"
 
 
-rule sweep:
+# every calibration applied to every trajectory
+rule compensate:
     input:
-        measurements=part("measurements", config["reproduce"]["campaign"]),
+        **named(["measurements", "parameters", "genetic"], part),
     output:
-        sweep_runs=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_runs.parquet",
-        sweep_history=f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_history.parquet",
+        **named(["errors", "error_summary"], part),
     log:
-        f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}/{{value}}.log",
+        f"{RESULTS}/logs/compensate/{{campaign}}.log",
     params:
-        settings=settings("seed", "robots", "calibration", "genetic", "reproduce", "sweep"),
-        code=script_code("sweep"),
+        settings=calibrated(),
+        code=code("compensate"),
     script:
-        "../scripts/sweep.py"
+        "../scripts/compensate.py"
 
 
-rule sweep_tables:
+rule gather:
     input:
-        **{
-            name: expand(
-                f"{RESULTS}/sweep/{{parameter}}/{{population}}/{{value}}_{name.removeprefix('sweep_')}.parquet",
-                parameter=SWEPT,
-                population=sorted(config["sweep"]["populations"]),
-                value=config["sweep"]["values"],
-            )
-            for name in ("sweep_runs", "sweep_history")
-        },
+        **{name: [part(name, campaign) for campaign in CAMPAIGNS] for name in CAMPAIGN_TABLES},
     output:
-        **{name: table(name) for name in SWEEP_TABLES},
+        **named(CAMPAIGN_TABLES),
     log:
-        f"{RESULTS}/logs/sweep_tables.log",
+        f"{RESULTS}/logs/gather.log",
     params:
-        seed=config["seed"],
-        code=script_code("sweep_tables"),
+        settings={},
+        code=code("gather"),
     script:
-        "../scripts/sweep_tables.py"
+        "../scripts/gather.py"

@@ -1,32 +1,34 @@
+parts.check(config)
+
+
+def campaign_file(wildcards):
+    """The file of an ingested campaign, nothing for a virtual one."""
+    return config["campaigns"][wildcards.campaign].get("ingest", [])
+
+
+def campaign_settings(wildcards):
+    """What one campaign is made from."""
+    name, calibration = wildcards.campaign, config["calibration"]
+    return {
+        "campaign": name,
+        "section": config["campaigns"][name],
+        "nominal": parts.nominal(config, name),
+        "virtual": parts.virtual(config, name),
+        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity", "sets")},
+    }
+
+
 rule campaign:
     input:
         file=campaign_file,
     output:
-        measurements=part("measurements"),
-        truth=part("truth"),
-        singularity=part("singularity"),
-        campaigns=part("campaigns"),
-        workspace=part("workspace"),
+        **named(["measurements", "truth", "singularity", "campaigns", "workspace"], part),
     log:
         f"{RESULTS}/logs/campaign/{{campaign}}.log",
     wildcard_constraints:
         campaign="|".join(CAMPAIGNS),
     params:
-        section=campaign_settings,
-        settings=settings("seed", "robots", "motion", "trajectories", "virtual_robots", "calibration"),
-        code=script_code("campaign"),
+        settings=campaign_settings,
+        code=code("campaign"),
     script:
         "../scripts/campaign.py"
-
-
-rule gather:
-    input:
-        **{name: [part(name, campaign) for campaign in CAMPAIGNS] for name in CAMPAIGN_TABLES},
-    output:
-        **{name: table(name) for name in CAMPAIGN_TABLES},
-    log:
-        f"{RESULTS}/logs/gather.log",
-    params:
-        code=script_code("gather"),
-    script:
-        "../scripts/gather.py"

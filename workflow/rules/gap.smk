@@ -1,56 +1,89 @@
+import hashlib
+from pathlib import Path
+
 from rrru.gap.settings import GapSettings
 
 # refuses unknown effects before anything runs
 GapSettings.from_config(config["gap"]).library()
 
+GAP_TABLES = [
+    "gap_verdicts",
+    "gap_locate",
+    "gap_identifiability",
+    "gap_attribute",
+    "gap_sets",
+    "gap_shrink",
+    "gap_parameters",
+    "gap_next_runs",
+]
+GAP_FIGURE = {"gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_attribute", "gap_shrink", "gap_points"])}
 
-# one job per campaign; it sees the measurements and what the configuration says of the robot, never the truth of a virtual one
+
+def diagnosed(wildcards):
+    """What a diagnosis is told: what is known of the robot, never the truth of a virtual one."""
+    section = DIAGNOSED[wildcards.campaign]
+    return {
+        "campaign": wildcards.campaign,
+        "robot": parts.robot(config, section),
+        "masses": parts.masses(config, section),
+        "noise_mm": section.get("noise_mm") or None,
+        "use_near_singularity": config["calibration"]["use_near_singularity"],
+        **reads("seed", "gap"),
+    }
+
+
+def own_effects():
+    """Digest of the files that hold the user's own effects, so that editing one reruns what it changes."""
+    files = [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
+    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.exists()]
+
+
+# one job per campaign; it sees the measurements and what the configuration says of the robot
 rule diagnose:
     input:
         measurements=part("measurements"),
     output:
-        **{name: part(name) for name in (*GAP_TABLES, "gap_points")},
+        **named([*GAP_TABLES, "gap_points"], part),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
-        robot=campaign_robot,
-        noise_mm=campaign_noise,
-        masses=campaign_masses,
-        use_near_singularity=config["calibration"]["use_near_singularity"],
-        seed=config["seed"],
-        gap=config["gap"],
-        own_effects=own_effects_digest(),
-        code=script_code("diagnose"),
+        settings=diagnosed,
+        own_effects=own_effects(),
+        code=code("diagnose"),
     script:
         "../scripts/diagnose.py"
+
+
+rule gap_figure:
+    input:
+        **named(shown(GAP_FIGURE), part),
+    output:
+        **drawn(GAP_FIGURE, "figures/{campaign}"),
+    log:
+        f"{RESULTS}/logs/figures/{{campaign}}_gap.log",
+    params:
+        settings=lambda wildcards: {
+            "figures": GAP_FIGURE,
+            "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(DIAGNOSED[wildcards.campaign])},
+        },
+        code=code("figure", GAP_FIGURE),
+    script:
+        "../scripts/figure.py"
 
 
 use rule gather as gather_gap with:
     input:
         **{name: [part(name, campaign) for campaign in DIAGNOSED] for name in GAP_TABLES},
     output:
-        **{name: table(name) for name in GAP_TABLES},
+        **named(GAP_TABLES),
     log:
         f"{RESULTS}/logs/gather_gap.log",
 
 
-rule gap_figure:
-    input:
-        **{name: part(name) for name in FIGURES["gap"][1] if name != "gap_points"},
-        gap_points=part("gap_points"),
-    output:
-        expand(f"{RESULTS}/figures/{{{{campaign}}}}/gap.{{kind}}", kind=["pdf", "png"]),
-    log:
-        f"{RESULTS}/logs/figures/{{campaign}}_gap.log",
-    params:
-        figures=["gap"],
-        options=lambda wildcards: {"campaign": wildcards.campaign, "z_down": z_down(wildcards.campaign)},
-        code=script_code("figure"),
-    script:
-        "../scripts/figure.py"
-
-
 rule gap:
     input:
-        [table(name) for name in GAP_TABLES],
-        expand(f"{RESULTS}/figures/{{campaign}}/gap.png", campaign=DIAGNOSED),
+        named(GAP_TABLES).values(),
+        [f"{RESULTS}/figures/{campaign}/gap.png" for campaign in DIAGNOSED],
+
+
+TARGETS += rules.gap.input

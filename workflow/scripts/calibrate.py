@@ -1,22 +1,22 @@
 """Calibrations of one campaign on every set of trajectories."""
 
 from rrru.fit import campaign_fit
+from rrru.fit.schemas import TABLES
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run
+from rrru.studies import setup
 
 
-def main(config, campaign, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the campaign's calibrations, parameters, correlations and observability."""
-    measurements = tables.read(inputs["measurements"])
-    info = tables.read(inputs["campaigns"]).iloc[0]
+    nominal, info = settings["nominal"], tables.read(inputs["campaigns"]).iloc[0]
     # noise known only from residuals is estimated anew by each fit
     noise_mm = None if info["noise_from"] == "residuals" else info["noise_mm"]
-    fits = campaign_fit.fit_sets(measurements, study.mechanism(config, campaign), config["calibration"], noise_mm)
-    for name, frame in campaign_fit.tables(campaign, fits, study.true_errors(config, campaign)).items():
-        tables.write(name, frame, outputs[name])
+    measurements = tables.read(inputs["measurements"])
+    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), settings["calibration"], noise_mm)
+    truth = setup.true_deviations(nominal, settings["virtual"])
+    tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.campaign, snakemake.input, snakemake.output)
+    run(main, snakemake)

@@ -1,38 +1,45 @@
 """One campaign: driven by a virtual robot or read from a file."""
 
-import logging
-import sys
-
 import pandas as pd
 
+from rrru.campaign.schemas import TABLES
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run, tell
+from rrru.studies import campaigns, setup
 
 
-def main(config, campaign, outputs):
+def main(settings, inputs, outputs):
     """Write measurements, truth (empty for a file), singularity measures, workspace slices and the campaign's row."""
-    ingested = None
-    if study.is_virtual(config, campaign):
-        measurements, truth = study.virtual_campaign(config, campaign).run()
+    name, section, nominal = settings["campaign"], settings["section"], settings["nominal"]
+    robot = setup.mechanism(nominal)
+    if settings["virtual"]:
+        measurements, truth = setup.virtual_campaign(nominal, settings["virtual"]).run()
+        notes, registration = (), None
     else:
-        ingested = study.ingest_campaign(config, campaign)
-        measurements, truth = ingested.measurements, pd.DataFrame(columns=tables.columns("truth"))
-    margin = config["calibration"]["singularity_margin"]
-    robot = study.mechanism(config, campaign)
-    measurements, singular = study.with_singularities(robot, measurements, margin)
+        ingested = setup.ingest_campaign(nominal, section)
+        measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))
+        notes, registration = ingested.notes, ingested.registration
+    measurements, singular = campaigns.with_singularities(robot, measurements, settings["singularity_margin"])
+    noise = campaigns.noise(robot, measurements, section.get("noise_mm"), settings["use_near_singularity"])
+    notes = (*notes, *campaigns.unmatched_sets(settings["sets"], measurements))
+    row = campaigns.campaign_row(section, measurements, singular, noise, notes, registration)
+    if row["notes"]:
+        tell(f"campaign {name}: {row['notes']}")
+    frames = {
+        "truth": truth[_columns("truth")],
+        "singularity": singular.assign(campaign=name),
+        "workspace": campaigns.workspace_table(robot, measurements).assign(campaign=name),
+        "campaigns": pd.DataFrame([row]).assign(campaign=name),
+    }
     kind = "measurements" if robot.drive_unit == "rad" else "slider_measurements"
-    tables.write(kind, measurements, outputs["measurements"])
-    tables.write("truth", truth[tables.columns("truth")], outputs["truth"])
-    tables.write("singularity", singular.assign(campaign=campaign), outputs["singularity"])
-    tables.write("workspace", study.workspace_table(config, campaign, measurements), outputs["workspace"])
-    row = study.campaign_row(config, campaign, measurements, singular, ingested)
-    if row["notes"].iloc[0]:
-        logging.warning("campaign %s: %s", campaign, row["notes"].iloc[0])
-        print(f"campaign {campaign}: {row['notes'].iloc[0]}", file=sys.stderr)
-    tables.write("campaigns", row, outputs["campaigns"])
+    tables.write_all(TABLES, {kind: measurements}, {kind: outputs["measurements"]})
+    tables.write_all(TABLES, frames, outputs)
+
+
+def _columns(name):
+    """The columns of a campaign's table."""
+    return next(table.names for table in TABLES if table.name == name)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.campaign, snakemake.output)
+    run(main, snakemake)

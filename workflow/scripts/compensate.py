@@ -4,18 +4,20 @@ import pandas as pd
 
 from rrru.compensate import evaluate
 from rrru.fit.campaign_fit import errors_vector
+from rrru.fit.schemas import TABLES
 from rrru.genetic.campaign_runs import typical_parameters
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run
+from rrru.studies import setup
 
 
-def main(config, campaign, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the campaign's errors point by point and summed up."""
-    measurements, mechanism = tables.read(inputs["measurements"]), study.mechanism(config, campaign)
+    nominal = settings["nominal"]
+    measurements, mechanism = tables.read(inputs["measurements"]), setup.mechanism(nominal)
     typical = typical_parameters(tables.read(inputs["genetic"]), mechanism.parameters.names)
     parameters = pd.concat([tables.read(inputs["parameters"])[typical.columns], typical], ignore_index=True)
-    virtual = study.virtual_campaign(config, campaign) if study.is_virtual(config, campaign) else None
+    virtual = setup.virtual_campaign(nominal, settings["virtual"]) if settings["virtual"] else None
     frames = [evaluate.before(measurements)]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):
         deviations = errors_vector(parameters, calibration, method, mechanism)
@@ -29,12 +31,10 @@ def main(config, campaign, inputs, outputs):
                 )
             )
     result = pd.concat(frames, ignore_index=True)
-    tables.write("errors", result.assign(campaign=campaign), outputs["errors"])
-    tables.write(
-        "error_summary", evaluate.summarise(result, measurements).assign(campaign=campaign), outputs["error_summary"]
-    )
+    result_tables = {"errors": result, "error_summary": evaluate.summarise(result, measurements)}
+    campaign = settings["campaign"]
+    tables.write_all(TABLES, {key: frame.assign(campaign=campaign) for key, frame in result_tables.items()}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.campaign, snakemake.input, snakemake.output)
+    run(main, snakemake)

@@ -3,17 +3,18 @@
 import numpy as np
 
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 from rrru.studies.delta import views
+from rrru.studies.delta.schemas import TABLES
 
 
-def main(config, outputs):
+def main(settings, inputs, outputs):
     """Write both sets of images, and the truth apart from them."""
-    truth = views.true_poses(config)
-    np.savez_compressed(outputs["images"], tilted=views.tilted_images(config), poses=views.pose_images(config, truth))
-    tables.write("delta_truth", truth, outputs["truth"])
+    truth = views.true_poses(settings)
+    tilted, poses = views.tilted_images(settings), views.pose_images(settings, truth)
+    np.savez_compressed(outputs["images"], tilted=tilted, poses=poses)
+    tables.write_all(TABLES, {"delta_truth": truth}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.output)
+    run(main, snakemake)

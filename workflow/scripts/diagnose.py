@@ -3,33 +3,32 @@
 import pandas as pd
 
 from rrru.gap.diagnose import diagnose
+from rrru.gap.schemas import TABLES
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
-from rrru.robots.protocol import make_mechanism
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
+from rrru.studies import setup
 
 
-def main(campaign, measurements, outputs, params):
+def main(settings, inputs, outputs):
     """Write the verdict and everything behind it."""
-    robot = dict(params.robot)
     result = diagnose(
-        tables.read(measurements),
-        make_mechanism(robot.pop("name"), robot),
-        Masses(**params.masses),
-        GapSettings.from_config(params.gap, params.seed),
-        params.noise_mm,
-        name=campaign,
-        use_near_singularity=params.use_near_singularity,
+        tables.read(inputs["measurements"]),
+        setup.mechanism(settings["robot"]),
+        Masses(**settings["masses"]),
+        GapSettings.from_config(settings["gap"], settings["seed"]),
+        settings["noise_mm"],
+        name=settings["campaign"],
+        use_near_singularity=settings["use_near_singularity"],
     )
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
-    for name, output in outputs.items():
-        frame = frames[name] if name == "gap_points" else frames[name].assign(campaign=campaign)
-        tables.write(name, frame, output)
+    named = {
+        name: frames[name] if name == "gap_points" else frames[name].assign(campaign=settings["campaign"])
+        for name in outputs
+    }
+    tables.write_all(TABLES, named, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(
-            snakemake.wildcards.campaign, snakemake.input.measurements, dict(snakemake.output.items()), snakemake.params
-        )
+    run(main, snakemake)

@@ -1,18 +1,23 @@
 """Figures of the study as PDF and PNG."""
 
+import importlib
+import inspect
+
 from rrru.figures import style
-from rrru.figures.catalogue import FIGURES
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 
 
-def main(names, inputs, outputs, options):
-    """Draw the named figures from the tables that they need; the outputs are a PDF and a PNG of each in turn."""
-    for name, pdf, png in zip(names, outputs[::2], outputs[1::2], strict=True):
-        draw, needed, _ = FIGURES[name]
-        style.save(draw({table: tables.read(inputs[table]) for table in needed}, options), pdf, png)
+def main(settings, inputs, outputs):
+    """Draw figures {name: ("module:function", names of its tables)} of the settings, each with the settings' options."""
+    for name, (place, needed) in settings["figures"].items():
+        module, _, draw = place.partition(":")
+        frames = {table: tables.read(inputs[table]) for table in needed}
+        function = getattr(importlib.import_module(module), draw)
+        figure = function(frames, settings["options"])
+        # what its function says of a figure is the caption in both files
+        style.save(figure, outputs[f"{name}_pdf"], outputs[f"{name}_png"], inspect.cleandoc(function.__doc__))
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.params.figures, snakemake.input, list(snakemake.output), snakemake.params.options)
+    run(main, snakemake)

@@ -1,19 +1,15 @@
 """Tables for the whole study out of the same tables of its parts."""
 
-import pandas as pd
-
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 
 
-def main(inputs, outputs):
+def main(settings, inputs, outputs):
     """Write every table as its parts, one below the other."""
     for name, output in outputs.items():
-        parts = [tables.read(path) for path in inputs[name]]
-        filled = [part for part in parts if len(part)] or parts[:1]
-        tables.write(name, pd.concat(filled, ignore_index=True), output)
+        parts = inputs[name]
+        tables.gather([parts] if isinstance(parts, str) else parts, output)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(dict(snakemake.input.items()), dict(snakemake.output.items()))
+    run(main, snakemake)

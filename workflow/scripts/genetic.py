@@ -3,51 +3,48 @@
 import pandas as pd
 from tqdm import tqdm
 
-from rrru.genetic import campaign_runs as genetic_study
+from rrru.genetic import campaign_runs
+from rrru.genetic.schemas import TABLES
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run
+from rrru.studies import setup
 
 
-def main(config, campaign, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
     measurements = tables.read(inputs["measurements"])
-    tied, identifiable = study.mechanism(config, campaign, "tied"), study.mechanism(config, campaign)
-    settings = genetic_study.settings_from_config(config["genetic"])
+    name, nominal, calibration = settings["campaign"], settings["nominal"], settings["calibration"]
+    tied, identifiable = setup.mechanism(nominal, "tied"), setup.mechanism(nominal)
     results = []
-    for name, patterns in tqdm(config["calibration"]["sets"].items(), desc=f"genetic {campaign}", unit="set"):
-        result = genetic_study.study_set(
+    for label, patterns in tqdm(calibration["sets"].items(), desc=f"genetic {name}", unit="set"):
+        result = campaign_runs.study_set(
             measurements,
             tied,
             identifiable,
-            name,
+            label,
             patterns,
-            settings,
-            config["genetic"]["seeds"],
-            config["seed"],
-            (campaign,),
-            config["calibration"]["use_near_singularity"],
+            campaign_runs.settings_from_config(settings["genetic"]),
+            settings["genetic"]["seeds"],
+            settings["seed"],
+            (name,),
+            calibration["use_near_singularity"],
         )
         if result is not None:
             results.append(result)
     runs, history, timings = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))
-    compared = genetic_study.against_least_squares(
-        runs,
-        tables.read(inputs["calibrations"]),
-        tables.read(inputs["parameters"]),
-        study.true_errors(config, campaign),
-    )
+    truth = setup.true_deviations(nominal, settings["virtual"])
+    fits = (tables.read(inputs[table]) for table in ("calibrations", "parameters"))
+    compared = campaign_runs.against_least_squares(runs, *fits, truth)
     # robots have different parameters, the table has those of all
-    runs = runs.reindex(columns=[name for name in tables.columns("genetic") if name != "campaign"])
-    for name, frame in (
-        ("genetic", runs),
-        ("genetic_history", history),
-        ("genetic_against_least_squares", compared),
-        ("timings", timings),
-    ):
-        tables.write(name, frame.assign(campaign=campaign), outputs[name])
+    names = next(table.names for table in TABLES if table.name == "genetic")
+    frames = {
+        "genetic": runs.reindex(columns=[column for column in names if column != "campaign"]),
+        "genetic_history": history,
+        "genetic_against_least_squares": compared,
+        "timings": timings,
+    }
+    tables.write_all(TABLES, {key: frame.assign(campaign=name) for key, frame in frames.items()}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.campaign, snakemake.input, snakemake.output)
+    run(main, snakemake)

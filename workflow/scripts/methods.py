@@ -3,18 +3,20 @@
 import numpy as np
 
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 from rrru.studies.delta.twin import pose_commands
 from rrru.studies.methods import benches, compare
+from rrru.studies.methods.schemas import TABLES
 
 
-def main(config, robot, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the robot's rows of the comparison, of its learning curves and of the computing times."""
-    bench = benches.bench(config, robot)
-    offsets = _from_images(config, bench, tables.read(inputs["calibrations"])) if inputs.get("calibrations") else None
-    methods, curve, timings = compare.compare(bench, config, offsets)
-    for name, frame in (("methods", methods), ("method_points", curve), ("method_timings", timings)):
-        tables.write(name, frame.assign(robot=robot), outputs[name])
+    robot = settings["robot"]
+    bench = benches.bench(settings, robot)
+    offsets = _from_images(settings, bench, tables.read(inputs["calibrations"])) if inputs.get("calibrations") else None
+    methods, curve, timings = compare.compare(bench, settings, offsets)
+    frames = {"methods": methods, "method_points": curve, "method_timings": timings}
+    tables.write_all(TABLES, {name: frame.assign(robot=robot) for name, frame in frames.items()}, outputs)
 
 
 def _from_images(config, bench, calibrations):
@@ -29,5 +31,4 @@ def _from_images(config, bench, calibrations):
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.wildcards.robot, dict(snakemake.input.items()), snakemake.output)
+    run(main, snakemake)

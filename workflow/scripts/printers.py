@@ -1,27 +1,22 @@
 """Linear-delta printers: what their owners measured, calibrated here and compared with what their firmware saved."""
 
-import logging
-import sys
-
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run, tell
 from rrru.studies.printers import printer_tables
-from rrru.studies.printers import readings as printers
+from rrru.studies.printers.readings import read
+from rrru.studies.printers.schemas import TABLES
 
 
-def main(file, settings, outputs):
-    """Write the printers, their numbers, readings and possible causes; says which saved answers do not belong to their
-    readings.
-    """
-    frames = printer_tables.tables(printers.read(file), settings)
-    for name, frame in frames.items():
-        tables.write(name, frame.reindex(columns=tables.columns(name)), outputs[name])
+def main(settings, inputs, outputs):
+    """Write the tables of the printers; says which saved answers do not belong to their readings."""
+    frames = printer_tables.tables(read(inputs["file"]), settings["printers"])
+    columns = {table.name: table.names for table in TABLES}
+    frames = {name: frame.reindex(columns=columns[name]) for name, frame in frames.items()}
+    tables.write_all(TABLES, frames, outputs)
     for row in frames["printers"].itertuples():
         if row.reason:
-            logging.warning("%s: %s: %s", row.printer, row.verdict, row.reason)
-            print(f"{row.printer}: {row.verdict}: {row.reason}", file=sys.stderr)
+            tell(f"{row.printer}: {row.verdict}: {row.reason}")
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.input[0], snakemake.params.settings, snakemake.output)
+    run(main, snakemake)

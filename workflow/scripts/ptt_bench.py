@@ -1,24 +1,23 @@
 """Kinematics, singularities, backlash and repeatability of paper B's robot."""
 
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 from rrru.studies.ptt3 import bench
+from rrru.studies.ptt3.schemas import TABLES
 
 
-def main(config, outputs):
+def main(settings, inputs, outputs):
     """Write the tables of all that comes before the experiments."""
-    encoder, backlash = bench.backlash(config)
+    encoder, backlash = bench.backlash(settings)
     frames = {
-        "ptt_kinematics": bench.kinematics(config),
-        "ptt_singularity": bench.singularity(config),
+        "ptt_kinematics": bench.kinematics(settings),
+        "ptt_singularity": bench.singularity(settings),
         "ptt_encoder": encoder,
         "ptt_backlash": backlash,
-        "ptt_repeatability": bench.repeatabilities(config, backlash),
+        "ptt_repeatability": bench.repeatabilities(settings, backlash),
     }
-    for name, frame in frames.items():
-        tables.write(name, frame, outputs[name])
+    tables.write_all(TABLES, frames, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.output)
+    run(main, snakemake)

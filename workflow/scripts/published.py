@@ -4,28 +4,31 @@ import pandas as pd
 
 from rrru.genetic.campaign_runs import typical_parameters
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run
+from rrru.studies import config as parts
+from rrru.studies import setup
 from rrru.studies.rrru3.audit import audit_table
 from rrru.studies.rrru3.published import published_table
 from rrru.studies.rrru3.redraw import spread
+from rrru.studies.rrru3.schemas import TABLES
 from rrru.studies.rrru3.sisters import spread_c, study_b, study_c
 
 
-def main(config, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write both tables."""
     errors, calibrations, parameters, genetic, runs = (
         tables.read(inputs[name]) for name in ("errors", "calibrations", "parameters", "genetic", "sweep_runs")
     )
-    reproduce = config["reproduce"]
+    config, reproduce = settings, settings["reproduce"]
     campaign = reproduce["campaign"]
+    nominal, virtual = parts.nominal(config, campaign), parts.virtual(config, campaign)
     own = genetic[genetic["campaign"] == campaign]
-    names = study.mechanism(config, campaign).parameters.names
+    names = setup.mechanism(nominal).parameters.names
     typical = typical_parameters(own, (*names, "dR", "dr")).assign(campaign=campaign)
     others = {}
-    if study.is_virtual(config, campaign):
+    if virtual:
         others = spread(
-            study.virtual_campaign(config, campaign), config["calibration"], reproduce, reproduce["redraws"]
+            setup.virtual_campaign(nominal, virtual), config["calibration"], reproduce, reproduce["redraws"]
         )
     parameters = pd.concat([parameters[typical.columns], typical], ignore_index=True)
     sisters = {
@@ -37,10 +40,8 @@ def main(config, inputs, outputs):
     }
     sister_spread = {"C": spread_c(tables.read(inputs["delta_draws"]))}
     frame = published_table(config, errors, calibrations, parameters, genetic, runs, others, sisters, sister_spread)
-    tables.write("published", frame, outputs["published"])
-    tables.write("audit", audit_table(), outputs["audit"])
+    tables.write_all(TABLES, {"published": frame, "audit": audit_table()}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.input, snakemake.output)
+    run(main, snakemake)

@@ -1,45 +1,44 @@
-"""All seeds of one value of one swept setting."""
+"""All values and seeds of one swept setting of the genetic algorithm."""
 
+import pandas as pd
 from tqdm import tqdm
 
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.genetic.campaign_runs import settings_from_config
+from rrru.genetic.schemas import TABLES
 from rrru.genetic.sweep import run_sweep
 from rrru.store import tables
-from rrru.store.job import job
-from rrru.studies import setup as study
+from rrru.store.job import run
+from rrru.studies import setup
 
 
-def main(config, parameter, population, value, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the runs and their history."""
-    section, reproduce = config["sweep"], config["reproduce"]
-    mechanism = study.mechanism(config, reproduce["campaign"], "tied")
-    patterns = config["calibration"]["sets"][reproduce["line_calibration"]]
-    residuals = select(
-        tables.read(inputs["measurements"]), mechanism, patterns, config["calibration"]["use_near_singularity"]
-    )
+    section, parameter, population = settings["sweep"], settings["parameter"], settings["population"]
+    mechanism = setup.mechanism(settings["nominal"], "tied")
+    measurements, patterns = tables.read(inputs["measurements"]), settings["patterns"]
+    residuals = select(measurements, mechanism, patterns, settings["calibration"]["use_near_singularity"])
     if residuals is None:
-        raise ConfigError(
-            f"campaign {reproduce['campaign']} has too few points for the set {reproduce['line_calibration']}"
+        raise ConfigError(f"sweep: too few points on the trajectories {', '.join(patterns)}")
+    genetic = settings_from_config(settings["genetic"], populations=section["populations"][population])
+    swept = [
+        run_sweep(
+            residuals.mean_distance,
+            mechanism.parameters.low,
+            mechanism.parameters.high,
+            genetic,
+            parameter,
+            float(value),
+            range(1, section["seeds"] + 1),
+            mechanism.parameters.names,
+            study_seed=settings["seed"],
         )
-    settings = settings_from_config(config["genetic"], populations=section["populations"][population])
-    runs, history = run_sweep(
-        residuals.mean_distance,
-        mechanism.parameters.low,
-        mechanism.parameters.high,
-        settings,
-        parameter,
-        float(value),
-        tqdm(range(1, section["seeds"] + 1), desc=f"{parameter} {value} {population}", unit="run"),
-        mechanism.parameters.names,
-        study_seed=config["seed"],
-    )
-    tables.write("sweep_runs", runs, outputs["sweep_runs"])
-    tables.write("sweep_history", history, outputs["sweep_history"])
+        for value in tqdm(section["values"], desc=f"{parameter} {population}", unit="value")
+    ]
+    runs, history = (pd.concat(frames, ignore_index=True) for frames in zip(*swept, strict=True))
+    tables.write_all(TABLES, {"sweep_runs": runs, "sweep_history": history}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        names = snakemake.wildcards
-        main(snakemake.config, names.parameter, names.population, names.value, snakemake.input, snakemake.output)
+    run(main, snakemake)

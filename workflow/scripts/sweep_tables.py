@@ -2,12 +2,13 @@
 
 import pandas as pd
 
+from rrru.genetic.schemas import TABLES
 from rrru.genetic.sweep import setting_effect, setting_pairs
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 
 
-def main(seed, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write the runs and their history, the test over all values and that of every value against the best."""
     runs, history = (
         pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
@@ -17,12 +18,10 @@ def main(seed, inputs, outputs):
         "sweep_runs": runs,
         "sweep_history": history,
         "sweep_effect": setting_effect(runs),
-        "sweep_pairs": setting_pairs(runs, seed),
+        "sweep_pairs": setting_pairs(runs, settings["seed"]),
     }
-    for name, frame in frames.items():
-        tables.write(name, frame, outputs[name])
+    tables.write_all(TABLES, frames, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.params.seed, snakemake.input, snakemake.output)
+    run(main, snakemake)

@@ -3,25 +3,24 @@
 import pandas as pd
 
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.robots import answer, nominal
+from rrru.studies.withheld.schemas import TABLES
 
 
-def main(config, robots, output):
-    """Write the answers of a chunk; robots: check, effect taken out, first number, number after the last."""
-    check, effect, first, end = robots
-    mechanism = nominal(config["robots"])
+def main(settings, inputs, outputs):
+    """Write the answers of a chunk."""
+    mechanism, seed = nominal(settings["robots"]), settings["seed"]
     rows = []
-    for number in range(first, end):
-        if check == "effect":
-            robot = draw.draw_single(config["seed"], effect, number, mechanism)
+    for number in range(settings["first"], settings["end"]):
+        if settings["check"] == "effect":
+            robot = draw.draw_single(seed, settings["effect"], number, mechanism)
         else:
-            robot = draw.draw_labelled(config["seed"], number, mechanism)
+            robot = draw.draw_labelled(seed, number, mechanism)
         rows.append(answer(robot, mechanism))
-    tables.write("withheld_answers", pd.DataFrame(rows), output)
+    tables.write_all(TABLES, {"withheld_answers": pd.DataFrame(rows)}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.params.robots, snakemake.output.answers)
+    run(main, snakemake)

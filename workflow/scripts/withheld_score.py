@@ -2,22 +2,22 @@
 
 from rrru.gap.settings import GapSettings
 from rrru.store import tables
-from rrru.store.job import job
+from rrru.store.job import run
 from rrru.studies.withheld import score
 from rrru.studies.withheld.robots import nominal
+from rrru.studies.withheld.schemas import TABLES
 
 
-def main(config, check, inputs, outputs):
+def main(settings, inputs, outputs):
     """Write scores and limits of the robots of a chunk."""
-    frames = {name: tables.read(inputs[name]) for name in ("answers", "measurements", "verdicts", "states")}
-    library = GapSettings.from_config(config["gap"]).library()
+    frames = {name.removeprefix("withheld_"): tables.read(path) for name, path in inputs.items()}
+    library = GapSettings.from_config(settings["gap"]).library()
+    mechanism = nominal(settings["robots"])
     scores, limits = score.score_chunk(
-        check, config["seed"], **frames, mechanism=nominal(config["robots"]), library=library
+        settings["check"], settings["seed"], **frames, mechanism=mechanism, library=library
     )
-    tables.write("withheld_scores", scores, outputs["scores"])
-    tables.write("withheld_limits", limits, outputs["limits"])
+    tables.write_all(TABLES, {"withheld_scores": scores, "withheld_limits": limits}, outputs)
 
 
 if __name__ == "__main__":
-    with job(snakemake.log[0]):
-        main(snakemake.config, snakemake.params.robots[0], snakemake.input, snakemake.output)
+    run(main, snakemake)

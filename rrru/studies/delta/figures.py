@@ -32,8 +32,9 @@ _FOUND = {"color": style.ORANGE, "marker": "+", "markersize": 4.0, "linestyle": 
 
 @style.printed
 def delta_images(tables, options):
-    """(a) The first pose's image with the dots found; (b) the target as seen, and the optical centres with their
-    errors.
+    """What the Delta's camera sees (paper C, Figs. 3 and 6). (a) The image of the first pose with the centres of
+    the dots found. (b) Dots that any image shows whole, those of (a) in colour, and the optical centres with their
+    errors, magnified as stated.
     """
     dots, poses = _rows(tables, "delta_dots", "delta_images"), _rows(tables, "delta_poses", "delta_images")
     figure = style.new(style.DOUBLE_MM, 80.0)
@@ -100,8 +101,10 @@ def _pitch(dots, centres):
 
 @style.printed
 def delta_errors(tables, options):
-    """Maps of the errors before and after the paper's calibration, and what every variant leaves, in other draws
-    too.
+    """Errors on the plane before and after the paper's calibration (paper C, Figs. 7 and 8): colour is the size of
+    the error in the calibration frame, arrows its part in the plane, magnified as stated. Below, mean and largest
+    error under every variant, and the range of the mean when plate, views and noise are drawn anew, (c) in the
+    calibration frame, (d) in the frame of the robot's base.
     """
     points, calibrations = (
         _rows(tables, "delta_points", "delta_errors"),
@@ -162,8 +165,8 @@ def _sizes(axes, calibrations, draws, frame, title):
 
 @style.printed
 def delta_observability(tables, options):
-    """Singular values, standard errors and the gain of length errors of the common and the differential
-    combinations.
+    """What every variant sees of the three zero errors: all drives alike (common) and against each other
+    (differential). (a) Singular value. (b) Standard error. (c) Error per unknown length error of 1 mm.
     """
     rows = _rows(tables, "delta_observability", "delta_observability")
     names = list(dict.fromkeys(rows["variant"]))

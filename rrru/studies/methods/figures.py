@@ -31,8 +31,9 @@ _OUTSIDE = {"color": style.ORANGE, "marker": "^", "markerfacecolor": "white"}
 
 @style.printed
 def methods(tables, options):
-    """Per robot: (a) to (c) mean error after every method with a bar to the largest, (d) to (f) mean error inside
-    against the points learned.
+    """Every method on every robot where it makes sense, judged on true errors of the driven robot. (a) to (c) Mean
+    error after it, with a bar to the largest, at targets inside the region that it learned on and around it. (d) to
+    (f) What fewer points cost.
     """
     frame, curves = tables["methods"], tables["method_points"]
     robots = [name for name in _ROBOTS if (frame["robot"] == name).any()]

@@ -20,8 +20,10 @@ _ROW_MM, _AROUND_MM, _HIGHEST_MM = 4.4, 34.0, 238.0
 
 @style.printed
 def printers(tables, options):
-    """One row per printer: (a) largest difference to the saved answer, (b) residuals under both answers, (c) standard
-    error of arms.
+    """Linear-delta printers calibrated from what their owners measured. (a) Largest difference between the numbers
+    that their firmware saved and ours; diamonds: readings and saved answer do not belong together. (b) Rms
+    residuals of probed heights and caliper distances under our answer and the saved one. (c) Standard error of an
+    arm's length with distances, and of the arms' common length if heights alone had to give it.
     """
     frame = tables["printers"]
     frame = frame[frame["verdict"].isin(_VERDICTS)].reset_index(drop=True)

@@ -93,13 +93,12 @@ class Twin:
         )
 
 
-def from_config(config, campaign):
-    """The configured twin: the virtual robot and the trajectories of a campaign, as a Twin.
+def from_config(virtual):
+    """The configured twin: the virtual robot and the trajectories of a virtual campaign's section, as a Twin.
 
     Raises ConfigError where these hold something that the search does not know.
     """
-    section = config["campaigns"][campaign]
-    robot, shape = config["virtual_robots"][section["virtual"]], config["trajectories"][section["trajectories"]]
+    robot, shape = virtual["robot"], virtual["trajectories"]
     spiral, offsets = shape["spiral"], shape["lines"]["offsets_y_mm"]
     steps = np.diff([0.0, *np.abs(offsets[1::2])])
     effects = robot["effects"]
@@ -117,7 +116,7 @@ def from_config(config, campaign):
     }
     if set(values) != set(SEARCH_BOUNDS):
         raise ConfigError(
-            f"twin: campaign {campaign} differs in {sorted(set(values) ^ set(SEARCH_BOUNDS))} from what is searched"
+            f"twin: campaign {virtual['name']} differs in {sorted(set(values) ^ set(SEARCH_BOUNDS))} from what is searched"
         )
     return Twin({name: float(values[name]) for name in SEARCH_BOUNDS})
 

@@ -1,6 +1,7 @@
 """Tables of the check on data whose effect is withheld: verdicts first, the truth joined by the scoring alone."""
 
 from rrru.store.schema import NUMBER, Column, Table
+from rrru.studies.withheld.schemas_parts import PARTS
 
 _CHECK = Column(
     "check",
@@ -14,6 +15,7 @@ _KIND = Column(
 )
 
 TABLES = (
+    *PARTS,
     Table(
         "withheld_verdicts",
         "tables/withheld_verdicts.parquet",

@@ -12,7 +12,7 @@ _KIND = Column(
     allowed=("paper", "full"),
 )
 
-TABLES = (
+PARTS = (
     Table(
         "withheld_answers",
         "withheld/answers/{chunk}.parquet",

@@ -11,8 +11,8 @@ from snakemake.utils import validate
 
 from rrru.errors import ConfigError
 from rrru.plant.virtual_tripod import VirtualTripod
-from rrru.store import tables
 from rrru.studies.methods import benches, compare, learners
+from tests.schemas import check
 from tests.workflow.folder import ROOT
 
 CONFIG = yaml.safe_load((ROOT / "config.yaml").read_text())
@@ -36,7 +36,7 @@ def delta():
 
 def test_the_tables_fit_their_schemas(delta):
     for name, frame in zip(("methods", "method_points", "method_timings"), delta[1:], strict=True):
-        tables.check(name, frame.assign(robot="delta"))
+        check(name, frame.assign(robot="delta"))
 
 
 def test_every_method_is_there_for_both_tests(delta):

@@ -7,8 +7,8 @@ import pytest
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
-from rrru.store import tables
 from rrru.studies.printers import printer_fit, printer_tables
+from tests.schemas import check
 from tests.studies.printers.simulated_printers import (
     DISTANCES,
     ENTRIES,
@@ -155,7 +155,7 @@ def test_tables_fit_their_schemas_and_a_printer_without_an_answer_keeps_its_row(
     with pytest.raises(FitError, match=r"lost: .*the answer belongs to steps 0.5 times as long"):
         printer_fit.fit_printer(lost, STEP)
     frames = printer_tables.tables([DISTANCES, lost, PRINTERS["printer_23"]], SETTINGS)
-    frames = {name: tables.check(name, frame) for name, frame in frames.items()}
+    frames = {name: check(name, frame) for name, frame in frames.items()}
     printers = frames["printers"].set_index("printer")
     assert printers["verdict"].to_dict() == {
         "printer_22": "reproduced",

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from rrru.store.schemas import TABLES
 from rrru.store.tables import check
 from rrru.studies.ptt3.controllers import METHODS
+from tests.schemas import TABLES
 
 EXPERIMENTS = tuple(f"ptt_{k}" for k in range(1, 6))
 _POINTS = 24

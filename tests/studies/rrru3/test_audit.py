@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from rrru.store import tables
 from rrru.studies.rrru3 import paper_a
 from rrru.studies.rrru3.audit import audit_table
 from rrru.studies.rrru3.study_numbers import group_orders, study_numbers
+from tests.schemas import check
 
 
 @pytest.fixture(scope="module")
 def audit():
-    return tables.check("audit", audit_table())
+    return check("audit", audit_table())
 
 
 def _values(audit, where, text):

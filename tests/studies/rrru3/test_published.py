@@ -5,14 +5,14 @@ import pandas as pd
 import pytest
 
 from rrru.errors import ConfigError
-from rrru.store import tables
 from rrru.studies.delta import paper_c
 from rrru.studies.ptt3 import paper_b
 from rrru.studies.rrru3.published_sisters import here_b, here_c, sister_rows
+from tests.schemas import check
 
 
 def test_every_row_fits_the_table_and_is_null_without_a_study():
-    frame = tables.check("published", pd.DataFrame(sister_rows()))
+    frame = check("published", pd.DataFrame(sister_rows()))
     assert len(frame) == len(paper_b.NUMBERS) + len(paper_c.NUMBERS) == 39 + 19
     assert frame["here"].isna().all() and set(frame["paper"]) == {"B", "C"}
 
@@ -37,7 +37,7 @@ def test_this_studys_numbers_stand_beside_their_items():
         "B": here_b({"repeats": 7.0}, benefits, networks),
         "C": here_c({"poses": 20.0}, [1.0, 2.0, 0.6], [0.1, 0.2, 0.6]),
     }
-    frame = tables.check("published", pd.DataFrame(sister_rows(here))).set_index(["paper", "item"])
+    frame = check("published", pd.DataFrame(sister_rows(here))).set_index(["paper", "item"])
     known = frame["here"].dropna()
     assert known["B"].to_dict() == {
         "repeats": 7.0,

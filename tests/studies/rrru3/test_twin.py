@@ -12,6 +12,7 @@ from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
+from rrru.studies import config as parts
 from rrru.studies.rrru3 import twin, twin_search
 from rrru.studies.rrru3.paper_a import ERRORS_MM
 from tests.places import ROOT
@@ -101,7 +102,7 @@ def test_the_overlay_is_the_twin():
 def test_the_configured_twin_comes_back_and_a_refinement_is_never_worse(draws):
     root = ROOT
     config = yaml.safe_load((root / "config.yaml").read_text())
-    configured = twin.from_config(config, "paper")
+    configured = twin.from_config(parts.virtual(config, "paper"))
     assert set(configured.values) == set(twin.SEARCH_BOUNDS)
     overlay = twin.overlay(configured)
     assert overlay["virtual_robots"]["twin"]["errors"] == config["virtual_robots"]["twin"]["errors"]
@@ -112,4 +113,4 @@ def test_the_configured_twin_comes_back_and_a_refinement_is_never_worse(draws):
     assert after <= before
     config["virtual_robots"]["twin"]["errors"]["dR"] = 1.0
     with pytest.raises(ConfigError, match="dR"):
-        twin.from_config(config, "paper")
+        twin.from_config(parts.virtual(config, "paper"))

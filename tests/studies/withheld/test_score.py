@@ -13,12 +13,12 @@ from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.gap.case import State, make_case
 from rrru.robots.dynamics import Masses
-from rrru.store import tables
 from rrru.studies.withheld import draw, score
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.robots import NOISE_MM, answer, measure, nominal
 from rrru.studies.withheld.states import state_of, state_row
 from rrru.studies.withheld.summary import calibration_error, summary, wilson
+from tests.schemas import check
 
 _MECHANISM = nominal({})
 _SEED = 11
@@ -62,8 +62,8 @@ def test_a_perfect_diagnosis_gets_everything(robots):
         {"sound": (robots["sound"][2], sound), "faulty": (calibrated, perfect)},
     )
     scores, yardsticks = score.score_chunk("label", _SEED, *frames, _MECHANISM)
-    scores = tables.check("withheld_scores", scores).set_index("robot")
-    tables.check("withheld_limits", yardsticks)
+    scores = check("withheld_scores", scores).set_index("robot")
+    check("withheld_limits", yardsticks)
     assert (
         scores["right"].all()
         and scores.loc["faulty", "leg_right"] == 1.0
@@ -193,7 +193,7 @@ def test_the_summary_counts_whom_it_says():
     limit = pd.DataFrame(
         [{"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "imitated_share": 0.1} for r in scores["robot"]]
     )
-    table = tables.check("withheld_summary", summary(scores, limit)).set_index(["group", "figure"])
+    table = check("withheld_summary", summary(scores, limit)).set_index(["group", "figure"])
     expected = {
         ("one effect, gap >= 1.5 x noise", "named exactly"): (2, 0.5),
         ("nothing acts", "false alarms"): (2, 0.5),
@@ -208,7 +208,7 @@ def test_the_summary_counts_whom_it_says():
     }
     for key, (robots, value) in expected.items():
         assert table.loc[key, "robots"] == robots and np.isclose(table.loc[key, "value"], value), key
-    counts = tables.check("withheld_confusion", score.confusion(scores)).set_index(["truth", "verdict"])["robots"]
+    counts = check("withheld_confusion", score.confusion(scores)).set_index(["truth", "verdict"])["robots"]
     assert counts["backlash+servo_lag", "backlash+servo_lag"] == 1 and counts.sum() == len(scores)
 
 
@@ -226,12 +226,12 @@ def test_field_campaigns_are_scored_against_the_users_answers(tmp_path):
     verdicts = pd.DataFrame(
         [verdict | {"campaign": name, "effects": effects, "leg": leg} for name, (effects, leg) in said.items()]
     )
-    scores = tables.check("withheld_scores", score.score_field(verdicts, score.read_field_answers(path)))
+    scores = check("withheld_scores", score.score_field(verdicts, score.read_field_answers(path)))
     assert (
         scores["robot"].tolist() == ["a", "b", "c", "d"] and scores["right"].all() and scores["strength"].eq(5.0).all()
     )
     assert scores.set_index("robot").loc["b", "leg_right"] == 0.0
-    assert len(tables.check("withheld_verdicts", score.field_verdicts(verdicts))) == 5
+    assert len(check("withheld_verdicts", score.field_verdicts(verdicts))) == 5
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,9 @@ def columns(rows, prefix):
 
 @style.printed
 def ptt_path(tables, options):
-    """Every experiment's curve from above and its height: commanded, measured before and after compensation, deviations
-    magnified.
+    """The curve of every experiment from above, and its height: commanded, measured (paper B, Figs. 10 and 12) and
+    driven again with the network's correction (Fig. 18). Deviations are magnified as stated; heights count from the
+    first point's.
     """
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 88.0)
@@ -55,7 +56,9 @@ def ptt_path(tables, options):
 
 @style.printed
 def ptt_errors(tables, options):
-    """Errors along the axes before compensation and when driven again, every experiment."""
+    """Errors along the axes before compensation and when driven again (paper B, Fig. 16); heights count from the
+    first point's.
+    """
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 100.0)
     panels = figure.subplots(3, len(parts), squeeze=False, sharex=True, sharey="row")
@@ -76,8 +79,8 @@ def ptt_errors(tables, options):
 
 @style.printed
 def ptt_network(tables, options):
-    """What the chosen network leaves of the corrected positions that it was taught, every experiment, test points
-    marked.
+    """What the chosen network leaves of the corrected positions taught: its answer less theirs (paper B, Fig. 14).
+    Circles: test points.
     """
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 24.0 + 21.0 * len(parts))

@@ -14,7 +14,9 @@ _MARKS = {1: "o", 2: "s", 3: "^"}
 
 @style.printed
 def ptt_singularity(tables, options):
-    """Both singularity measures over two slices of the workspace, where kappa vanishes, and the curve."""
+    """Distance of the 3-PTT from both kinds of singularity (paper B, 2.2), at y = 0 and at half the curve's height.
+    On the line kappa, a factor of det J, vanishes. Hatched is out of reach.
+    """
     grid, points = tables["ptt_singularity"], tables["ptt_points"]
     curve = points[points["experiment"] == points["experiment"].min()].sort_values("point")
     figure = style.new(style.DOUBLE_MM, 150.0)
@@ -69,8 +71,10 @@ def _map(axes, field, kappa):
 
 @style.printed
 def ptt_backlash(tables, options):
-    """The encoder's readings less the command, the backlash per screw and load, and the repeatability with and without
-    compensation.
+    """Backlash of the screws (paper B, Figs. 7 and 8, Tables 4 to 6). (a) Encoder's reading less command while a
+    screw is turned forwards, back and forwards again, least load. (b) Backlash by eq. (19) with two standard
+    errors. (c) Scatter of the sliders per unit travel, the curve passed in both directions in turn, beside what the
+    tracker's noise alone gives.
     """
     figure = style.new(style.DOUBLE_MM, 70.0)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))

@@ -12,8 +12,12 @@ TOLERANCE_MM = 2.0
 
 @style.printed
 def fig09(tables, options):
-    """Group 1: (a) its points in the vertical plane with magnified deviations, (b) the size of the error along it."""
-    paths, calibration = tables["paths"], options["calibration_lines"]
+    """Group 1 before and after the line calibration (paper A, Fig. 9). (a) Commanded and attained points in the
+    vertical plane, deviations magnified as stated. (b) Size of the error at every point. Grey: points near a
+    constraint singularity. Where a trajectory was passed more than once, curves are means over the passes, bands
+    their range.
+    """
+    paths, calibration = tables["measurements"], options["calibration_lines"]
     name = choose.trajectories(paths, LINE_PATTERN, "fig09")[0]
     places = choose.stations(paths, name)
     after, mode = choose.after(tables, options, calibration, "fig09")
@@ -38,14 +42,17 @@ def fig09(tables, options):
 
 @style.printed
 def fig10(tables, options):
-    """Every line's error before and after the line calibration: (a) the lines in the middle, (b) the outer ones."""
+    """Every line before and after the line calibration (paper A, Fig. 10). (a) The lines in the middle, (b) the
+    outer ones. The numbers are the smallest and largest error. Grey: points near a constraint singularity. Where a
+    trajectory was passed more than once, curves are means over the passes, bands their range.
+    """
     calibration = options["calibration_lines"]
     after, mode = choose.after(tables, options, calibration, "fig10")
     curves = [
         ("before calibration", style.BEFORE, choose.before(tables, options, "fig10")),
         (choose.after_label(calibration, mode), style.LINES, after),
     ]
-    names = choose.trajectories(tables["paths"], LINE_PATTERN, "fig10")
+    names = choose.trajectories(tables["measurements"], LINE_PATTERN, "fig10")
     inner, outer = names[:3], names[3:]
     columns = 4
     rows = 1 + -(-len(outer) // columns)
@@ -66,7 +73,10 @@ def fig10(tables, options):
 
 @style.printed
 def fig12(tables, options):
-    """The lines but the first under the line calibration and under the spiral's."""
+    """The lines but the first under the line and the spiral calibration (paper A, Fig. 12). The numbers are the
+    smallest and largest error. Grey: points near a constraint singularity. Where a trajectory was passed more than
+    once, curves are means over the passes, bands their range.
+    """
     curves = []
     for calibration, look in (
         (options["calibration_lines"], style.LINES),
@@ -74,7 +84,7 @@ def fig12(tables, options):
     ):
         errors, mode = choose.after(tables, options, calibration, "fig12")
         curves.append((choose.after_label(calibration, mode), look, errors))
-    names = choose.trajectories(tables["paths"], LINE_PATTERN, "fig12")
+    names = choose.trajectories(tables["measurements"], LINE_PATTERN, "fig12")
     names = names[1:] or names
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
@@ -113,7 +123,7 @@ def _plane(axes, places, curves):
 def _error_panels(tables, cells, curves, tags, marks):
     """One panel per line with its curves and, in numbers behind their tags, their ranges."""
     for name, axes in cells:
-        places = choose.stations(tables["paths"], name)
+        places = choose.stations(tables["measurements"], name)
         ranges = [draw_along(axes, errors, places, look, label) for label, look, errors in curves]
         shade_near_singular(axes, places)
         axes.set_title(f"{marks.get(name, '')}{choose.trajectory_label(name)}{pass_note(places)}")

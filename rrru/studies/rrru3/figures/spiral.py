@@ -12,11 +12,12 @@ _COLUMNS = [f"error_{axis}_mm" for axis in _AXES]
 
 @style.printed
 def fig11(tables, options):
-    """The spiral: (a) its path with magnified deviations, (b) to (d) its error along each axis under both
-    calibrations.
+    """The spiral under both calibrations (paper A, Fig. 11). (a) Commanded and attained path, deviations magnified
+    as stated. (b) to (d) Errors along the axes, with the tolerance of the task. Grey: points near a constraint
+    singularity. Where a trajectory was passed more than once, curves are means over the passes, bands their range.
     """
-    name = _spiral(tables["paths"])
-    places = choose.stations(tables["paths"], name)
+    name = _spiral(tables["measurements"])
+    places = choose.stations(tables["measurements"], name)
     curves = []
     for calibration, look in (
         (options["calibration_lines"], style.LINES),

@@ -1,0 +1,96 @@
+"""What is told of one campaign before anything is fitted: its state, its singularities, its workspace. Lengths in mm."""
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.errors import ConfigError
+from rrru.fit.campaign_fit import select
+from rrru.fit.least_squares import least_squares
+from rrru.robots import singularity, workspace
+from rrru.robots.rrru3 import Rrru3
+
+# grid lines over the longest reach of a robot's legs
+_WORKSPACE_LINES = 130
+
+
+def noise(robot, measurements, given, use_near_singularity):
+    """Noise per axis in mm and where it is from: given, else from repeated points, else from the fit of all points.
+
+    Raises ConfigError where none of these is possible.
+    """
+    if given is not None:
+        return given, "given"
+    repeated, freedom = rows.repeat_noise(measurements)
+    if freedom >= rows.ENOUGH_REPEATS and repeated > 0.0:
+        return repeated, "repeats"
+    residuals = select(measurements, robot, ["*"], use_near_singularity)
+    if residuals is None:
+        raise ConfigError("too few usable points to estimate noise_mm; give it")
+    return least_squares(residuals).noise_mm, "residuals"
+
+
+def with_singularities(robot, measurements, margin):
+    """The measurements with points near a constraint singularity marked, and the rows of `singularity`."""
+    position, theta = rows.command(measurements), rows.actuators(measurements)
+    constraint = singularity.constraint_measure(robot, position, theta)
+    measurements = rows.mark_near_singularity(measurements, constraint, margin)
+    return measurements, measurements[["run", "trajectory", "point", "status"]].assign(
+        translational_measure=singularity.translational_measure(robot, position, theta),
+        constraint_measure=constraint,
+        constraint_determinant=singularity.constraint_determinant(robot, position, theta),
+    )
+
+
+def workspace_table(robot, measurements):
+    """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commands."""
+    height = float(rows.command(measurements)[:, 2].mean().round(-1))
+    reach = float(robot.lengths_mm[1:4].sum())
+    # the 3-RRRU's z points down from its base
+    across, down = (-reach, reach), (0.0 if isinstance(robot, Rrru3) else -reach, reach)
+    frames = []
+    for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
+        grid = workspace.slice_points(plane, at, across, vertical, reach / _WORKSPACE_LINES)
+        points = _around_reachable(robot, grid)
+        names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
+        measures = dict(zip(names, workspace.measures(robot, points), strict=True))
+        frames.append(pd.DataFrame(points, columns=["x_mm", "y_mm", "z_mm"]).assign(slice=plane, **measures))
+    return pd.concat(frames, ignore_index=True)
+
+
+def campaign_row(section, measurements, singular, noise_mm, notes, registration=None):
+    """The row of `campaigns`; noise_mm: the noise and where it is from."""
+    counts = measurements["status"].value_counts()
+    source = f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}"
+    return {
+        "robot": section["robot"],
+        "source": source,
+        "points": len(measurements),
+        "runs": measurements["run"].nunique(),
+        **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "near_singularity", "unsolved")},
+        "noise_mm": noise_mm[0],
+        "noise_from": noise_mm[1],
+        "platform_mass_kg": section.get("platform_mass_kg", np.nan),
+        "registration_rms_mm": registration.rms_mm if registration else np.nan,
+        "registration_max_mm": registration.max_mm if registration else np.nan,
+        "min_translational_measure": singular["translational_measure"].min(),
+        "min_constraint_measure": singular["constraint_measure"].min(),
+        "notes": "; ".join(notes),
+    }
+
+
+def unmatched_sets(sets, measurements):
+    """A note where calibration sets match none of the campaign's trajectories."""
+    unmatched = [name for name, patterns in sets.items() if not rows.on_trajectories(measurements, patterns).any()]
+    if not unmatched:
+        return ()
+    present = ", ".join(measurements["trajectory"].unique())
+    return (f"not calibrated on {', '.join(unmatched)}: these sets match none of the trajectories {present}",)
+
+
+def _around_reachable(robot, points):
+    """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth."""
+    reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
+    low, high = reachable.min(axis=0), reachable.max(axis=0)
+    margin = 0.1 * (high - low)
+    return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]

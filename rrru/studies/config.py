@@ -1,0 +1,96 @@
+"""Which part of the configuration a campaign needs, as plain mappings, and whether its names fit together.
+
+A workflow rule hands its script these parts and nothing else, so that a change reruns what it concerns.
+"""
+
+from pathlib import Path
+
+from rrru.errors import ConfigError
+
+
+def part(config, *keys):
+    """The configuration with nothing in it but the values under dotted keys such as "robots.rrru3"; absent ones are left out."""
+    result = {}
+    for key in keys:
+        source, target, steps = config, result, key.split(".")
+        for step in steps[:-1]:
+            source, target = source.get(step, {}), target.setdefault(step, {})
+        if steps[-1] in source:
+            target[steps[-1]] = source[steps[-1]]
+    return result
+
+
+def robot(config, section):
+    """The robot of a campaign's section: name, dimensions, and the set of parameters where the section chooses one."""
+    name = section["robot"]
+    dimensions = {**config["robots"].get(name, {}), **section.get("dimensions", {})}
+    return {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors")}
+
+
+def nominal(config, name):
+    """The robot of a campaign with the calibration's bounds."""
+    return robot(config, config["campaigns"][name]) | {"bounds": config["calibration"]["bounds"]}
+
+
+def virtual(config, name):
+    """What drives a virtual campaign: robot, trajectories, passes, motion, noise and seed; None for a measured one."""
+    section = config["campaigns"][name]
+    if "virtual" not in section:
+        return None
+    return {
+        "name": name,
+        "seed": config["seed"],
+        "robot": config["virtual_robots"][section["virtual"]],
+        "trajectories": config["trajectories"][section["trajectories"]],
+        "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
+        "motion": config["motion"],
+        "noise_mm": section["noise_mm"],
+    }
+
+
+def masses(config, section):
+    """Masses in kg, the platform's own where the campaign's section states it."""
+    loads = config["loads"]
+    return {
+        "platform_kg": section.get("platform_mass_kg", loads["platform_mass_kg"]),
+        "forearm_kg": loads["forearm_mass_kg"],
+        "arm_kg": loads["arm_mass_kg"],
+    }
+
+
+def check(config):
+    """Raise ConfigError where names in a valid configuration refer to nothing, before anything runs."""
+    for name, section in config["campaigns"].items():
+        if "virtual" in section:
+            _check_virtual(config, name, section)
+        elif not Path(section["ingest"]).is_file():
+            raise ConfigError(f"campaigns.{name}.ingest: there is no file {section['ingest']}")
+
+
+def entry(config, section, name, asked_by):
+    """config[section][name]; raises ConfigError naming who asked, the section and what exists."""
+    if name not in config[section]:
+        raise ConfigError(f"{asked_by}: {section} has no {name!r}; known: {', '.join(config[section])}")
+    return config[section][name]
+
+
+def _check_virtual(config, name, section):
+    """Raise ConfigError where a virtual campaign's robot, trajectories or passes name nothing that exists."""
+    entry(config, "virtual_robots", section["virtual"], f"campaigns.{name}")
+    known = trajectory_names(entry(config, "trajectories", section["trajectories"], f"campaigns.{name}"))
+    for one in section.get("passes", []):
+        for wanted in one.get("trajectories", []):
+            if wanted not in known:
+                raise ConfigError(f"campaigns.{name}.passes: no trajectory {wanted!r}; known: {', '.join(known)}")
+
+
+def trajectory_names(section):
+    """Names of the trajectories of a `trajectories:` entry."""
+    from rrru.campaign import trajectories
+
+    return [trajectory.name for trajectory in trajectories.from_config(section)]
+
+
+def z_down(section):
+    """Whether the frame of a campaign's robot has its z pointing down."""
+    return section["robot"] == "rrru3"

@@ -1,0 +1,43 @@
+"""`results/README.md`: every table and column in words. `python -m rrru.studies.glossary` writes it from the schemas."""
+
+import importlib
+import pkgutil
+from pathlib import Path
+
+import rrru
+
+_HEAD = """# What a run writes
+
+`tables/` holds the tables of the whole study, `campaigns/` each campaign's own parts of them, `figures/` every figure as PDF and PNG,
+`timings/` wall times (the only files whose bytes differ from run to run), `logs/` one log per job, `sweep/` the parts of the sweeps.
+Lengths are in mm and angles in rad unless a column's name says otherwise. This page is made from the `schemas.py` beside each package.
+"""
+
+
+def tables():
+    """All tables by name, out of every module of the package that is called `schemas`."""
+    modules = [m.name for m in pkgutil.walk_packages(rrru.__path__, "rrru.") if m.name.endswith(".schemas")]
+    return {table.name: table for name in sorted(modules) for table in importlib.import_module(name).TABLES}
+
+
+def text():
+    """The glossary as Markdown."""
+    parts = [_HEAD]
+    for table in tables().values():
+        key = ", ".join(table.key)
+        parts.append(f"## {table.name}\n\n`{table.path}`. {table.description} A row is named by: {key}.\n")
+        parts.append(
+            "\n".join(["| column | type | meaning |", "| --- | --- | --- |", *map(_row, table.columns)]) + "\n"
+        )
+    return "\n".join(parts)
+
+
+def _row(column):
+    """One column as a row of Markdown."""
+    kind = column.kind + (", null allowed" if column.nullable else "")
+    values = f" ({', '.join(column.allowed)})" if column.allowed else ""
+    return f"| `{column.name}` | {kind} | {column.description}{values} |"
+
+
+if __name__ == "__main__":
+    (Path(__file__).resolve().parents[2] / "results" / "README.md").write_text(text())

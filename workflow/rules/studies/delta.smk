@@ -1,0 +1,110 @@
+from rrru.studies.delta import twin as delta_twin
+
+# refuses commands out of reach before anything runs
+delta_twin.twin(config)
+
+DELTA_IMAGE_TABLES = ["delta_centres", "delta_dots", "delta_picture"]
+DELTA_TABLES = [
+    "delta_camera",
+    "delta_poses",
+    "delta_calibrations",
+    "delta_observability",
+    "delta_draws",
+    "delta_points",
+    "delta_robots",
+]
+_DELTA = "rrru.studies.delta.figures"
+DELTA_FIGURES = {
+    "delta_images": (f"{_DELTA}:delta_images", ["delta_picture", "delta_dots", "delta_poses", "delta_centres"]),
+    "delta_errors": (f"{_DELTA}:delta_errors", ["delta_points", "delta_calibrations", "delta_draws"]),
+    "delta_observability": (f"{_DELTA}:delta_observability", ["delta_observability"]),
+}
+
+
+def delta_part(name):
+    """Path of a table that one step hands to the next."""
+    return f"{RESULTS}/delta/{name}.parquet"
+
+
+rule delta_images:
+    output:
+        images=f"{RESULTS}/delta/images.npz",
+        delta_truth=delta_part("truth"),
+    log:
+        f"{RESULTS}/logs/delta_images.log",
+    params:
+        settings=reads("seed", "robots.delta", "delta"),
+        code=code("delta_images"),
+    script:
+        "../../scripts/delta_images.py"
+
+
+# it sees the images and the commands, never the truth
+rule delta_vision:
+    input:
+        images=f"{RESULTS}/delta/images.npz",
+    output:
+        **named(DELTA_IMAGE_TABLES),
+        delta_lens=delta_part("lens"),
+        delta_timings=f"{RESULTS}/timings/delta/steps.parquet",
+    log:
+        f"{RESULTS}/logs/delta_vision.log",
+    params:
+        settings=reads("seed", "robots.delta", "delta"),
+        code=code("delta_vision"),
+    script:
+        "../../scripts/delta_vision.py"
+
+
+rule delta_calibrate:
+    input:
+        delta_lens=delta_part("lens"),
+        delta_truth=delta_part("truth"),
+        **named(["delta_centres", "delta_dots"]),
+    output:
+        **named(DELTA_TABLES),
+    log:
+        f"{RESULTS}/logs/delta_calibrate.log",
+    params:
+        settings=reads("seed", "robots.delta", "delta"),
+        code=code("delta_calibrate"),
+    script:
+        "../../scripts/delta_calibrate.py"
+
+
+rule delta_twin:
+    input:
+        delta_dots=table("delta_dots"),
+        delta_truth=delta_part("truth"),
+    output:
+        twin=f"{RESULTS}/twin/delta.yaml",
+    log:
+        f"{RESULTS}/logs/delta_twin.log",
+    params:
+        settings=reads("seed", "robots.delta", "delta"),
+        code=code("delta_twin"),
+    script:
+        "../../scripts/delta_twin.py"
+
+
+rule delta_figures:
+    input:
+        **named(shown(DELTA_FIGURES)),
+    output:
+        **drawn(DELTA_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/delta.log",
+    params:
+        settings={"figures": DELTA_FIGURES, "options": {}},
+        code=code("figure", DELTA_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+rule delta:
+    input:
+        named([*DELTA_IMAGE_TABLES, *DELTA_TABLES]).values(),
+        drawn(DELTA_FIGURES).values(),
+
+
+TARGETS += rules.delta.input

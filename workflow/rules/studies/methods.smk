@@ -1,0 +1,75 @@
+METHOD_TABLES = ["methods", "method_points"]
+METHOD_ROBOTS = sorted(config["methods"]["regions"])
+METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TABLES)}
+
+
+def method_part(name, robot="{robot}"):
+    """Path of one robot's part of a table of the comparison."""
+    return f"{RESULTS}/methods/{robot}/{name}.parquet"
+
+
+# the Delta is also given what its images have shown
+rule compare_methods:
+    input:
+        calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],
+    output:
+        **named(METHOD_TABLES, method_part),
+        method_timings=f"{RESULTS}/timings/methods_{{robot}}.parquet",
+    log:
+        f"{RESULTS}/logs/methods/{{robot}}.log",
+    wildcard_constraints:
+        robot="|".join(METHOD_ROBOTS),
+    params:
+        settings=lambda wildcards: {
+            "robot": wildcards.robot,
+            **reads(
+                "seed",
+                "robots",
+                "motion",
+                "trajectories",
+                "virtual_robots",
+                "campaigns",
+                "calibration",
+                "genetic",
+                "reproduce",
+                "loads",
+                "ptt",
+                "delta",
+                "methods",
+            ),
+        },
+        code=code("methods"),
+    script:
+        "../../scripts/methods.py"
+
+
+use rule gather as gather_methods with:
+    input:
+        **{name: [method_part(name, robot) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
+    output:
+        **named(METHOD_TABLES),
+    log:
+        f"{RESULTS}/logs/gather_methods.log",
+
+
+rule method_figures:
+    input:
+        **named(shown(METHOD_FIGURES)),
+    output:
+        **drawn(METHOD_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/methods.log",
+    params:
+        settings={"figures": METHOD_FIGURES, "options": {}},
+        code=code("figure", METHOD_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+rule methods:
+    input:
+        named(METHOD_TABLES).values(),
+        drawn(METHOD_FIGURES).values(),
+
+
+TARGETS += rules.methods.input

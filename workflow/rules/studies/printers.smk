@@ -1,0 +1,46 @@
+from pathlib import Path
+
+from rrru.errors import ConfigError
+
+PRINTER_TABLES = ["printers", "printer_parameters", "printer_readings", "printer_causes"]
+PRINTER_FIGURES = {"printers": ("rrru.studies.printers.figures:printers", ["printers"])}
+
+if not Path(config["printers"]["file"]).is_file():
+    raise ConfigError(f"printers.file: there is no file {config['printers']['file']}")
+
+
+rule calibrate_printers:
+    input:
+        file=config["printers"]["file"],
+    output:
+        **named(PRINTER_TABLES),
+    log:
+        f"{RESULTS}/logs/printers.log",
+    params:
+        settings=reads("printers.stopping_step", "printers.level", "printers.imitated_from"),
+        code=code("printers"),
+    script:
+        "../../scripts/printers.py"
+
+
+rule printer_figures:
+    input:
+        **named(shown(PRINTER_FIGURES)),
+    output:
+        **drawn(PRINTER_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/printers.log",
+    params:
+        settings={"figures": PRINTER_FIGURES, "options": {}},
+        code=code("figure", PRINTER_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+rule printers:
+    input:
+        named(PRINTER_TABLES).values(),
+        drawn(PRINTER_FIGURES).values(),
+
+
+TARGETS += rules.printers.input

@@ -1,0 +1,102 @@
+from rrru.studies.ptt3 import experiments as ptt_experiments
+
+ptt_experiments.check(config)
+
+PTT_EXPERIMENTS = sorted(config["ptt"]["experiments"])
+# experiments that are diagnosed together, as one campaign
+PTT_JOINT = sorted(config["ptt"]["joint"])
+PTT_BENCH_TABLES = ["ptt_kinematics", "ptt_singularity", "ptt_encoder", "ptt_backlash", "ptt_repeatability"]
+PTT_STUDY_TABLES = [
+    "ptt_points",
+    "ptt_benefit",
+    "ptt_start",
+    "ptt_training",
+    "ptt_spread",
+    "ptt_corrections",
+    "ptt_extrapolation",
+]
+_PTT = "rrru.studies.ptt3.figures"
+PTT_FIGURES = {
+    "ptt_singularity": (f"{_PTT}.robot:ptt_singularity", ["ptt_singularity", "ptt_points"]),
+    "ptt_backlash": (f"{_PTT}.robot:ptt_backlash", ["ptt_encoder", "ptt_backlash", "ptt_repeatability"]),
+    "ptt_path": (f"{_PTT}.paths:ptt_path", ["ptt_points"]),
+    "ptt_errors": (f"{_PTT}.paths:ptt_errors", ["ptt_points"]),
+    "ptt_network": (f"{_PTT}.paths:ptt_network", ["ptt_points"]),
+    "ptt_training": (f"{_PTT}.learning:ptt_training", ["ptt_training", "ptt_spread"]),
+    "ptt_corrections": (f"{_PTT}.learning:ptt_corrections", ["ptt_corrections"]),
+    "ptt_benefit": (f"{_PTT}.learning:ptt_benefit", ["ptt_benefit", "ptt_start"]),
+    "ptt_extrapolation": (f"{_PTT}.learning:ptt_extrapolation", ["ptt_extrapolation"]),
+}
+# they are diagnosed as every campaign is
+DIAGNOSED |= {
+    name: {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
+    for name in (*PTT_EXPERIMENTS, *PTT_JOINT)
+}
+
+
+rule ptt_bench:
+    output:
+        **named(PTT_BENCH_TABLES),
+    log:
+        f"{RESULTS}/logs/ptt_bench.log",
+    params:
+        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
+        code=code("ptt_bench"),
+    script:
+        "../../scripts/ptt_bench.py"
+
+
+# measured and, where experiments are diagnosed together, also as one campaign
+rule ptt_measure:
+    input:
+        backlash=table("ptt_backlash"),
+    output:
+        **{name: part("measurements", name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)},
+    log:
+        f"{RESULTS}/logs/ptt_measure.log",
+    params:
+        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
+        code=code("ptt_measure"),
+    script:
+        "../../scripts/ptt_measure.py"
+
+
+# one job: starting five takes longer than what they do
+rule ptt_compensate:
+    input:
+        **{name: part("measurements", name) for name in PTT_EXPERIMENTS},
+        backlash=table("ptt_backlash"),
+    output:
+        **named(PTT_STUDY_TABLES),
+    log:
+        f"{RESULTS}/logs/ptt_compensate.log",
+    params:
+        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
+        code=code("ptt_compensate"),
+    script:
+        "../../scripts/ptt_compensate.py"
+
+
+rule ptt_figures:
+    input:
+        **named(shown(PTT_FIGURES)),
+    output:
+        **drawn(PTT_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/ptt.log",
+    params:
+        settings={"figures": PTT_FIGURES, "options": {}},
+        code=code("figure", PTT_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+rule ptt:
+    input:
+        named([*PTT_BENCH_TABLES, *PTT_STUDY_TABLES]).values(),
+        drawn(PTT_FIGURES).values(),
+        # their figures are of `gap`
+        [part("gap_verdicts", name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)],
+
+
+TARGETS += rules.ptt.input

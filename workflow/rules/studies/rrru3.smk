@@ -1,0 +1,170 @@
+SWEPT = ["crossover_fraction", "migration_fraction"]
+SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
+REPRODUCED = config["reproduce"]["campaign"]
+_SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations", "published"]
+_PAPER_A = "rrru.studies.rrru3.figures"
+PAPER_A_FIGURES = {
+    "fig06": (f"{_PAPER_A}.sweep:fig06", _SWEEP_SHOWN),
+    "fig07": (f"{_PAPER_A}.sweep:fig07", _SWEEP_SHOWN),
+    "fig09": (f"{_PAPER_A}.lines:fig09", ["measurements", "errors"]),
+    "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors"]),
+    "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors"]),
+    "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors"]),
+}
+# figures that every campaign gets, the reproduced one in figures/ itself
+CAMPAIGN_FIGURES = {
+    "workspace": ("rrru.figures.workspace:workspace", ["workspace", "singularity", "measurements"]),
+    "observability": ("rrru.figures.observability:observability", ["observability"]),
+    "convergence": ("rrru.figures.convergence:convergence", ["genetic_history", "genetic"]),
+    "cross": ("rrru.figures.cross:cross", ["error_summary"]),
+}
+
+
+def figure_options(campaign):
+    """What the figures of a campaign show."""
+    reproduce = config["reproduce"]
+    return {
+        "campaign": campaign,
+        "z_down": parts.z_down(config["campaigns"][campaign]),
+        "calibration_lines": reproduce["line_calibration"],
+        "calibration_spiral": reproduce["spiral_calibration"],
+        "sweep_campaign": REPRODUCED,
+        "sweep_calibration": reproduce["line_calibration"],
+        "method": reproduce["method"],
+        "mode": "closed_loop",
+    }
+
+
+def sweep_part(name, parameter="{parameter}", population="{population}"):
+    """Path of one sweep's part of a table."""
+    return f"{RESULTS}/sweep/{parameter}/{population}/{name}.parquet"
+
+
+# all values and seeds of one swept setting
+rule sweep:
+    input:
+        measurements=part("measurements", REPRODUCED),
+    output:
+        **named(["sweep_runs", "sweep_history"], sweep_part),
+    log:
+        f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}.log",
+    wildcard_constraints:
+        parameter="|".join(SWEPT),
+        population="|".join(config["sweep"]["populations"]),
+    params:
+        settings=lambda wildcards: {
+            **wildcards,
+            "nominal": parts.nominal(config, REPRODUCED),
+            "patterns": config["calibration"]["sets"][config["reproduce"]["line_calibration"]],
+            **reads("seed", "genetic", "sweep", "calibration.use_near_singularity"),
+        },
+        code=code("sweep"),
+    script:
+        "../../scripts/sweep.py"
+
+
+rule sweep_tables:
+    input:
+        **{
+            name: expand(sweep_part(name), parameter=SWEPT, population=sorted(config["sweep"]["populations"]))
+            for name in ("sweep_runs", "sweep_history")
+        },
+    output:
+        **named(SWEEP_TABLES),
+    log:
+        f"{RESULTS}/logs/sweep_tables.log",
+    params:
+        settings=reads("seed"),
+        code=code("sweep_tables"),
+    script:
+        "../../scripts/sweep_tables.py"
+
+
+rule published:
+    input:
+        **named(["errors", "calibrations", "parameters", "genetic", "sweep_runs"]),
+        **named(["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"]),
+        **named(["delta_points", "delta_camera", "delta_draws"]),
+    output:
+        **named(["published", "audit"]),
+    log:
+        f"{RESULTS}/logs/published.log",
+    params:
+        settings=reads(
+            "seed",
+            "robots",
+            "motion",
+            "trajectories",
+            "virtual_robots",
+            "campaigns",
+            "calibration",
+            "genetic",
+            "reproduce",
+            "ptt",
+            "delta",
+        ),
+        code=code("published"),
+    script:
+        "../../scripts/published.py"
+
+
+rule twin:
+    output:
+        twin=f"{RESULTS}/twin/twin.yaml",
+    log:
+        f"{RESULTS}/logs/twin.log",
+    threads: 2
+    params:
+        settings={
+            "nominal": parts.nominal(config, REPRODUCED),
+            "virtual": parts.virtual(config, REPRODUCED),
+            "workers": 2,
+            **reads("reproduce.line_calibration", "twin"),
+        },
+        code=code("twin"),
+    script:
+        "../../scripts/twin.py"
+
+
+rule paper_a_figures:
+    input:
+        **named({*shown(PAPER_A_FIGURES), *shown(CAMPAIGN_FIGURES)} - {"measurements", "workspace"}),
+        **named(["measurements", "workspace"], lambda name: part(name, REPRODUCED)),
+    output:
+        **drawn(PAPER_A_FIGURES | CAMPAIGN_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/paper_a.log",
+    params:
+        settings={"figures": PAPER_A_FIGURES | CAMPAIGN_FIGURES, "options": figure_options(REPRODUCED)},
+        code=code("figure", PAPER_A_FIGURES, CAMPAIGN_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+rule campaign_figures:
+    input:
+        **named(shown(CAMPAIGN_FIGURES), part),
+    output:
+        **drawn(CAMPAIGN_FIGURES, "figures/{campaign}"),
+    log:
+        f"{RESULTS}/logs/figures/{{campaign}}.log",
+    wildcard_constraints:
+        campaign="|".join(CAMPAIGNS),
+    params:
+        settings=lambda wildcards: {
+            "figures": CAMPAIGN_FIGURES,
+            "options": figure_options(wildcards.campaign),
+        },
+        code=code("figure", CAMPAIGN_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+# the 3-RRRU's
+rule figures:
+    input:
+        drawn(PAPER_A_FIGURES | CAMPAIGN_FIGURES).values(),
+        [drawn(CAMPAIGN_FIGURES, f"figures/{name}").values() for name in CAMPAIGNS if name != REPRODUCED],
+
+
+TARGETS += [*named([*SWEEP_TABLES, "published", "audit"]).values(), *rules.figures.input]

@@ -1,0 +1,127 @@
+from rrru.studies.withheld.chunks import check as check_withheld, chunks
+
+check_withheld(config)
+WITHHELD = chunks(config["withheld"])
+WITHHELD_TABLES = [
+    "withheld_verdicts",
+    "withheld_scores",
+    "withheld_limits",
+    "withheld_summary",
+    "withheld_confusion",
+]
+WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
+
+
+wildcard_constraints:
+    chunk="|".join(WITHHELD) or "none",
+
+
+def withheld_part(name, chunk="{chunk}"):
+    """Path of a chunk's part of a table."""
+    return f"{RESULTS}/withheld/{name.removeprefix('withheld_')}/{chunk}.parquet"
+
+
+def withheld_settings(*keys):
+    """What a rule about a chunk of robots reads: which robots, and the configuration under dotted keys."""
+
+    def settings(wildcards):
+        chunk = WITHHELD[wildcards.chunk]
+        robots = {"check": chunk.check, "effect": chunk.effect, "first": chunk.first, "end": chunk.end}
+        return {**robots, **reads(*keys)}
+
+    return settings
+
+
+rule withheld_answers:
+    output:
+        **named(["withheld_answers"], withheld_part),
+    log:
+        f"{RESULTS}/logs/withheld_answers/{{chunk}}.log",
+    params:
+        settings=withheld_settings("seed", "robots"),
+        code=code("withheld_answers"),
+    script:
+        "../../scripts/withheld_answers.py"
+
+
+rule withheld_measure:
+    input:
+        **named(["withheld_answers"], withheld_part),
+    output:
+        **named(["withheld_measurements"], withheld_part),
+    log:
+        f"{RESULTS}/logs/withheld_measure/{{chunk}}.log",
+    params:
+        settings=reads("seed", "robots"),
+        code=code("withheld_measure"),
+    script:
+        "../../scripts/withheld_measure.py"
+
+
+# it sees the measurements and which effect its library lacks, never an answer
+rule withheld_diagnose:
+    input:
+        **named(["withheld_measurements"], withheld_part),
+    output:
+        **named(["withheld_verdicts", "withheld_states"], withheld_part),
+    log:
+        f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
+    params:
+        settings=lambda wildcards: {"effect": WITHHELD[wildcards.chunk].effect, **reads("seed", "robots", "gap")},
+        code=code("withheld_diagnose"),
+    script:
+        "../../scripts/withheld_diagnose.py"
+
+
+rule withheld_score:
+    input:
+        **named(["withheld_answers", "withheld_measurements", "withheld_verdicts", "withheld_states"], withheld_part),
+    output:
+        **named(["withheld_scores", "withheld_limits"], withheld_part),
+    log:
+        f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
+    params:
+        settings=lambda wildcards: {"check": WITHHELD[wildcards.chunk].check, **reads("seed", "robots", "gap")},
+        code=code("withheld_score"),
+    script:
+        "../../scripts/withheld_score.py"
+
+
+rule withheld_summary:
+    input:
+        **{
+            name: [withheld_part(name, chunk) for chunk in WITHHELD]
+            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits")
+        },
+        field=[part("gap_verdicts", campaign) for campaign in config["withheld"]["field"]],
+        field_answers=config["withheld"]["field_answers"] or [],
+    output:
+        **named(WITHHELD_TABLES),
+    log:
+        f"{RESULTS}/logs/withheld_summary.log",
+    params:
+        settings={},
+        code=code("withheld_summary"),
+    script:
+        "../../scripts/withheld_summary.py"
+
+
+rule withheld_figures:
+    input:
+        **named(shown(WITHHELD_FIGURES)),
+    output:
+        **drawn(WITHHELD_FIGURES),
+    log:
+        f"{RESULTS}/logs/figures/withheld.log",
+    params:
+        settings={"figures": WITHHELD_FIGURES, "options": {}},
+        code=code("figure", WITHHELD_FIGURES),
+    script:
+        "../../scripts/figure.py"
+
+
+# not part of the default run
+rule withheld:
+    input:
+        named(WITHHELD_TABLES).values(),
+        drawn(WITHHELD_FIGURES).values(),
