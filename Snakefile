@@ -11,9 +11,9 @@ configfile: "config.yaml"
 validate(config, "workflow/schemas/config.schema.yaml")
 
 
-include: "workflow/rules/common.smk"
-include: "workflow/rules/campaign.smk"
-include: "workflow/rules/calibrate.smk"
+include: "workflow/rules/pipeline/common.smk"
+include: "workflow/rules/pipeline/campaign.smk"
+include: "workflow/rules/pipeline/calibrate.smk"
 
 
 # a study is its rules here, its folder in rrru/studies and its section of the configuration
@@ -22,7 +22,7 @@ for study in sorted(Path(workflow.basedir, "workflow/rules/studies").glob("*.smk
     include: study
 
 
-include: "workflow/rules/gap.smk"
+include: "workflow/rules/pipeline/gap.smk"
 
 
 rule all:

@@ -15,22 +15,6 @@ _INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points",
 def mechanism(nominal, parameter_set=None):
     """The nominal robot with a set of parameters: the given one, the campaign's, or what tracked positions identify.
 
-<<<<<<< HEAD
-
-def mechanism(config, campaign, parameter_set=None):
-    """The nominal robot of a campaign with the configuration's bounds and the chosen error parameters, by default the
-    identifiable ones.
-    """
-    section, bounds = config["campaigns"][campaign], config["calibration"]["bounds"]
-    name = section["robot"]
-    return make_mechanism(
-        name,
-        {**config["robots"].get(name, {}), **section.get("dimensions", {})},
-        parameter_set=parameter_set or MECHANISMS[name].TRACKED,
-        angle_limit_rad=bounds["angle_rad"],
-        length_limit_mm=bounds["length_mm"],
-    )
-=======
     Its bounds are the robot's own where the part has none.
     """
     name = nominal["name"]
@@ -40,7 +24,6 @@ def mechanism(config, campaign, parameter_set=None):
         limits = {"angle_limit_rad": bounds["angle_rad"], "length_limit_mm": bounds["length_mm"]}
     chosen = parameter_set or nominal.get("parameter_set") or MECHANISMS[name].TRACKED
     return make_mechanism(name, nominal["dimensions"], parameter_set=chosen, **limits)
->>>>>>> be31a50 (workflow: what a rule reads and runs is handed over, and its code digest is its import closure; figures in one job a study)
 
 
 @dataclass(frozen=True)

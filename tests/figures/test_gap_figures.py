@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
-from rrru.figures.catalogue import FIGURES
 from scipy.stats import binomtest
 
 from rrru.errors import ConfigError
@@ -15,6 +14,7 @@ from rrru.store import tables
 from rrru.studies.withheld import figures as withheld
 from tests.figures import synthetic_gap as made_up
 from tests.figures import synthetic_tables as synthetic
+from tests.figures.catalogue import FIGURES
 from tests.schemas import TABLES
 
 GROUND = synthetic.commanded(names=("line_1", "line_2", "spiral"), passes=2)
@@ -26,7 +26,7 @@ def frames():
 
 
 def draw(name, frames):
-    function, needed, _ = FIGURES[name]
+    function, needed = FIGURES[name]
     figure = function({table: frames[table] for table in needed}, synthetic.OPTIONS)
     figure.draw_without_rendering()
     return figure

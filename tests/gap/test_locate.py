@@ -161,15 +161,8 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
 
 @pytest.fixture(scope="module")
 def identified(case):
-<<<<<<< HEAD
     plain = case.linearise(State(calibrate(case).deviations, {}))
-    return plain, tables.check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index(
-        "effect"
-    )
-=======
-    plain = case.linearise(State(calibrate(case).errors, {}))
     return plain, check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index("effect")
->>>>>>> be31a50 (workflow: what a rule reads and runs is handed over, and its code digest is its import closure; figures in one job a study)
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from rrru.figures.catalogue import FIGURES
 
 from rrru.errors import ConfigError
+from tests.figures.catalogue import FIGURES
 from tests.studies.printers.synthetic_printers import printers
 
 

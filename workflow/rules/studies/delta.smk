@@ -58,9 +58,9 @@ rule delta_vision:
 
 rule delta_calibrate:
     input:
+        **named(["delta_centres", "delta_dots"]),
         delta_lens=delta_part("lens"),
         delta_truth=delta_part("truth"),
-        **named(["delta_centres", "delta_dots"]),
     output:
         **named(DELTA_TABLES),
     log:

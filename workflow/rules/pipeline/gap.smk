@@ -51,7 +51,7 @@ rule diagnose:
         own_effects=own_effects(),
         code=code("diagnose"),
     script:
-        "../scripts/diagnose.py"
+        "../../scripts/diagnose.py"
 
 
 rule gap_figure:
@@ -68,7 +68,7 @@ rule gap_figure:
         },
         code=code("figure", GAP_FIGURE),
     script:
-        "../scripts/figure.py"
+        "../../scripts/figure.py"
 
 
 use rule gather as gather_gap with:

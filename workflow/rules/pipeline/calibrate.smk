@@ -24,10 +24,12 @@ rule calibrate:
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
-        settings=calibrated(*(f"calibration.{key}" for key in ("sets", "loss", "loss_scale_mm", "use_near_singularity"))),
+        settings=calibrated(
+            *(f"calibration.{key}" for key in ("sets", "loss", "loss_scale_mm", "use_near_singularity"))
+        ),
         code=code("calibrate"),
     script:
-        "../scripts/calibrate.py"
+        "../../scripts/calibrate.py"
 
 
 rule genetic:
@@ -42,7 +44,7 @@ rule genetic:
         settings=calibrated("seed", "genetic", "calibration.sets", "calibration.use_near_singularity"),
         code=code("genetic"),
     script:
-        "../scripts/genetic.py"
+        "../../scripts/genetic.py"
 
 
 # every calibration applied to every trajectory
@@ -57,7 +59,7 @@ rule compensate:
         settings=calibrated(),
         code=code("compensate"),
     script:
-        "../scripts/compensate.py"
+        "../../scripts/compensate.py"
 
 
 rule gather:
@@ -71,4 +73,4 @@ rule gather:
         settings={},
         code=code("gather"),
     script:
-        "../scripts/gather.py"
+        "../../scripts/gather.py"

@@ -31,4 +31,4 @@ rule campaign:
         settings=campaign_settings,
         code=code("campaign"),
     script:
-        "../scripts/campaign.py"
+        "../../scripts/campaign.py"
