@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.campaign.ingest.columns import COMMAND, MEASURED
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED
 
 _LEAST_POINTS = 3
 # A file that prints coarser than this gives the same position twice by chance.
@@ -16,19 +16,17 @@ def number_runs(frame):
     a `point`, where the commanded path turns back on itself or starts again. Without a `point` they are counted within
     the run.
     """
-    notes = []
-    frame = frame.copy()
+    frame, notes, numbered = frame.copy(), [], "point" in frame
     if "run" not in frame:
         change = (frame["trajectory"] != frame["trajectory"].shift()).to_numpy()
-        change = change | (
-            (frame["point"].diff() < 0).to_numpy() if "point" in frame else _turns(frame[[*COMMAND]].to_numpy(), change)
+        again = (
+            (frame["point"].diff() < 0).to_numpy() if numbered else _turns_back(frame[[*COMMAND]].to_numpy(), change)
         )
-        frame["run"] = change.cumsum().astype(float)
-        where = "the point's number falls" if "point" in frame else "the commanded path turns back or starts again"
-        notes.append(
-            f"no column run: a new run wherever the trajectory's name changes or {where}, {int(frame['run'].max())} runs"
-        )
-    if "point" not in frame:
+        frame["run"] = (change | again).cumsum().astype(float)
+        where = "the point's number falls" if numbered else "the commanded path turns back or starts again"
+        runs = int(frame["run"].max())
+        notes.append(f"no column run: a new run wherever the trajectory's name changes or {where}, {runs} runs")
+    if not numbered:
         frame["point"] = frame.groupby("run").cumcount().astype(float) + 1.0
         notes.append("no column point: counted within the run")
     return frame, notes
@@ -41,10 +39,8 @@ def path_length(command):
     return np.concatenate([[0.0], np.cumsum(np.maximum(step, least))])
 
 
-def _turns(command, change):
-    """Rows (n,) where the path of commanded positions (n, 3) turns back or starts again within what `change` (n,) sets
-    apart.
-    """
+def _turns_back(command, change):
+    """Rows (n,) where positions (n, 3) turn back or start again within what `change` (n,) sets apart."""
     result = np.zeros(len(command), dtype=bool)
     last, begun = None, 0
     for i in range(1, len(command)):
@@ -64,21 +60,6 @@ def _turns(command, change):
     return result
 
 
-def check_runs(frame, found, parameter_count, resolution_mm, problems):
-    """Note rows that do not make sense as runs.
-
-    frame: index row number, columns under our names, NaN where a cell has been noted already; found: {our name: the
-    file's name}; parameter_count: numbers that a calibration fits; resolution_mm: last digit of the file's positions.
-    """
-    names = {ours: found.get(ours, ours) for ours in frame}
-    _check_repeats(frame, names, problems)
-    _check_order(frame, names, problems)
-    _check_copies(frame, names, resolution_mm, problems)
-    _check_counts(frame, names, parameter_count, problems)
-    if "time_s" in frame:
-        _check_time(frame, names, problems)
-
-
 def resolution(position):
     """Last digit of positions (n, 3) as the file has them: 0.001 for three decimals."""
     known = position[np.isfinite(position)]
@@ -87,107 +68,93 @@ def resolution(position):
     )
 
 
-def _check_repeats(frame, names, problems):
+def check_runs(sheet, digit_mm):
+    """Note rows that do not make sense as runs; digit_mm: last digit of the file's positions."""
+    _check_repeats(sheet)
+    _check_order(sheet)
+    _check_copies(sheet, digit_mm)
+    _check_counts(sheet)
+    if "time_s" in sheet.frame:
+        _check_time(sheet)
+
+
+def _first_alike(frame, columns):
+    """The first row (n,) with the same values as each row in some columns."""
+    return frame.index.to_series().groupby([frame[name] for name in columns]).transform("first")
+
+
+def _falls(frame, where):
+    """The flagged rows (n,) of a frame: their number, the row itself and the one before."""
+    for i in np.flatnonzero(where):
+        yield frame.index[i], frame.iloc[i], frame.iloc[i - 1]
+
+
+def _check_repeats(sheet):
     """Note points that stand twice, by number and run."""
-    known = frame.dropna(subset=["run", "point"])
-    first = {}
-    for row, run, point in zip(known.index, known["run"], known["point"], strict=True):
-        if (run, point) in first:
-            value = f"run {run:g}, point {point:g}, as in row {first[run, point]}"
-            problems.add(
-                "repeated point",
-                row=row,
-                column=f"{names['run']}, {names['point']}",
-                value=value,
-                allowed="each point of a run once",
-            )
-        first.setdefault((run, point), row)
+    known = sheet.frame.dropna(subset=["run", "point"])
+    first = _first_alike(known, ("run", "point"))
+    for row, run, point in known.loc[first != known.index, ["run", "point"]].itertuples():
+        value = f"run {run:g}, point {point:g}, as in row {first[row]}"
+        sheet.note("repeated point", ("run", "point"), value, "each point of a run once", row)
 
 
-def _check_order(frame, names, problems):
+def _check_order(sheet):
     """Note runs and points that go back, and runs over two trajectories: the rows stand in the order driven."""
-    known = frame.dropna(subset=["run", "point"])
-    run, point, row = known["run"].to_numpy(), known["point"].to_numpy(), known.index.to_numpy()
-    for i in np.flatnonzero(np.diff(run) < 0) + 1:
-        value = f"run {run[i]:g} after run {run[i - 1]:g}"
-        problems.add(
-            "order of runs",
-            row=row[i],
-            column=names["run"],
-            value=value,
-            allowed="runs numbered and listed in the order driven",
-        )
-    for i in np.flatnonzero((np.diff(point) < 0) & (np.diff(run) == 0)) + 1:
-        value = f"point {point[i]:g} after point {point[i - 1]:g}"
+    known = sheet.frame.dropna(subset=["run", "point"])
+    for row, now, before in _falls(known, known["run"].diff() < 0):
+        allowed = "runs numbered and listed in the order driven"
+        sheet.note("order of runs", "run", f"run {now['run']:g} after run {before['run']:g}", allowed, row)
+    for row, now, before in _falls(known, (known["point"].diff() < 0) & (known["run"].diff() == 0)):
         allowed = "points numbered and listed in the order driven; without the column they are counted"
-        problems.add("order of points", row=row[i], column=names["point"], value=value, allowed=allowed)
+        sheet.note("order of points", "point", f"point {now['point']:g} after point {before['point']:g}", allowed, row)
     for number, name in known[known["trajectory"] != ""].groupby("run")["trajectory"]:
         other = name[name != name.iloc[0]]
         if len(other):
             value = f"{other.iloc[0]} in run {number:g}, which began with {name.iloc[0]}"
-            problems.add(
-                "two trajectories",
-                row=other.index[0],
-                column=names["trajectory"],
-                value=value,
-                allowed="one trajectory per run",
-            )
+            sheet.note("two trajectories", "trajectory", value, "one trajectory per run", other.index[0])
 
 
-def _check_copies(frame, names, resolution_mm, problems):
-    """Note rows that repeat a measured position to the last digit; at the same command only where the file is fine
-    enough to tell.
-    """
-    known = frame.dropna(subset=[*COMMAND, *MEASURED])
-    first = {}
-    for row, measured, command in zip(
-        known.index, known[[*MEASURED]].to_numpy(), known[[*COMMAND]].to_numpy(), strict=True
-    ):
-        key = tuple(measured)
-        before = first.setdefault(key, (row, command))
-        if before[0] != row and (resolution_mm < _COARSE_MM or not np.array_equal(before[1], command)):
-            problems.add(
-                "copied row",
-                row=row,
-                column=", ".join(names[name] for name in MEASURED),
-                value=f"({', '.join(f'{value:.10g}' for value in key)}) mm, exactly as in row {before[0]}",
-                allowed="each measurement once: an instrument does not repeat every digit",
-            )
+def _check_copies(sheet, digit_mm):
+    """Note rows that repeat a measured position; at the same command only where the file is fine enough to tell."""
+    known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
+    first, command = _first_alike(known, MEASURED), known[[*COMMAND]]
+    elsewhere = (command.to_numpy() != command.loc[first].to_numpy()).any(axis=1)
+    copied = (first != known.index) & (elsewhere | (digit_mm < _COARSE_MM))
+    for row, *measured in known.loc[copied, [*MEASURED]].itertuples():
+        value = f"({', '.join(f'{one:.10g}' for one in measured)}) mm, exactly as in row {first[row]}"
+        sheet.note(
+            "copied row", MEASURED, value, "each measurement once: an instrument does not repeat every digit", row
+        )
 
 
-def _check_counts(frame, names, parameter_count, problems):
+def _check_counts(sheet):
     """Note a campaign or a run with too few rows."""
-    needed = -(-parameter_count // 3)
-    if len(frame) < max(needed, _LEAST_POINTS):
-        allowed = f"at least {max(needed, _LEAST_POINTS)}: three numbers per point for {parameter_count} parameters"
-        problems.add("too few points", value=f"{len(frame)} rows", allowed=allowed)
-    for number, size in frame.groupby("run").size().items():
+    parameters = len(sheet.mechanism.parameters)
+    needed = max(-(-parameters // 3), _LEAST_POINTS)
+    if len(sheet.frame) < needed:
+        allowed = f"at least {needed}: three numbers per point for {parameters} parameters"
+        sheet.note("too few points", None, f"{len(sheet.frame)} rows", allowed)
+    for number, size in sheet.frame.groupby("run").size().items():
         if size < _LEAST_POINTS:
             allowed = f"at least {_LEAST_POINTS} points in a run"
-            problems.add(
-                "too few points", column=names["run"], value=f"run {number:g} with {size} points", allowed=allowed
-            )
+            sheet.note("too few points", "run", f"run {number:g} with {size} points", allowed)
 
 
-def _check_time(frame, names, problems):
+def _check_time(sheet):
     """Note times that run backwards, within a run or from run to run."""
-    known = frame.dropna(subset=["time_s", "run"])
-    time, run, row = known["time_s"].to_numpy(), known["run"].to_numpy(), known.index.to_numpy()
-    for i in np.flatnonzero(np.diff(time) < 0) + 1:
-        value = f"{time[i]:.10g} s after {time[i - 1]:.10g} s" + (
-            f" (run {run[i]:g} after run {run[i - 1]:g})" if run[i] != run[i - 1] else ""
-        )
+    known = sheet.frame.dropna(subset=["time_s", "run"])
+    for row, now, before in _falls(known, known["time_s"].diff() < 0):
+        other = f" (run {now['run']:g} after run {before['run']:g})" if now["run"] != before["run"] else ""
+        value = f"{now['time_s']:.10g} s after {before['time_s']:.10g} s{other}"
         allowed = "times since the campaign's start that never run backwards, within a run and from run to run"
-        problems.add("time", row=row[i], column=names["time_s"], value=value, allowed=allowed)
+        sheet.note("time", "time_s", value, allowed, row)
 
 
-def check_speed(frame, found, problems):
-    """Note runs whose points follow each other faster than the run's speed allows; for files whose unit is known to be
-    right.
-    """
-    if not {"time_s", "speed_mm_s"} <= set(frame):
+def check_speed(sheet):
+    """Note runs whose points follow each other faster than their speed allows, in a file whose unit is right."""
+    if not {"time_s", "speed_mm_s"} <= set(sheet.frame):
         return
-    known = frame.dropna(subset=["time_s", "run", "speed_mm_s", *COMMAND])
+    known = sheet.frame.dropna(subset=["time_s", "run", "speed_mm_s", *COMMAND])
     for number, run in known.groupby("run"):
         step, pause = np.linalg.norm(np.diff(run[[*COMMAND]], axis=0), axis=1), np.diff(run["time_s"])
         if not (pause > 0).any():
@@ -196,4 +163,4 @@ def check_speed(frame, found, problems):
         if driven > 3.0 * stated:
             value = f"{stated:g} mm/s in run {number:g}, whose points follow each other at {driven:.4g} mm/s"
             allowed = "the speed in mm/s, and times in s, that fit the commanded positions"
-            problems.add("speed", row=run.index[0], column=found["speed_mm_s"], value=value, allowed=allowed)
+            sheet.note("speed", "speed_mm_s", value, allowed, run.index[0])

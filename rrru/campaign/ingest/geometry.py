@@ -1,135 +1,104 @@
-"""Whether commanded positions, drive angles and measured positions of a campaign belong to the robot and to each other.
-Lengths in mm.
-"""
+"""Whether commanded, drive and measured values of a campaign belong to the robot and to each other. Lengths in mm."""
 
 from dataclasses import fields
 from itertools import permutations, product
 
 import numpy as np
 
-from rrru.campaign.ingest.columns import AXES, COMMAND, DRIVES, MEASURED, MM, drive_name
+from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.columns import MM
+from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, position_text
 from rrru.robots.rrru3 import Rrru3
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
 DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
-# ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ.
-_FRAME_SHARE = 0.05
-# A hundredth of it is strange enough for a note.
-_STRANGE_SHARE = 0.01
-# Room beyond the farthest reachable point, where an outlier may still lie.
+# ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ. A
+# hundredth of it is strange enough for a note.
+_FRAME_SHARE, _STRANGE_SHARE = 0.05, 0.01
+# Margin beyond the farthest reachable point, where an outlier may still lie.
 _REACH_MARGIN = 1.1
 _MOST, _MANY = 0.9, 0.5
 
 
-def check_commands(frame, found, spec, mechanism, problems):
-    """Note commanded positions that the robot cannot take and angles that contradict them; whether the file's unit can
-    be right.
-
-    frame: index row number, columns in mm and rad under our names, NaN where a cell has been noted; found: {our name:
-    the file's name}.
-    """
-    known = frame.dropna(subset=[*COMMAND])
-    command = known[[*COMMAND]].to_numpy()
+def check_commands(sheet):
+    """Note commanded positions out of reach and drive values that contradict them; whether the unit can be right."""
+    known = sheet.frame.dropna(subset=[*COMMAND])
+    command = rows.command(known)
     if not len(known):
         return True
-    if _wrong_unit(command, found, spec, mechanism, problems):
+    if _wrong_unit(command, sheet):
         return False
-    theta = mechanism.inverse(command, elbow=spec.elbow)
-    reached = np.isfinite(theta).all(axis=1)
+    drive = sheet.mechanism.inverse(command, elbow=sheet.spec.elbow)
+    reached = np.isfinite(drive).all(axis=1)
     for i in np.flatnonzero(~reached):
-        legs = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(theta[i])))
-        column, allowed = _columns(COMMAND, found), f"a position that every leg reaches; leg {legs} does not"
-        problems.add("reach", row=known.index[i], column=column, value=_position(command[i]), allowed=allowed)
-    flipped = _upside_down(command[reached], theta[reached], found, mechanism, problems)
-    if set(DRIVES[mechanism.drive_unit]) <= set(known) and not flipped:
-        _check_angles(known[reached], theta[reached], found, spec, mechanism, problems)
+        legs = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(drive[i])))
+        allowed = f"a position that every leg reaches; leg {legs} does not"
+        sheet.note("reach", COMMAND, position_text(command[i]), allowed, known.index[i])
+    flipped = _upside_down(command[reached], drive[reached], sheet)
+    if set(sheet.drives) <= set(known) and not flipped:
+        _check_drives(known[reached], drive[reached], sheet)
     return True
 
 
-def check_sizes(frame, found, problems):
+def check_sizes(sheet):
     """Note measured positions in another unit than the commanded ones; whether both have the same.
 
     Their spreads are compared, which are the same in every frame.
     """
-    known = frame.dropna(subset=[*COMMAND, *MEASURED])
+    known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
     if not len(known):
         return False
-    command, measured = (_spread(known[[*columns]].to_numpy()) for columns in (COMMAND, MEASURED))
+    command, measured = _spread(rows.command(known)), _spread(rows.measured(known))
     if command == 0.0 or 0.5 <= measured / command <= 2.0:
         return True
-    ratio = measured / command
-    unit = next(
-        (
-            f", not the measured ones in {b} and the commanded ones in {a}, as it seems"
-            for (a, x), (b, y) in product(MM.items(), repeat=2)
-            if a != b and abs(ratio - x / y) < 0.1 * ratio
-        ),
-        "",
+    ratio, seems = measured / command, ""
+    for (one, size), (other, its_size) in product(MM.items(), repeat=2):
+        if one != other and not seems and abs(ratio - size / its_size) < 0.1 * ratio:
+            seems = f", not the measured ones in {other} and the commanded ones in {one}, as it seems"
+    value = (
+        f"measured positions that spread over {measured:.6g} mm while the commanded ones spread over {command:.6g} mm"
     )
-    value = f"measured positions that spread over {measured:.6g} mm while the commanded ones spread over {command:.6g} mm (ratio {ratio:.4g})"
-    problems.add(
-        "size",
-        column=_columns(MEASURED, found),
-        value=value,
-        allowed=f"a ratio of 0.5 to 2: both in the same unit{unit}",
-    )
+    sheet.note("size", MEASURED, f"{value} (ratio {ratio:.4g})", f"a ratio of 0.5 to 2: both in the same unit{seems}")
     return False
 
 
-def check_measured(frame, found, mechanism, problems):
-    """Note measured positions, in the robot's frame, that lie beyond the robot's reach or altogether elsewhere than
-    commanded.
-    """
-    known = frame.dropna(subset=[*COMMAND, *MEASURED])
-    command, measured = known[[*COMMAND]].to_numpy(), known[[*MEASURED]].to_numpy()
-    limit = frame_limit(mechanism)
-    off = np.linalg.norm(measured - command, axis=1)
-    column = _columns(MEASURED, found)
+def check_measured(sheet):
+    """Note measured positions, in the robot's frame, beyond its reach or altogether elsewhere than commanded."""
+    known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
+    command, measured = rows.command(known), rows.measured(known)
+    limit, off = frame_limit(sheet.mechanism), np.linalg.norm(measured - command, axis=1)
     if len(known) and np.median(off) > limit:
-        middle = np.median(measured - command, axis=0)
-        value = f"measured positions {np.median(off):.6g} mm from the commanded ones in the median, {_position(middle)} along x, y, z"
-        allowed = f"at most {limit:g} mm; {_axes_advice(measured, command, limit) or 'frame: register turns another frame into the robot frame'}"
-        problems.add("frame", column=column, value=value, allowed=allowed)
+        along = position_text(np.median(measured - command, axis=0))
+        value = (
+            f"measured positions {np.median(off):.6g} mm from the commanded ones in the median, {along} along x, y, z"
+        )
+        advice = _axes_advice(measured, command, limit) or "frame: register turns another frame into the robot frame"
+        sheet.note("frame", MEASURED, value, f"at most {limit:g} mm; {advice}")
         return
-    for number, run in known.groupby("run"):
-        part = np.linalg.norm(run[[*MEASURED]].to_numpy() - run[[*COMMAND]].to_numpy(), axis=1)
-        if np.median(part) > limit:
-            value = f"run {number:g}: measured positions {np.median(part):.6g} mm from the commanded ones in the median"
-            problems.add(
-                "frame",
-                row=run.index[0],
-                column=column,
-                value=value,
-                allowed=f"at most {limit:g} mm, in one frame for all runs",
-            )
-    far = _REACH_MARGIN * _farthest(mechanism)
+    for number, at in known.groupby("run").indices.items():
+        if (median := np.median(off[at])) > limit:
+            value = f"run {number:g}: measured positions {median:.6g} mm from the commanded ones in the median"
+            allowed = f"at most {limit:g} mm, in one frame for all runs"
+            sheet.note("frame", MEASURED, value, allowed, known.index[at[0]])
+    far = _REACH_MARGIN * _farthest(sheet.mechanism)
     for i in np.flatnonzero((np.linalg.norm(measured, axis=1) > far) | (measured == 0.0).all(axis=1)):
-        allowed = (
-            f"within {far:.4g} mm of the robot's origin, and not 0, 0, 0; drop the row of a point that was not measured"
-        )
-        problems.add(
-            "reach of measured", row=known.index[i], column=column, value=_position(measured[i]), allowed=allowed
-        )
+        allowed = f"within {far:.4g} mm of the robot's origin, and not 0, 0, 0"
+        allowed += "; drop the row of a point that was not measured"
+        sheet.note("reach of measured", MEASURED, position_text(measured[i]), allowed, known.index[i])
 
 
 def doubts(frame, mechanism):
-    """What is possible but strange about measured positions in the robot's frame: far off in all, or one row late or
-    early.
-    """
-    command, measured, run = frame[[*COMMAND]].to_numpy(), frame[[*MEASURED]].to_numpy(), frame["run"].to_numpy()
-    off = np.median(np.linalg.norm(measured - command, axis=1))
-    notes = []
+    """What is strange about measured positions in the robot's frame: far off in all, or one row late or early."""
+    command, measured, run = rows.command(frame), rows.measured(frame), frame["run"].to_numpy()
+    off, notes = np.median(np.linalg.norm(measured - command, axis=1)), []
     for first, second, word in ((measured[1:], command[:-1], "before"), (measured[:-1], command[1:], "after")):
         shifted = np.linalg.norm(first - second, axis=1)[run[1:] == run[:-1]]
         if off > 1.0 and np.median(shifted) < 0.2 * off:
-            notes.append(
-                f"measured positions fit the command of the row {word} theirs to {np.median(shifted):.3g} mm in the median, "
-                f"their own to {off:.3g} mm: the rows may be shifted"
-            )
+            fit = f"measured positions fit the command of the row {word} theirs to {np.median(shifted):.3g} mm"
+            notes.append(f"{fit} in the median, their own to {off:.3g} mm: the rows may be shifted")
     if off > _STRANGE_SHARE * _size(mechanism):
-        notes.append(
-            f"measured positions are {off:.4g} mm from the commanded ones in the median: see that unit, frame and rows belong together"
-        )
+        far = f"measured positions are {off:.4g} mm from the commanded ones in the median"
+        notes.append(f"{far}: see that unit, frame and rows belong together")
     return notes
 
 
@@ -159,77 +128,69 @@ def _spread(position):
     return float(np.median(np.linalg.norm(position - np.median(position, axis=0), axis=1)))
 
 
-def _reached(position, spec, mechanism):
-    """Share of positions (n, 3) within reach."""
-    return np.isfinite(mechanism.inverse(position, elbow=spec.elbow)).all(axis=1).mean()
-
-
-def _wrong_unit(command, found, spec, mechanism, problems):
+def _wrong_unit(command, sheet):
     """Note that another unit brings the commanded positions into reach; whether that is so."""
-    if _reached(command, spec, mechanism) >= _MANY:
+
+    def reached(position):
+        return np.isfinite(sheet.mechanism.inverse(position, elbow=sheet.spec.elbow)).all(axis=1).mean()
+
+    read = sheet.spec.unit
+    if reached(command) >= _MANY:
         return False
     for unit, factor in MM.items():
-        if unit != spec.unit and _reached(command * factor / MM[spec.unit], spec, mechanism) >= _MOST:
+        if unit != read and reached(command * factor / MM[read]) >= _MOST:
             distance = np.linalg.norm(command, axis=1)
-            value = f"commanded positions {distance.min():.4g} to {distance.max():.4g} mm from the robot's origin when read in {spec.unit}"
+            value = f"commanded positions {distance.min():.4g} to {distance.max():.4g} mm from the robot's origin"
             allowed = f"positions within reach; unit: {unit} brings them there"
-            problems.add("unit", column=_columns(COMMAND, found), value=value, allowed=allowed)
+            sheet.note("unit", COMMAND, f"{value} when read in {read}", allowed)
             return True
     return False
 
 
-def _upside_down(command, theta, found, mechanism, problems):
+def _upside_down(command, drive, sheet):
     """Note that the robot stands on the other side of its base; whether that is so."""
-    back = mechanism.forward(theta)
+    back = sheet.mechanism.forward(drive)
     flipped = np.abs(back[:, 2] + command[:, 2]) < np.abs(back[:, 2] - command[:, 2])
     if not len(command) or flipped.mean() < _MANY:
         return False
-    way = "DOWN" if isinstance(mechanism, Rrru3) else "UP"
-    drives, at, turned = drive_name(DRIVES[mechanism.drive_unit]), command[flipped][0, 2], back[flipped][0, 2]
-    value = f"{at:.6g} mm, where the {drives} of that position bring the robot to {turned:.6g} mm"
-    problems.add(
-        "upside down",
-        column=found["command_z_mm"],
-        value=value,
-        allowed=f"positions in the robot frame, whose z points {way} from the base",
-    )
+    way = "DOWN" if isinstance(sheet.mechanism, Rrru3) else "UP"
+    at, turned = command[flipped][0, 2], back[flipped][0, 2]
+    value = f"{at:.6g} mm, where the {sheet.drive_name} of that position bring the robot to {turned:.6g} mm"
+    sheet.note("upside down", COMMAND[2], value, f"positions in the robot frame, whose z points {way} from the base")
     return True
 
 
-def _check_angles(known, theta, found, spec, mechanism, problems):
-    """Note drive angles or slider positions that are not those of the commanded positions."""
-    unit = mechanism.drive_unit
-    drives = DRIVES[unit]
-    given, command = known[[*drives]].to_numpy(), known[[*COMMAND]].to_numpy()
-    off = np.abs(given - theta)
-    bad = off > DRIVE_TOLERANCE[unit]
-    tolerance = f"within {DRIVE_TOLERANCE[unit]:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
-    if bad.any(axis=1).mean() > _MANY and (advice := _angle_advice(given, theta, command, spec, mechanism)):
-        read = f"{drive_name(drives)} up to {np.nanmax(np.abs(given)):.6g} {unit}"
-        read += f" when read in {spec.angle_unit}" if unit == "rad" else ""
-        value = f"{read}, up to {np.nanmax(off):.6g} {unit} from those that the commanded positions need"
-        problems.add("angles", column=_columns(drives, found), value=value, allowed=f"{tolerance}; {advice}")
+def _check_drives(known, drive, sheet):
+    """Note drive angles or slider positions that are not those (n, 3) of the commanded positions."""
+    unit = sheet.mechanism.drive_unit
+    given, command = known[[*sheet.drives]].to_numpy(), rows.command(known)
+    off, limit = np.abs(given - drive), DRIVE_TOLERANCE[unit]
+    bad = off > limit
+    allowed = f"within {limit:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
+    if bad.any(axis=1).mean() > _MANY and (advice := _drive_advice(given, drive, command, sheet)):
+        read = f" when read in {sheet.spec.angle_unit}" if unit == "rad" else ""
+        value = f"{sheet.drive_name} up to {np.nanmax(np.abs(given)):.6g} {unit}{read}"
+        value += f", up to {np.nanmax(off):.6g} {unit} from those that the commanded positions need"
+        sheet.note("angles", sheet.drives, value, f"{allowed}; {advice}")
         return
     for i, k in np.argwhere(bad):
-        value = f"{given[i, k]:.6f} {unit}, while the commanded position {_position(command[i])} needs {theta[i, k]:.6f} {unit}"
-        problems.add("angles", row=known.index[i], column=found[drives[k]], value=value, allowed=tolerance)
+        needs = f"while the commanded position {position_text(command[i])} needs {drive[i, k]:.6f} {unit}"
+        sheet.note("angles", sheet.drives[k], f"{given[i, k]:.6f} {unit}, {needs}", allowed, known.index[i])
 
 
-def _angle_advice(given, theta, command, spec, mechanism):
+def _drive_advice(given, drive, command, sheet):
     """Which setting makes the drive angles or slider positions fit the commanded positions, or None."""
-    tolerance = DRIVE_TOLERANCE[mechanism.drive_unit]
-    other = {"rad": ("deg", np.pi / 180.0), "deg": ("rad", 180.0 / np.pi)}[spec.angle_unit]
+    mechanism, spec = sheet.mechanism, sheet.spec
+    other, factor = {"rad": ("deg", np.pi / 180.0), "deg": ("rad", 180.0 / np.pi)}[spec.angle_unit]
     elbow = {"out": "in", "in": "out"}[spec.elbow]
-    for candidate, wanted, advice in (
-        *(
-            ((given * other[1], theta, f"angle_unit: {other[0]} makes them fit"),)
-            if mechanism.drive_unit == "rad"
-            else ()
-        ),
+    candidates = [
         (given, mechanism.inverse(command, elbow=elbow), f"elbow: {elbow} makes them fit"),
-        (given[:, ::-1], theta, "the legs seem to be numbered the other way round"),
-    ):
-        if (np.abs(candidate - wanted) < tolerance).all(axis=1).mean() > _MOST:
+        (given[:, ::-1], drive, "the legs seem to be numbered the other way round"),
+    ]
+    if mechanism.drive_unit == "rad":
+        candidates.insert(0, (given * factor, drive, f"angle_unit: {other} makes them fit"))
+    for candidate, wanted, advice in candidates:
+        if (np.abs(candidate - wanted) < DRIVE_TOLERANCE[mechanism.drive_unit]).all(axis=1).mean() > _MOST:
             return advice
     return None
 
@@ -243,13 +204,3 @@ def _axes_advice(measured, command, limit):
             axes = ", ".join(("-" if sign < 0 else "") + AXES[axis] for axis, sign in zip(order, signs, strict=True))
             best, text = off, f"the file's measured ({axes}) would fit the robot's (x, y, z) to {off:.3g} mm"
     return text
-
-
-def _columns(ours, found):
-    """The file's names of some of our columns."""
-    return ", ".join(found[name] for name in ours)
-
-
-def _position(position):
-    """A position for a message."""
-    return f"({', '.join(f'{value:.6g}' for value in position)}) mm"

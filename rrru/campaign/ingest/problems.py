@@ -18,10 +18,8 @@ class Problems:
     def __bool__(self):
         return bool(self._by_kind)
 
-    def add(self, kind, *, row=None, column=None, value, allowed):
-        """Note one problem: data row from 1 or None, the file's column name or None, the value as the file has it, what
-        is allowed.
-        """
+    def add(self, kind, *, value, allowed, row=None, column=None):
+        """Note a problem: data row from 1 or None, the file's column or None, its value there, what is allowed."""
         self._by_kind[kind].append(
             {
                 "file": self._file,
@@ -34,17 +32,14 @@ class Problems:
 
     def refuse(self):
         """Raise IngestError if there is any problem."""
-        if not self._by_kind:
-            return
         listed = []
         for problems in self._by_kind.values():
             listed += problems[:LISTED]
             if len(problems) > LISTED:
                 more = f"{len(problems)} problems of this kind, of which the first {LISTED} are listed"
-                listed.append(
-                    {"file": self._file, "row": None, "column": None, "value": more, "allowed": problems[0]["allowed"]}
-                )
-        raise IngestError(listed)
+                listed.append(problems[0] | {"row": None, "column": None, "value": more})
+        if listed:
+            raise IngestError(listed)
 
     def refuse_now(self, **problem):
         """Raise IngestError for a problem that leaves nothing more to look at."""

@@ -1,11 +1,8 @@
-"""Rigid registration: the six numbers that turn positions in an instrument's frame into the robot's frame. Lengths in
-mm, angles in rad.
-"""
+"""Rigid registration: the six numbers that turn an instrument's frame into the robot's frame. Lengths in mm."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
 
@@ -16,9 +13,7 @@ _LEAST_WIDTH = 0.05
 
 @dataclass(frozen=True)
 class Registration:
-    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,) in mm; rms and largest distance left at
-    `points` points.
-    """
+    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,); what it leaves at `points` points."""
 
     rotation: np.ndarray
     translation: np.ndarray
@@ -42,14 +37,16 @@ def register(measured_mm, command_mm):
     Raises FitError for fewer than three points and for points on one line, and ValueError for arguments of the wrong
     shape.
     """
+    from scipy.spatial.transform import Rotation
+
     measured, command = np.asarray(measured_mm, dtype=float), np.asarray(command_mm, dtype=float)
     if measured.shape != command.shape or measured.ndim != 2 or measured.shape[1] != 3:
         raise ValueError(f"expected two arrays (n, 3), got {measured.shape} and {command.shape}")
     _require_spread("commanded", command)
     _require_spread("measured", measured)
     middle_measured, middle_command = measured.mean(axis=0), command.mean(axis=0)
-    turn, _ = Rotation.align_vectors(command - middle_command, measured - middle_measured)
-    rotation = turn.as_matrix()
+    best, _ = Rotation.align_vectors(command - middle_command, measured - middle_measured)
+    rotation = best.as_matrix()
     translation = middle_command - rotation @ middle_measured
     off = np.linalg.norm(measured @ rotation.T + translation - command, axis=1)
     return Registration(rotation, translation, float(np.sqrt((off**2).mean())), float(off.max()), len(command))
@@ -57,12 +54,11 @@ def register(measured_mm, command_mm):
 
 def _require_spread(name, position):
     """Raise FitError unless the points (n, 3) span a plane well enough."""
-    distinct = len(np.unique(position, axis=0))
+    count, distinct = len(position), len(np.unique(position, axis=0))
     if distinct < 3:
         raise FitError(f"{distinct} different {name} positions; allowed: at least 3, not on one line")
-    spread = np.linalg.svd(position - position.mean(axis=0), compute_uv=False) / np.sqrt(len(position))
-    if spread[1] < _LEAST_WIDTH * spread[0]:
-        raise FitError(
-            f"{len(position)} {name} positions on one line: {spread[1]:.3f} mm (rms) off the line that they spread along by "
-            f"{spread[0]:.3f} mm (rms); allowed: at least 3 points, at least {_LEAST_WIDTH * spread[0]:.3f} mm (rms) off every line"
-        )
+    along, off, _ = np.linalg.svd(position - position.mean(axis=0), compute_uv=False) / np.sqrt(count)
+    if off < _LEAST_WIDTH * along:
+        line = f"{off:.3f} mm (rms) off the line that they spread along by {along:.3f} mm (rms)"
+        allowed = f"at least 3 points, at least {_LEAST_WIDTH * along:.3f} mm (rms) off every line"
+        raise FitError(f"{count} {name} positions on one line: {line}; allowed: {allowed}")

@@ -1,6 +1,4 @@
-"""The cells of a comma-separated file as text, with every fault of the file itself found before a number is looked
-at.
-"""
+"""The cells of a comma-separated file as text; every fault of the file itself shows before a number is looked at."""
 
 import csv
 import io
@@ -16,6 +14,8 @@ _SIGNATURES = (
 )
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _COMMA_SEPARATED = "comma-separated text in UTF-8 with decimal points and one header line"
+_OTHER_ENCODING = f"{_COMMA_SEPARATED}; save the file again with the encoding UTF-8"
+_TWO_FIELDS = "; a decimal comma makes two fields of one number"
 
 
 def looks_like(data):
@@ -32,74 +32,59 @@ def text_cells(data, problems):
     text = _decode(data, problems)
     if not text.strip():
         problems.refuse_now(value="an empty file", allowed=_COMMA_SEPARATED)
-    rows = _rows(text, problems)
-    names = [name.strip() for name in rows[0]]
-    _require_header(names, [len(row) for row in rows[1:] if row], problems)
-    cells = [[cell.strip() for cell in row] for row in rows[1:]]
-    while cells and not any(cells[-1]):
-        cells.pop()
-    if not cells:
-        problems.refuse_now(
-            value=f"a header ({', '.join(names)}) and no row", allowed="one row per measured point below the header"
-        )
-    whole = _whole_rows(names, cells, problems)
+    reader = csv.reader(io.StringIO(text.lstrip("\r\n"), newline=""), strict=True)
+    try:
+        names, *rows = ([cell.strip() for cell in row] for row in reader)
+    except csv.Error as error:
+        allowed = 'fields without quotes, or each quote closed: "line 1"'
+        problems.refuse_now(value=f"line {reader.line_num}: {error}", allowed=allowed)
+    _require_header(names, [len(row) for row in rows if row], problems)
+    while rows and not any(rows[-1]):
+        rows.pop()
+    if not rows:
+        value = f"a header ({', '.join(names)}) and no row"
+        problems.refuse_now(value=value, allowed="one row per measured point below the header")
+    whole = [number for number, row in enumerate(rows, start=1) if _is_whole(number, row, len(names), problems)]
     if not whole:
         problems.refuse()
-    return names, [number for number, _ in whole], [row for _, row in whole]
+    return names, whole, [rows[number - 1] for number in whole]
 
 
 def _decode(data, problems):
     """Text of the bytes; a UTF-8 byte-order mark is accepted."""
-    known = looks_like(data)
-    if known:
+    if known := looks_like(data):
         problems.refuse_now(value=known, allowed=_COMMA_SEPARATED)
-    if data.startswith(_UTF16) or b"\0" in data[:4096]:
-        wide = data.startswith(_UTF16) or data[:4096].count(b"\0") > len(data[:4096]) // 4
-        encoding = "UTF-16 or UTF-32" if wide else "binary data (a byte 0)"
-        problems.refuse_now(value=encoding, allowed=f"{_COMMA_SEPARATED}; save the file again with the encoding UTF-8")
+    head = data[:4096]
+    if data.startswith(_UTF16) or b"\0" in head:
+        wide = data.startswith(_UTF16) or head.count(b"\0") > len(head) // 4
+        value = "UTF-16 or UTF-32" if wide else "binary data (a byte 0)"
+        problems.refuse_now(value=value, allowed=_OTHER_ENCODING)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         value = f"byte 0x{data[error.start]:02x} in line {line}, which is not UTF-8"
-        problems.refuse_now(value=value, allowed=f"{_COMMA_SEPARATED}; save the file again with the encoding UTF-8")
-    if "\0" in text:
-        problems.refuse_now(
-            value=f"byte 0 in line {text.count(chr(10), 0, text.index(chr(0))) + 1}", allowed=_COMMA_SEPARATED
-        )
+        problems.refuse_now(value=value, allowed=_OTHER_ENCODING)
+    before, zero, _ = text.partition("\0")
+    if zero:
+        problems.refuse_now(value=f"byte 0 in line {before.count(chr(10)) + 1}", allowed=_COMMA_SEPARATED)
     return text
 
 
-def _rows(text, problems):
-    """All records from the header on; lines before the header that are empty are left out."""
-    reader = csv.reader(io.StringIO(text.lstrip("\r\n"), newline=""), strict=True)
-    try:
-        return list(reader)
-    except csv.Error as error:
-        problems.refuse_now(
-            value=f"line {reader.line_num}: {error}", allowed='fields without quotes, or each quote closed: "line 1"'
-        )
-
-
 def _require_header(names, widths, problems):
-    """Refuse a first line that is no header, or that has another separator; `widths` are the numbers of fields of the
-    rows below.
-    """
+    """Refuse a first line that is no header or has another separator; `widths`: numbers of fields of the rows below."""
     for separator, word in _SEPARATORS.items():
-        if sum(name.count(separator) for name in names) >= len(names) and (
-            separator != " " or {len(names), *widths} == {1}
-        ):
-            allowed = (
-                "commas between the fields and points as decimal marks; "
-                f"pandas.read_csv(file, sep={separator!r}, decimal=',').to_csv(new_file, index=False) writes such a file"
-            )
+        often = sum(name.count(separator) for name in names) >= len(names)
+        if often and (separator != " " or {len(names), *widths} == {1}):
+            remedy = f"pandas.read_csv(file, sep={separator!r}, decimal=',').to_csv(new_file, index=False)"
+            allowed = f"commas between the fields and points as decimal marks; {remedy} writes such a file"
             problems.refuse_now(value=f"{word} between the fields", allowed=allowed)
     allowed = "a first line with the names of all columns, and nothing above it"
     if sum(map(_is_number, names)) > len(names) // 2:
         problems.refuse_now(value=f"a first line of values ({', '.join(names)})", allowed=allowed)
     if len(set(widths)) == 1 and widths[0] != len(names):
         value = f"a first line of {len(names)} fields ({', '.join(names[:5])}, ...) above rows of {widths[0]} fields"
-        problems.refuse_now(value=value, allowed=f"{allowed}; a decimal comma makes two fields of one number")
+        problems.refuse_now(value=value, allowed=allowed + _TWO_FIELDS)
 
 
 def _is_number(text):
@@ -111,21 +96,12 @@ def _is_number(text):
     return True
 
 
-def _whole_rows(names, cells, problems):
-    """Numbered rows with as many fields as the header; the others, and empty rows between them, are noted."""
-    whole = []
-    for number, row in enumerate(cells, start=1):
-        if not any(row):
-            problems.add(
-                "empty row", row=number, value="an empty row", allowed="one row per measured point: drop the row"
-            )
-        elif len(row) != len(names):
-            allowed = f"{len(names)} fields as in the header"
-            if len(row) > len(names):
-                allowed += "; a decimal comma makes two fields of one number"
-            problems.add(
-                "ragged row", row=number, value=f"{len(row)} fields ({', '.join(row[:4])}, ...)", allowed=allowed
-            )
-        else:
-            whole.append((number, row))
-    return whole
+def _is_whole(number, row, width, problems):
+    """Whether a row has as many fields as the header; others, and empty ones, are noted."""
+    if not any(row):
+        allowed = "one row per measured point: drop the row"
+        problems.add("empty row", row=number, value="an empty row", allowed=allowed)
+    elif len(row) != width:
+        allowed = f"{width} fields as in the header{_TWO_FIELDS if len(row) > width else ''}"
+        problems.add("ragged row", row=number, value=f"{len(row)} fields ({', '.join(row[:4])}, ...)", allowed=allowed)
+    return any(row) and len(row) == width
