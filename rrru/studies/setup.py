@@ -9,8 +9,6 @@ from rrru.plant import virtual_robot, virtual_tripod
 from rrru.robots.protocol import MECHANISMS, identifiable_truth, make_mechanism
 from rrru.seeds import stream
 
-_INGEST_KEYS = ("columns", "unit", "angle_unit", "frame", "registration_points", "extra_columns", "elbow")
-
 
 def mechanism(nominal, parameter_set=None):
     """The nominal robot with a set of parameters: the given one, the campaign's, or what tracked positions identify.
@@ -63,10 +61,7 @@ def virtual_campaign(nominal, virtual):
 
 def ingest_campaign(nominal, section):
     """The ingested file of a campaign's section; raises IngestError where it is refused."""
-    options = {key: section[key] for key in _INGEST_KEYS if key in section}
-    if "registration_points" in options:
-        options["registration_points"] = tuple(tuple(pair) for pair in options["registration_points"])
-    return ingest(IngestSpec(path=section["ingest"], **options), mechanism(nominal))
+    return ingest(IngestSpec.from_config(section), mechanism(nominal))
 
 
 def true_deviations(nominal, virtual):

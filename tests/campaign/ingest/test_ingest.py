@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.errors import ConfigError, IngestError
 from rrru.robots.rrru3 import Rrru3
-from rrru.store.tables import check
 from tests.places import DATA
+from tests.schemas import check
 
 ROBOT = Rrru3()
 COMMAND = [f"command_{axis}_mm" for axis in "xyz"]

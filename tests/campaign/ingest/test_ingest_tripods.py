@@ -10,7 +10,7 @@ from rrru.errors import IngestError
 from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
-from rrru.store.tables import check
+from tests.schemas import check
 
 ROBOTS = {
     "ptt3": (Ptt3(), -250.0, {"db1": 0.3, "dL2": 0.2}),

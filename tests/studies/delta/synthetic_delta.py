@@ -5,7 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from rrru.store.tables import check
+from tests.schemas import check
 from tests.schemas import TABLES
 
 VARIANTS = ("none", "paper", "converged", "shape", "tracker_positions", "of_my_own")

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from rrru.store.tables import check
+from tests.schemas import check
 
 _METHODS = (
     "zero_offsets",

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rrru.store.tables import check
+from tests.schemas import check
 
 
 def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "not fitted")):

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from rrru.store.tables import check
+from tests.schemas import check
 from rrru.studies.ptt3.controllers import METHODS
 from tests.schemas import TABLES
 
