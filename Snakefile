@@ -22,6 +22,7 @@ for study in sorted(Path(workflow.basedir, "workflow/rules/studies").glob("*.smk
     include: study
 
 
+include: "workflow/rules/pipeline/published.smk"
 include: "workflow/rules/pipeline/gap.smk"
 
 

@@ -259,23 +259,6 @@ def sweeps(scatter_mm=0.3, seeds=6):
     return {name: check(name, pd.DataFrame(rows)) for name, rows in frames.items()}
 
 
-def published():
-    """`published` with the two sweeps of the paper."""
-    items = {f"P_c={k / 10:.1f}": value for k, value in enumerate(P_C, start=1)}
-    items |= {f"P_m={k / 10:.1f}": value for k, value in enumerate(P_M, start=1)}
-    labels = {
-        "paper": "A",
-        "source": "Tables 3 and 4",
-        "unit": "mm",
-        "here": np.nan,
-        "ratio": np.nan,
-        "here_low": np.nan,
-        "here_high": np.nan,
-        "note": "",
-    }
-    return check("published", pd.DataFrame({"item": list(items), "published": list(items.values())}).assign(**labels))
-
-
 def all_tables(ground=None, **choices):
     """Every table that a figure reads, by name."""
     ground = commanded() if ground is None else ground
@@ -291,6 +274,5 @@ def all_tables(ground=None, **choices):
         "calibrations": calibrations(),
         "genetic": runs,
         "genetic_history": history,
-        "published": published(),
         **sweeps(),
     }

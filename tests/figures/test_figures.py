@@ -188,8 +188,6 @@ def test_missing_trajectories_and_items_are_named(frames):
     for name, word in (("fig09", "line_"), ("fig10", "line_"), ("fig12", "line_"), ("fig11", "spiral")):
         with pytest.raises(ConfigError, match=rf"{name}.*{word}.*circle_1"):
             draw(name, others)
-    with pytest.raises(ConfigError, match=r"fig06.*P_c="):
-        draw("fig06", frames | {"published": frames["published"].iloc[:0]})
     with pytest.raises(ConfigError, match=r"fig07.*migration_fraction"):
         draw("fig07", frames | {"sweep_runs": frames["sweep_runs"].iloc[:0]})
 

@@ -9,7 +9,7 @@ import time
 import pandas as pd
 import pytest
 
-from rrru.studies.rrru3 import paper_a
+from rrru.studies.rrru3 import paper as paper_a
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 

@@ -1,82 +1,76 @@
-"""Published numbers beside this study's: paper A's from its tables, papers B's and C's as they are handed over."""
+"""Paper A's numbers beside this study's, from the configuration and the tables of the reproduced campaign."""
 
-import numpy as np
+from dataclasses import dataclass
+
 import pandas as pd
 
+from rrru.campaign.measurements import vectors
+from rrru.genetic.campaign_runs import typical_parameters
 from rrru.robots.rrru3 import PARAMETER_NAMES
-from rrru.studies.rrru3 import paper_a
-from rrru.studies.rrru3.published_sisters import row, sister_rows
+from rrru.studies import paper, setup
+from rrru.studies.rrru3.paper import NUMBERS, SETTINGS, TIED, TIED_TO_PRINTED
+from rrru.studies.rrru3.redraw import spread
 from rrru.studies.rrru3.study_numbers import TRAJECTORIES, group_orders, study_numbers
 
-_COLUMNS = ["paper", "item", "source", "unit", "published", "here", "ratio", "here_low", "here_high", "note"]
-_AXES = [f"error_{axis}_mm" for axis in "xyz"]
+_DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
 
 
-def published_table(
-    config, errors, calibrations, parameters, genetic, sweep_runs, spread=None, sisters=None, sister_spread=None
-):
-    """Rows of `published` from tables of the study.
+@dataclass(frozen=True)
+class Reproduced:
+    """Which campaign, calibrations and method stand for the paper's, and how many other draws show the scatter."""
 
-    config: the whole configuration, whose `reproduce` section says which calibrations stand for the paper's; errors,
-    calibrations, parameters (the genetic algorithm's median run included), genetic, sweep_runs: the tables of those
-    names; spread: item to (low, high) over other draws, see `rrru.studies.rrru3.redraw`; sisters: "B" and "C" to {item:
-    number of this study}, sister_spread: to {item: (low, high)}, see `rrru.studies.rrru3.published_sisters`. Numbers
-    that this study does not have are null.
+    campaign: str
+    line_calibration: str
+    spiral_calibration: str
+    method: str
+    redraws: int
+
+
+def published_rows(settings, errors, calibrations, parameters, genetic, sweep_runs):
+    """Rows of `published` for paper A.
+
+    settings: the configuration's `genetic`, `reproduce` and `calibration`, with the campaign's `nominal` robot and
+    what is `virtual` of it; the others: the tables of those names. Numbers that this study does not have are null.
     """
-    reproduce = config["reproduce"]
-    before, lines, spiral = (
-        _study_errors(errors, reproduce, key) for key in ("none", "line_calibration", "spiral_calibration")
+    chosen, nominal, virtual = Reproduced(**settings["reproduce"]), settings["nominal"], settings["virtual"]
+    errors, calibrations, parameters, genetic = (
+        table[table["campaign"] == chosen.campaign] for table in (errors, calibrations, parameters, genetic)
     )
-    here = (
-        _design(config)
-        | _sweep(sweep_runs)
-        | _fitted(parameters, reproduce)
-        | _errors(before, lines, spiral)
-        | _objective(calibrations, genetic, reproduce)
-    )
-    notes, spread = _notes(genetic, reproduce), spread or {}
-    rows = [row("A", number, here, spread, notes.get(number.item, "")) for number in paper_a.NUMBERS]
-    return pd.concat(
-        [pd.DataFrame(rows), _orders(before, lines), pd.DataFrame(sister_rows(sisters, sister_spread))],
-        ignore_index=True,
-    )
+    names = setup.mechanism(nominal).parameters.names
+    parameters = pd.concat([parameters, typical_parameters(genetic, (*names, "dR", "dr"))], ignore_index=True)
+    runs = genetic[genetic["calibration"] == chosen.line_calibration]
+    numbers, order_notes = _error_numbers(errors, chosen)
+    here = {
+        **_design(nominal, virtual, settings["genetic"]),
+        **_sweep(sweep_runs),
+        **_fitted(parameters, chosen),
+        **numbers,
+        "lines_objective": _objective(calibrations, runs, chosen),
+    }
+    draws = {}
+    if virtual:
+        sets, near = settings["calibration"]["sets"], settings["calibration"]["use_near_singularity"]
+        patterns = [sets[name] for name in (chosen.line_calibration, chosen.spiral_calibration)]
+        draws = spread(setup.virtual_campaign(nominal, virtual), patterns, chosen.method, chosen.redraws, near)
+    return paper.published_rows("A", NUMBERS, here, draws, order_notes | _notes(runs, parameters, chosen))
 
 
-def _study_errors(errors, reproduce, key):
-    """Trajectory names (n,) and error vectors (n, 3): before calibration (key "none"), or driven again under one of the
-    calibrations.
-    """
-    chosen = errors[errors["campaign"] == reproduce["campaign"]]
-    if key == "none":
-        chosen = chosen[chosen["mode"] == "before"]
-    else:
-        same = (chosen["calibration"] == reproduce[key]) & (chosen["method"] == reproduce["method"])
-        chosen = chosen[same & (chosen["mode"] == "closed_loop")]
-    chosen = chosen.sort_values(["run", "point"])
-    return chosen["trajectory"].to_numpy(), chosen[_AXES].to_numpy()
-
-
-def _design(config):
-    """Dimensions, motion and counts as configured; what an ingested campaign or other trajectories do not have is
-    absent.
-    """
-    robot, motion, genetic = config["robots"]["rrru3"], config["motion"], config["genetic"]
-    campaign = config["campaigns"][config["reproduce"]["campaign"]]
-    shape = config["trajectories"].get(campaign.get("trajectories"), {})
+def _design(nominal, virtual, genetic):
+    """Dimensions, motion and counts as configured; without what a measured campaign or other trajectories lack."""
+    shape = virtual["trajectories"] if virtual else {}
     result = {
-        **{key: robot[key] for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm") if key in robot},
+        **{key: value for key, value in nominal["dimensions"].items() if key in _DIMENSIONS},
         "population": sum(genetic["populations"]),
-        "crossover_fraction": genetic["crossover_fraction"],
-        "migration_fraction": genetic["migration_fraction"],
+        **{key: genetic[key] for key in ("crossover_fraction", "migration_fraction")},
         "errors": len(PARAMETER_NAMES["published"]),
     }
-    if shape:
-        result |= {key: motion[key] for key in ("speed_mm_s", "acceleration_mm_s2")}
+    if virtual:
+        result |= {key: virtual["motion"][key] for key in ("speed_mm_s", "acceleration_mm_s2")}
     if lines := shape.get("lines"):
-        result |= {
+        ends = {
             f"line_{end}_{axis}_mm": lines[f"{end}_mm"][k] for end in ("start", "end") for k, axis in enumerate("xyz")
         }
-        result |= {"points_per_line": lines["points"], "line_groups": len(lines["offsets_y_mm"])}
+        result |= ends | {"points_per_line": lines["points"], "line_groups": len(lines["offsets_y_mm"])}
     if spiral := shape.get("spiral"):
         result["points_on_spiral"] = spiral["points"]
     return result
@@ -84,98 +78,68 @@ def _design(config):
 
 def _sweep(runs):
     """Median objective of the one population at every swept value that the paper has."""
+    median = runs[runs["population"] == "one"].groupby(["parameter", "value"])["objective_mm"].median()
+    labels = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
+    printed = {(parameter, float(s)): f"{label}={s}" for parameter, label in labels.items() for s in SETTINGS}
+    return {printed[key]: objective for key, objective in median.items() if key in printed}
+
+
+def _fitted(parameters, chosen):
+    """The printed 14 deviations of both calibrations; dR and dr alone are of the genetic algorithm's median run."""
+    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
     result = {}
-    one = runs[runs["population"] == "one"]
-    for parameter, label in (("crossover_fraction", "P_c"), ("migration_fraction", "P_m")):
-        for value in paper_a.VALUES:
-            chosen = one[(one["parameter"] == parameter) & (one["value"] == float(value))]
-            if len(chosen):
-                result[f"{label}={value}"] = chosen["objective_mm"].median()
+    for label, calibration in (("lines", chosen.line_calibration), ("spiral", chosen.spiral_calibration)):
+        for name in (*TIED, "da"):
+            key = (calibration, "genetic" if name in ("dR", "dr") else chosen.method, name)
+            if key in values:
+                result |= {f"{label}_{printed}": values[key] for printed in TIED_TO_PRINTED.get(name, (name,))}
     return result
 
 
-def _fitted(parameters, reproduce):
-    """The printed 14 errors of both calibrations; dR and dr alone are those of the genetic algorithm's median run."""
-    result = {}
-    for label, key in (("lines", "line_calibration"), ("spiral", "spiral_calibration")):
-        own = parameters[
-            (parameters["campaign"] == reproduce["campaign"]) & (parameters["calibration"] == reproduce[key])
-        ]
-        by_method = {
-            method: dict(zip(part["parameter"], part["value"], strict=True)) for method, part in own.groupby("method")
-        }
-        values, typical = by_method.get(reproduce["method"], {}), by_method.get("genetic", {})
-        for name in paper_a.TABLE_5:
-            value = (typical if name in ("dR", "dr") else values).get(name, np.nan)
-            for printed in paper_a.TIED_TO_PRINTED.get(name, (name,)):
-                result[f"{label}_{printed}"] = value
-        result[f"{label}_da"] = values.get("da", np.nan)
-    return result
+def _error_numbers(errors, chosen):
+    """The error numbers of the paper's section 3 and its orders, and notes on these.
 
-
-def _errors(before, lines, spiral):
-    """The error numbers of the paper's section 3; empty for a campaign that was not driven again along the paper's
-    trajectories.
+    Empty for a campaign that was not driven again along the paper's trajectories.
     """
-    if not len(before[1]) == len(lines[1]) == len(spiral[1]) > 0 or not set(before[0]) >= TRAJECTORIES:
-        return {}
-    return study_numbers(before[0], before[1], lines[1], spiral[1])
+    again = errors[(errors["mode"] == "closed_loop") & (errors["method"] == chosen.method)]
+    before, lines, spiral = (
+        frame.sort_values(["run", "point"])
+        for frame in (
+            errors[errors["mode"] == "before"],
+            *(again[again["calibration"] == name] for name in (chosen.line_calibration, chosen.spiral_calibration)),
+        )
+    )
+    if not len(before) == len(lines) == len(spiral) > 0 or not set(before["trajectory"]) >= TRAJECTORIES:
+        return {}, {}
+    before_mm, lines_mm, spiral_mm = (vectors(frame, "error") for frame in (before, lines, spiral))
+    margins = group_orders(before["trajectory"], before_mm, lines_mm)
+    orders = {f"order_{name}": float(margin > 0.0) for name, margin in margins.items()}
+    notes = {f"order_{name}": f"margin here {100.0 * margin:.1f} %" for name, margin in margins.items()}
+    return study_numbers(before["trajectory"], before_mm, lines_mm, spiral_mm) | orders, notes
 
 
-def _objective(calibrations, genetic, reproduce):
-    """Mean distance that the line calibration leaves on its own points."""
-    own = [
-        (table["campaign"] == reproduce["campaign"]) & (table["calibration"] == reproduce["line_calibration"])
-        for table in (calibrations, genetic)
-    ]
-    if reproduce["method"] == "genetic":
-        return {"lines_objective": genetic.loc[own[1], "objective_mm"].median()}
-    return {
-        "lines_objective": calibrations.loc[own[0] & (calibrations["method"] == reproduce["method"]), "mean_mm"].mean()
-    }
+def _objective(calibrations, runs, chosen):
+    """Mean distance in mm that the line calibration leaves on its own points."""
+    if chosen.method == "genetic":
+        return runs["objective_mm"].median()
+    fitted = (calibrations["calibration"] == chosen.line_calibration) & (calibrations["method"] == chosen.method)
+    return calibrations.loc[fitted, "mean_mm"].mean()
 
 
-def _orders(before, lines):
-    """The paper's orders as rows: published 1 (holds), here 1 or 0."""
-    if not len(before[1]) == len(lines[1]) > 0 or not set(before[0]) >= TRAJECTORIES:
-        return pd.DataFrame(columns=_COLUMNS)
-    text = {
-        "centre_before": "mean error of each of groups 1-3 below each of groups 4-7, before calibration",
-        "centre_after": "mean error of each of groups 1-3 below each of groups 4-7, after the line calibration",
-        "group6_before": "largest error in group 6, before calibration",
-        "group6_after": "largest error in group 6, after the line calibration",
-    }
-    rows = [
-        {
-            "paper": "A",
-            "item": f"order_{name}",
-            "source": "section 3.2, Fig. 10",
-            "unit": "1",
-            "published": 1.0,
-            "here": float(margin > 0.0),
-            "ratio": float(margin > 0.0),
-            "here_low": np.nan,
-            "here_high": np.nan,
-            "note": f"{text[name]}: 1 where it holds; margin here {100.0 * margin:.1f} %",
-        }
-        for name, margin in group_orders(before[0], before[1], lines[1]).items()
-    ]
-    return pd.DataFrame(rows)
-
-
-def _notes(genetic, reproduce):
-    """Notes that depend on the results."""
-    runs = genetic[
-        (genetic["campaign"] == reproduce["campaign"]) & (genetic["calibration"] == reproduce["line_calibration"])
-    ]
+def _notes(runs, parameters, chosen):
+    """Notes on the genetic algorithm's runs of the line calibration."""
     if runs.empty:
         return {}
-    typical = runs.sort_values(["objective_mm", "seed"]).iloc[(len(runs) - 1) // 2]
+    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
+    difference = values[chosen.line_calibration, "genetic", "da"]
+    typical = f"here the genetic algorithm's median run, whose dr - dR is {difference:.4f} mm"
+    reached = f"{runs['objective_mm'].min():.4f} to {runs['objective_mm'].max():.4f} mm"
     return {
-        "lines_objective": f"least mean distance {runs['optimum_mm'].iloc[0]:.4f} mm; the genetic algorithm's {len(runs)} seeds reach "
-        f"{runs['objective_mm'].min():.4f} to {runs['objective_mm'].max():.4f} mm",
-        "lines_dR": f"here the genetic algorithm's median run, whose dr - dR is {typical['da']:.4f} mm",
-        "lines_dr": f"here the genetic algorithm's median run, whose dr - dR is {typical['da']:.4f} mm",
+        "lines_objective": f"least mean distance {runs['optimum_mm'].iloc[0]:.4f} mm; "
+        f"the genetic algorithm's {len(runs)} seeds reach {reached}",
+        "lines_dR": typical,
+        "lines_dr": typical,
         "tolerance_mm": "the paper's requirement, not a result",
-        "errors": "as in the paper; least squares fits the 7 that can be identified, the genetic algorithm the 8 tied ones",
+        "errors": "as in the paper; least squares fits the 7 that can be identified, "
+        "the genetic algorithm the 8 tied ones",
     }

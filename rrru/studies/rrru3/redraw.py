@@ -1,48 +1,61 @@
 """How much the reproduced numbers scatter: the same robot measured, calibrated and driven again with other draws of
-wobble and noise.
+non-repeatability and noise.
 """
 
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
+from rrru.fit.residuals import Residuals
+from rrru.plant.tracker import measure
+from rrru.plant.virtual_robot import non_repeatability
 from rrru.studies.rrru3.study_numbers import TRAJECTORIES, study_numbers
 
 # the middle 90 % of the draws
 _QUANTILES = (0.05, 0.95)
 
 
-def spread(virtual, calibration, reproduce, count):
-    """Item to (low, high): the middle 90 % of the numbers of paper_a.ERRORS over `count` other draws; empty where they
-    do not apply.
+def spread(campaign, patterns, method, count, use_near_singularity=True):
+    """Item to (low, high): the middle 90 % of the numbers of paper.ERRORS over `count` other draws.
 
-    virtual: the campaign, with `robot`, `plan`, `noise_mm` and `generator(*labels)`; calibration, reproduce: sections
-    of the configuration. Method "genetic" is stood in for by its optimum, the least mean distance.
+    campaign: the virtual one; patterns: trajectories of the line and of the spiral calibration; method: "genetic" is
+    stood in for by its optimum, the least mean distance. Empty where the numbers do not apply.
     """
-    if count == 0 or not {run.trajectory for run in virtual.plan.runs} >= TRAJECTORIES:
+    if count == 0 or not {run.trajectory for run in campaign.plan.runs} >= TRAJECTORIES:
         return {}
-    draws = [_numbers(virtual, calibration, reproduce, k) for k in range(count)]
-    return {item: tuple(np.quantile([numbers[item] for numbers in draws], _QUANTILES).tolist()) for item in draws[0]}
+    measurements, _ = campaign.run()
+    usable = rows.usable(measurements, use_near_singularity)
+    chosen = [usable & rows.on_trajectories(measurements, names) for names in patterns]
+    attained = _attained(campaign, campaign.robot.mechanism.inverse)
+    draws = [_numbers(campaign, measurements, attained, chosen, method, number) for number in range(count)]
+    return {item: tuple(np.quantile([draw[item] for draw in draws], _QUANTILES).tolist()) for item in draws[0]}
 
 
-def _numbers(virtual, calibration, reproduce, number):
-    """The numbers of one draw."""
-    robot, mechanism = virtual.robot, virtual.robot.mechanism
-    measured, _ = robot.run(virtual.plan, virtual.noise_mm, virtual.generator("redraw", number, "measure"))
-    after, fits = {}, {}
-    for key in ("line_calibration", "spiral_calibration"):
-        patterns = calibration["sets"][reproduce[key]]
-        residuals = select(measured, mechanism, patterns, calibration["use_near_singularity"])
-        fits[key] = least_squares(residuals)
-        if reproduce["method"] != "least_squares":
-            fits[key] = least_mean_distance(residuals, fits[key].deviations)
-        generator = virtual.generator("redraw", number, "closed_loop")
-        again, _ = robot.run(
-            virtual.plan, virtual.noise_mm, generator, lambda x, e=fits[key].deviations: mechanism.inverse(x, e)
-        )
-        after[key] = rows.measured(again) - rows.command(again)
-    before = rows.measured(measured) - rows.command(measured)
-    numbers = study_numbers(measured["trajectory"], before, after["line_calibration"], after["spiral_calibration"])
-    return numbers | {"lines_objective": fits["line_calibration"].mean_mm}
+def _attained(campaign, controller):
+    """Positions (n, 3) that the robot attains under a controller, before anything random."""
+    return campaign.robot.positions(campaign.robot.motion(campaign.plan, controller), campaign.plan.targets())[0]
+
+
+def _measured(campaign, attained, generator):
+    """Measured positions (n, 3) of attained ones, drawn in the order in which a virtual robot draws."""
+    moved = attained + campaign.robot.non_repeatability_mm * non_repeatability(generator, len(attained))
+    return measure(moved, campaign.noise_mm, generator)
+
+
+def _numbers(campaign, measurements, attained, chosen, method, number):
+    """The numbers of one draw; chosen: rows (n,) of the line and of the spiral calibration."""
+    mechanism, target, theta = campaign.robot.mechanism, rows.command(measurements), rows.actuators(measurements)
+    measured = _measured(campaign, attained, campaign.generator("redraw", number, "measure"))
+    fits, after = [], []
+    for calibrated in chosen:
+        residuals = Residuals(mechanism, theta[calibrated], measured[calibrated], target[calibrated])
+        fit = least_squares(residuals)
+        if method != "least_squares":
+            fit = least_mean_distance(residuals, fit.deviations)
+        corrected = _attained(campaign, lambda x, deviations=fit.deviations: mechanism.inverse(x, deviations))
+        # the same draw for both calibrations
+        generator = campaign.generator("redraw", number, "closed_loop")
+        after.append(_measured(campaign, corrected, generator) - target)
+        fits.append(fit)
+    return study_numbers(measurements["trajectory"], measured - target, *after) | {"lines_objective": fits[0].mean_mm}

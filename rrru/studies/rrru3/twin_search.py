@@ -21,7 +21,7 @@ from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.fit.identifiability import RANK_TOLERANCE
 from rrru.plant.virtual_robot import VirtualRobot, non_repeatability
 from rrru.robots import singularity
-from rrru.studies.rrru3.paper_a import ERRORS_MM
+from rrru.studies.rrru3.paper import ERRORS_MM
 from rrru.studies.rrru3.study_numbers import UPPER_LIMITS, group_orders, study_numbers
 from rrru.studies.rrru3.twin import SEARCH_BOUNDS, Twin
 

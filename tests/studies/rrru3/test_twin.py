@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import yaml
+from rrru.studies.rrru3.paper_a import ERRORS_MM
 
 from rrru.errors import ConfigError, UnreachableError
 from rrru.fit.least_squares import least_squares
@@ -14,7 +15,6 @@ from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
 from rrru.studies import config as parts
 from rrru.studies.rrru3 import twin, twin_search
-from rrru.studies.rrru3.paper_a import ERRORS_MM
 from tests.places import ROOT
 
 _VALUES = {name: 0.5 * (low + high) for name, (low, high) in twin.SEARCH_BOUNDS.items()} | {

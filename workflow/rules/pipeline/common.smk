@@ -7,6 +7,9 @@ CAMPAIGNS = sorted(config["campaigns"])
 DIAGNOSED = dict(config["campaigns"])
 # what `snakemake` makes; every study adds its own
 TARGETS = []
+# what a study has of a paper's numbers, by the paper's letter: its package with `published` and `audit`, the tables
+# that hold its own numbers, and what it reads of the configuration
+PAPERS = {}
 
 
 wildcard_constraints:

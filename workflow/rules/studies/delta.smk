@@ -19,6 +19,11 @@ DELTA_FIGURES = {
     "delta_errors": (f"{_DELTA}:delta_errors", ["delta_points", "delta_calibrations", "delta_draws"]),
     "delta_observability": (f"{_DELTA}:delta_observability", ["delta_observability"]),
 }
+PAPERS["C"] = {
+    "study": "rrru.studies.delta",
+    "tables": ["delta_points", "delta_camera", "delta_draws"],
+    "settings": config["delta"],
+}
 
 
 def delta_part(name):

@@ -32,6 +32,11 @@ DIAGNOSED |= {
     name: {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
     for name in (*PTT_EXPERIMENTS, *PTT_JOINT)
 }
+PAPERS["B"] = {
+    "study": "rrru.studies.ptt3",
+    "tables": ["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"],
+    "settings": config["ptt"],
+}
 
 
 rule ptt_bench:

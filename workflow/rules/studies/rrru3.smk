@@ -1,7 +1,7 @@
 SWEPT = ["crossover_fraction", "migration_fraction"]
 SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
 REPRODUCED = config["reproduce"]["campaign"]
-_SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations", "published"]
+_SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations"]
 _PAPER_A = "rrru.studies.rrru3.figures"
 PAPER_A_FIGURES = {
     "fig06": (f"{_PAPER_A}.sweep:fig06", _SWEEP_SHOWN),
@@ -10,6 +10,15 @@ PAPER_A_FIGURES = {
     "fig10": (f"{_PAPER_A}.lines:fig10", ["measurements", "errors"]),
     "fig11": (f"{_PAPER_A}.spiral:fig11", ["measurements", "errors"]),
     "fig12": (f"{_PAPER_A}.lines:fig12", ["measurements", "errors"]),
+}
+PAPERS["A"] = {
+    "study": "rrru.studies.rrru3",
+    "tables": ["errors", "calibrations", "parameters", "genetic", "sweep_runs"],
+    "settings": {
+        "nominal": parts.nominal(config, REPRODUCED),
+        "virtual": parts.virtual(config, REPRODUCED),
+        **reads("genetic", "reproduce", "calibration.sets", "calibration.use_near_singularity"),
+    },
 }
 # figures that every campaign gets, the reproduced one in figures/ itself
 CAMPAIGN_FIGURES = {
@@ -80,34 +89,6 @@ rule sweep_tables:
         "../../scripts/sweep_tables.py"
 
 
-rule published:
-    input:
-        **named(["errors", "calibrations", "parameters", "genetic", "sweep_runs"]),
-        **named(["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"]),
-        **named(["delta_points", "delta_camera", "delta_draws"]),
-    output:
-        **named(["published", "audit"]),
-    log:
-        f"{RESULTS}/logs/published.log",
-    params:
-        settings=reads(
-            "seed",
-            "robots",
-            "motion",
-            "trajectories",
-            "virtual_robots",
-            "campaigns",
-            "calibration",
-            "genetic",
-            "reproduce",
-            "ptt",
-            "delta",
-        ),
-        code=code("published"),
-    script:
-        "../../scripts/published.py"
-
-
 rule twin:
     output:
         twin=f"{RESULTS}/twin/twin.yaml",
@@ -167,4 +148,4 @@ rule figures:
         [drawn(CAMPAIGN_FIGURES, f"figures/{name}").values() for name in CAMPAIGNS if name != REPRODUCED],
 
 
-TARGETS += [*named([*SWEEP_TABLES, "published", "audit"]).values(), *rules.figures.input]
+TARGETS += [*named(SWEEP_TABLES).values(), *rules.figures.input]

@@ -3,13 +3,16 @@ seeds.
 """
 
 import numpy as np
+import pandas as pd
 from matplotlib.ticker import FuncFormatter
 
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
+from rrru.studies.rrru3.paper import CROSSOVER, MIGRATION, SETTINGS
 
 # paper A, 3.1: the settings that were chosen there
 _CHOSEN = {"crossover_fraction": 0.8, "migration_fraction": 0.7}
+_PRINTED = {"crossover_fraction": CROSSOVER, "migration_fraction": MIGRATION}
 _SYMBOL = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
 _POPULATIONS = {"one": "one population", "islands": "islands"}
 # the paper prints four digits: smaller differences cannot be told apart there
@@ -41,7 +44,7 @@ def _sweep(tables, options, parameter, name):
     """The published curve as printed, then for each kind of population the seeds' scatter and the published curve on
     one log axis.
     """
-    published = _published(tables["published"], parameter, name)
+    published = pd.Series(_PRINTED[parameter], index=[float(setting) for setting in SETTINGS])
     optimum = _optimum(tables, options, name)
     runs = tables["sweep_runs"]
     runs = runs[runs["parameter"] == parameter]
@@ -66,17 +69,6 @@ def _sweep(tables, options, parameter, name):
     first.set_ylabel("mean distance above the optimum (mm)")
     style.legend_above(figure, figure.axes, columns=3)
     return figure
-
-
-def _published(table, parameter, name):
-    """The published curve: setting to fitness in mm, in ascending order."""
-    prefix = f"{_SYMBOL[parameter]}="
-    rows = table[table["item"].str.startswith(prefix)]
-    if rows.empty:
-        raise ConfigError(f"{name}: table published has no items {prefix}...")
-    curve = rows.drop_duplicates("item").set_index("item")["published"]
-    curve.index = [float(item.removeprefix(prefix)) for item in curve.index]
-    return curve.sort_index()
 
 
 def _optimum(tables, options, name):

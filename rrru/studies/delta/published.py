@@ -1,0 +1,46 @@
+"""Paper C's numbers beside this study's, from the configuration and the tables of the Delta."""
+
+import numpy as np
+
+from rrru.robots.delta import Delta
+from rrru.studies import paper
+from rrru.studies.delta.paper import NUMBERS
+
+# before calibration, and after the paper's single linear step in its own calibration frame
+_VARIANTS = {"before": "none", "after": "paper"}
+
+
+def published_rows(section, points, camera, draws):
+    """Rows of `published` for paper C.
+
+    section: the configuration's `delta`; points, camera, draws: the tables delta_points, delta_camera and delta_draws.
+    """
+    here, spread, drawn = _design(section, camera), {}, draws.set_index("variant")
+    for label, variant in _VARIANTS.items():
+        size = points.loc[points["variant"] == variant, "error_mm"].to_numpy()
+        for item, value, kind in (
+            ("max", size.max(), "max"),
+            ("mean", size.mean(), "mean"),
+            ("about", size.mean(), "mean"),
+        ):
+            here[f"{label}_{item}"] = value
+            spread[f"{label}_{item}"] = tuple(drawn.loc[variant, [f"plane_{kind}_{end}_mm" for end in ("low", "high")]])
+    return paper.published_rows("C", NUMBERS, here, spread)
+
+
+def _design(section, camera):
+    """What is configured of the robot, the target and the poses, and the focal length that the calibration found."""
+    azimuth = Delta().azimuth_rad
+    focal_px = camera.set_index("parameter").loc["focal_x_px", "found"]
+    return {
+        **{f"beta{leg}_rad": angle for leg, angle in enumerate(azimuth, start=1)},
+        "legs": len(azimuth),
+        "target_dots_across": section["target"]["rows"],
+        "target_dots_along": section["target"]["columns"],
+        "dot_diameter_mm": section["target"]["diameter_mm"],
+        "dot_pitch_mm": section["target"]["pitch_mm"],
+        "focal_length_mm": focal_px * section["camera"]["pixel_mm"],
+        "poses": np.prod(section["poses"]["counts"]),
+        "calibration_height_mm": section["poses"]["z_mm"],
+        "checked_height_mm": section["plane"]["z_mm"],
+    }

@@ -1,0 +1,100 @@
+"""What a paper prints: its numbers beside a study's, and its misprints and contradictions as rows of an audit."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from rrru.errors import ConfigError
+
+_ABSENT = (np.nan, np.nan)
+
+
+@dataclass(frozen=True)
+class Number:
+    """One printed number: item, where it stands, unit and value, and what a reader has to know about it."""
+
+    item: str
+    source: str
+    unit: str
+    value: float
+    note: str = ""
+
+
+def numbers(source, unit, note="", **values):
+    """Numbers that are printed in one place, in one unit: items to values."""
+    return tuple(Number(item, source, unit, value, note) for item, value in values.items())
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One misprint, contradiction or claim: what stands where, what should, and the numbers that decide.
+
+    check: what is computed; it and `right` may hold fields such as {2:.2f} for the values. values: function without
+    arguments to what the printed form gives, what the right form gives, and whatever else decides. shows: these
+    values to whether the misprint or contradiction shows. Without both it is a matter of reading.
+    """
+
+    where: str
+    printed: str
+    right: str
+    check: str = "as printed"
+    unit: str = ""
+    values: Callable = lambda: _ABSENT
+    shows: Callable = lambda *_: True
+
+    def row(self):
+        """Row of `audit` without `paper` and `kind`."""
+        values = tuple(float(value) for value in self.values())
+        return {
+            "where": self.where,
+            "printed": self.printed,
+            "right": self.right.format(*values),
+            "check": self.check.format(*values),
+            "unit": self.unit,
+            "value_printed": values[0],
+            "value_right": values[1],
+            "shown": bool(self.shows(*values)),
+        }
+
+
+def published_rows(paper, numbers, here, spread=None, notes=None):
+    """Rows of `published` for the numbers that a paper prints, null for what is absent.
+
+    here, spread, notes: item to this study's number, to its (low, high) over other draws, and to what the results add
+    to the printed number's note. Raises ConfigError for an item of `here` that the paper does not print.
+    """
+    known = list(dict.fromkeys(number.item for number in numbers))
+    if unknown := sorted(set(here) - set(known)):
+        raise ConfigError(f"paper {paper} prints no {', '.join(unknown)}; known: {', '.join(known)}")
+    spread, notes = spread or {}, notes or {}
+    frame = pd.DataFrame(
+        [
+            {
+                "paper": paper,
+                "item": number.item,
+                "source": number.source,
+                "unit": number.unit,
+                "published": number.value,
+                "here": here.get(number.item, np.nan),
+                "note": "; ".join(filter(None, (number.note, notes.get(number.item)))),
+            }
+            for number in numbers
+        ]
+    )
+    low, high = np.array([spread.get(item, _ABSENT) for item in frame["item"]]).T
+    ratio = frame["here"] / frame["published"].where(frame["published"] != 0.0)
+    return frame.assign(ratio=ratio, here_low=low, here_high=high)
+
+
+def audit_rows(paper, computed, as_printed=(), lost=None):
+    """Rows of `audit`: Findings by computation, Findings as printed, and what a scan lost, {where: (what, instead)}."""
+    absent = [
+        Finding(where, f"lost: {what}", instead, "what stands in for it", shows=lambda *_: False)
+        for where, (what, instead) in (lost or {}).items()
+    ]
+    parts = {"computed": computed, "as printed": as_printed, "lost": absent}
+    return pd.DataFrame(
+        [{"paper": paper, "kind": kind} | finding.row() for kind, findings in parts.items() for finding in findings]
+    )

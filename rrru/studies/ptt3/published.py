@@ -1,0 +1,67 @@
+"""Paper B's numbers beside this study's, from the configuration and the tables of the 3-PTT."""
+
+import numpy as np
+import pandas as pd
+
+from rrru.studies import paper
+from rrru.studies.ptt3.paper import NUMBERS
+
+# a network has converged where its cross-validated error is within this share of the least
+_CONVERGED = 0.1
+
+
+def published_rows(section, benefit, spread, training, repeatability):
+    """Rows of `published` for paper B.
+
+    section: the configuration's `ptt`; benefit, spread, training, repeatability: the tables ptt_benefit, ptt_spread,
+    ptt_training and ptt_repeatability. Benefits are those of the Jacobian's route on points that were not learned.
+    """
+    order = {name: number for number, name in enumerate(section["experiments"], start=1)}
+    papers_way = (benefit["method"] == "rbf_jacobian") & (benefit["set"] == "test") & benefit["axis"].isin(list("xyz"))
+    by_leg = repeatability.pivot(index="leg", columns="compensated", values="per_travel_um_per_mm")
+    here = {
+        **_design(section),
+        **_networks(section["curve"], spread[spread["chosen"]], training, order),
+        **{
+            f"benefit_{order[row.experiment]}_{row.axis}": row.benefit_percent
+            for row in benefit[papers_way].itertuples()
+        },
+        "order_repeatability": float((by_leg[True] < by_leg[False]).all()),
+    }
+    return paper.published_rows("B", NUMBERS, here)
+
+
+def _design(section):
+    """What is configured of the experiments."""
+    loads = {entry["payload_kg"] for entry in section["experiments"].values() if entry["payload_kg"] > 0.0}
+    points, train = section["curve"]["points"], section["network"]["train"]
+    return {
+        # a network from positions to positions
+        "network_inputs": 3,
+        "network_outputs": 3,
+        "solved_positions": len(section["positions_mm"]),
+        "experiments": len(section["experiments"]),
+        "loads": len(loads),
+        "repeats": section["repeats"],
+        "screw_turns": section["bench"]["turns"],
+        "encoder_range_mm": section["bench"]["range_mm"],
+        "encoder_accuracy_um": 1e3 * section["bench"]["resolution_mm"],
+        "training_points": train,
+        "test_points": points - train,
+        "points": points,
+    }
+
+
+def _networks(curve, chosen, training, order):
+    """Spreads of the chosen networks for inputs scaled to -1..1 over the largest range, and their median steps."""
+    half_mm = max(curve["radius_mm"], 0.5 * np.ptp(curve["z_mm"]))
+    keys = ["experiment", "spread_from", "learns", "spread_mm"]
+    curves = pd.merge(chosen[keys], training, on=keys, how="left").sort_values("neurons").groupby(keys)
+    steps = [_steps(part["neurons"].to_numpy(), np.sqrt(part["validation_mse_mm2"].to_numpy())) for _, part in curves]
+    spreads = {f"spread_{order[row.experiment]}": row.spread_mm / half_mm for row in chosen.itertuples()}
+    return spreads | {"training_steps": float(np.median(steps))}
+
+
+def _steps(neurons, error):
+    """Fewest neurons (n,) with an error (n,) within a share of the least."""
+    return neurons[np.argmax(error <= (1.0 + _CONVERGED) * error.min())]
