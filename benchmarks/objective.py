@@ -30,7 +30,7 @@ def _fsolve_rate(residuals, deviations, count):
     """Pose solves per second of fsolve on eq. (8), written out in plain numpy as a user would, and the positions
     (count, 3).
     """
-    legs, (cx, cy) = residuals.mechanism.legs(deviations), residuals.mechanism.turn
+    legs, (cx, cy) = residuals.mechanism.legs(deviations), residuals.mechanism.azimuth_cos_sin
 
     def closure(p, theta):
         u, v = p[0] * cx + p[1] * cy, p[1] * cx - p[0] * cy

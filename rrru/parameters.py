@@ -6,10 +6,12 @@ import numpy as np
 
 from rrru.errors import ConfigError
 
+LEGS = (1, 2, 3)
+
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a model: name, unit, nominal value, bounds and where these come from."""
+    """One number of a model: name, unit, nominal value, bounds, where these come from, its leg (0: all)."""
 
     name: str
     unit: str
@@ -17,11 +19,13 @@ class Parameter:
     low: float = -np.inf
     high: float = np.inf
     source: str = ""
+    leg: int = 0
 
     def __post_init__(self):
         if not self.low <= self.nominal <= self.high:
+            bounds = f"[{self.low}, {self.high}]"
             raise ConfigError(
-                f"parameter {self.name}: nominal {self.nominal} {self.unit} lies outside its bounds [{self.low}, {self.high}]"
+                f"parameter {self.name}: nominal {self.nominal} {self.unit} lies outside its bounds {bounds}"
             )
 
 
@@ -53,6 +57,11 @@ class ParameterSet:
     def units(self):
         """Units in the order of the vector."""
         return tuple(p.unit for p in self.parameters)
+
+    @property
+    def legs(self):
+        """Legs (p,) that the parameters belong to: 1 to 3, 0 for all."""
+        return np.array([p.leg for p in self.parameters])
 
     @property
     def nominal(self):

@@ -51,7 +51,7 @@ class Residuals:
         """Arrays of the compiled objective that do not change with the errors."""
         slope = self.mechanism.parameter_jacobian(self.nominal_mm, self.actuators)
         return (
-            self.mechanism.turn,
+            self.mechanism.azimuth_cos_sin,
             np.ascontiguousarray(np.cos(self.actuators).T),
             np.ascontiguousarray(np.sin(self.actuators).T),
             np.ascontiguousarray(self.nominal_mm.T),

@@ -166,7 +166,7 @@ class Case:
         """
         coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
         shape = state.shape(self.library, key)
-        leg = legs.leg_errors(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
+        leg = legs.leg_deviations(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
         columns, steps = [], []
         for name, value in shape.items():
             high = effect.parameters[name].high
@@ -177,7 +177,7 @@ class Case:
                 other = effect.contribute(
                     self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped})
                 )
-                columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_errors(other) - leg)[self.used])
+                columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_deviations(other) - leg)[self.used])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
         return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)

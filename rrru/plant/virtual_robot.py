@@ -14,7 +14,7 @@ from rrru.errors import ConfigError
 from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
 from rrru.robots.dynamics import Masses
-from rrru.robots.rrru3 import PARAMETER_NAMES, Rrru3
+from rrru.robots.rrru3 import Rrru3
 
 
 class DrivenRobot:
@@ -131,7 +131,7 @@ def non_repeatability(generator, count):
 
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
-    known = tuple(dict.fromkeys((*PARAMETER_NAMES["tied"], *PARAMETER_NAMES["published"])))
+    known = tuple(dict.fromkeys((*Rrru3.PARAMETER_NAMES["tied"], *Rrru3.PARAMETER_NAMES["published"])))
     for name in section["errors"]:
         if name not in known:
             raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")

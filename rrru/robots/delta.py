@@ -21,34 +21,22 @@ rad.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.three_legs import points
+from rrru.robots.three_legs import Deviation, of_each_leg, points
 from rrru.robots.tripod import Tripod
 
-COLUMNS = ("dtheta_rad", "l1_mm", "l2_mm", "a_mm")
-_LEGS = (1, 2, 3)
-_DRIVES = tuple(f"dtheta{leg}" for leg in _LEGS)
-PARAMETER_NAMES = {
-    "zero": _DRIVES,
-    "tied": (*_DRIVES, "dl1", "dl2", "da"),
-    "legs": (
-        *_DRIVES,
-        *(f"dl1_{leg}" for leg in _LEGS),
-        *(f"dl2_{leg}" for leg in _LEGS),
-        *(f"da_{leg}" for leg in _LEGS),
-    ),
-}
-_KINDS = {"dtheta": 0, "dl1": 1, "dl2": 2, "da": 3}
+# columns of the legs' numbers: what the drive's angle adds to, l1, l2, a
+_OWN = of_each_leg("dtheta", 0, "rad"), of_each_leg("dl1_", 1), of_each_leg("dl2_", 2), of_each_leg("da_", 3)
+_COMMON = {"dl1": Deviation(1), "dl2": Deviation(2), "da": Deviation(3)}
 
 
 @dataclass(frozen=True)
 class Delta(Tripod):
-    """The robot with its nominal dimensions in mm and the choice of error parameters: "zero" (3), "tied" (6) or "legs"
-    (12).
-    """
+    """The robot with its nominal dimensions in mm; parameter_set: "zero" (3), "tied" (6) or "legs" (12)."""
 
     l1_mm: float = 375.0  # ASSUME this and the next two: the paper gives no dimensions
     l2_mm: float = 900.0
@@ -61,10 +49,13 @@ class Delta(Tripod):
 
     ARM, LINK, OFFSET = 1, 2, 3
     TRACKED = "tied"
-
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
-    ANGLES = ("dtheta",)
-    PARAMETER_NAMES = PARAMETER_NAMES
+    DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
+    PARAMETER_NAMES: ClassVar = {
+        "zero": (*_OWN[0],),
+        "tied": (*_OWN[0], *_COMMON),
+        "legs": (*_OWN[0], *_OWN[1], *_OWN[2], *_OWN[3]),
+    }
     SOURCE = "paper C, 1.1; bounds assumed"
 
     def __post_init__(self):
@@ -90,29 +81,14 @@ class Delta(Tripod):
         return float(np.sqrt(self.l2_mm**2 - (self.a_mm + self.l1_mm) ** 2))
 
     @cached_property
-    def leg_map(self):
-        """Derivative of the legs' numbers with respect to the errors, shape (3, 4, p)."""
-        matrix = np.zeros((3, len(COLUMNS), len(self.parameters)))
-        for column, name in enumerate(self.parameters.names):
-            if name.startswith("dtheta"):
-                matrix[int(name[-1]) - 1, 0, column] = 1.0
-                continue
-            kind, _, leg = name.partition("_")
-            matrix[slice(None) if not leg else int(leg) - 1, _KINDS[kind], column] = 1.0
-        return matrix
-
-    @cached_property
     def nominal_legs(self):
-        """Numbers of the legs (3, 4) without errors."""
+        """Numbers of the legs (3, 4) without deviations."""
         return np.tile([0.0, self.l1_mm, self.l2_mm, self.a_mm], (3, 1))
 
     def inverse_of_legs(self, position_mm, legs, sign=1.0):
-        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where a leg cannot
-        reach.
-        """
+        """Drive angles (n, 3) in rad under leg numbers (3, 4), knees outwards for sign 1; NaN where out of reach."""
         position = points(position_mm)
-        cx, cy = self.turn
-        u, v = position[:, :1] * cx + position[:, 1:2] * cy, position[:, 1:2] * cx - position[:, :1] * cy
+        u, v = self.radial_tangential(position)
         depth = self.origin_depth_mm - position[:, 2:]
         inward = u - legs[:, 3]
         d = np.hypot(inward, depth)
@@ -122,9 +98,7 @@ class Delta(Tripod):
             return np.arctan2(depth, inward) - sign * np.arccos(cosine) - legs[:, 0]
 
     def ends(self, theta_rad, legs):
-        """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm in the calibration frame, for drive angles
-        (n, 3).
-        """
+        """Arms' ends less the platform's radius, (..., n, 3 legs, 3) in mm, calibration frame, for angles (n, 3)."""
         angle = theta_rad + legs[..., 0]
         reach = legs[..., 3] + legs[..., 1] * np.cos(angle)
         height = self.origin_depth_mm - legs[..., 1] * np.sin(angle)

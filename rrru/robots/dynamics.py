@@ -45,8 +45,7 @@ class Masses:
 def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
     """Rates (n, 3) and accelerations (n, 3) of the actuator values, per s and per s^2, from the platform's (n, 3).
 
-    Both are NaN where the position or the velocity is; where only the platform's acceleration is NaN, only the drives'
-    is.
+    Both are NaN where position or velocity are; where only the platform's acceleration is NaN, only the drives' is.
     """
     position, velocity = np.asarray(position_mm, dtype=float), np.asarray(velocity_mm_s, dtype=float)
     acceleration = np.asarray(acceleration_mm_s2, dtype=float)
@@ -68,8 +67,7 @@ def gravity(mechanism):
 
 
 def loads(mechanism, masses, position_mm, actuators, drive_acceleration, acceleration_mm_s2, payload_kg):
-    """Forces (n, 3) in N with which the legs push the platform, their directions (n, 3 legs, 3), loads (n, 3) in N mm
-    or N on the drives.
+    """Legs' forces (n, 3) in N on the platform, their directions (n, 3 legs, 3), drives' loads (n, 3) in N mm or N.
 
     Compression is positive; a load is positive in the drive's sense. position_mm and actuators (n, 3) fit each other;
     payload_kg (n,). NaN where a pose cannot be reached.
@@ -90,19 +88,15 @@ def loads(mechanism, masses, position_mm, actuators, drive_acceleration, acceler
 
 
 def held_force(mechanism, masses, position_mm, theta_rad, acceleration_mm_s2, payload_kg):
-    """Forces (n, 3) in N with which the 3-RRRU's legs push if friction holds joint 3, compression positive; arguments
-    as for `loads`.
+    """Forces (n, 3) in N of the 3-RRRU's legs, as in `loads`, if friction holds joint 3.
 
     A free joint 3 lets the leg push along its forearm only. Held, it makes one two-force member of L2 and L3, which
     pushes along the line from the elbow (joint 2) to the U-joint. A real leg lies between the two.
     """
-    theta, position = np.asarray(theta_rad, dtype=float), np.asarray(position_mm, dtype=float)
-    cx, cy = mechanism.turn
-    radial = np.stack([cx, cy, np.zeros(3)], axis=-1)
-    elbow = mechanism.R_mm * radial + mechanism.L1_mm * (
-        np.cos(theta)[..., None] * radial + np.sin(theta)[..., None] * np.array([0.0, 0.0, 1.0])
-    )
-    line = position[:, None, :] + mechanism.r_mm * radial - elbow
+    theta, radial = np.asarray(theta_rad, dtype=float)[..., None], mechanism.radial
+    arm = np.cos(theta) * radial + np.sin(theta) * np.array([0.0, 0.0, 1.0])
+    elbow = mechanism.R_mm * radial + mechanism.L1_mm * arm
+    line = np.asarray(position_mm, dtype=float)[:, None, :] + mechanism.r_mm * radial - elbow
     line /= np.linalg.norm(line, axis=-1, keepdims=True)
     load = _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg)
     return -np.linalg.solve(line.transpose(0, 2, 1), load[..., None])[..., 0]

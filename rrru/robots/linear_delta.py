@@ -1,6 +1,4 @@
-"""A linear delta as its owner's firmware describes it: the 3-PTT with upright rails and nominal numbers of its own for
-every tower.
-"""
+"""A linear delta as its firmware describes it: the 3-PTT with upright rails and own nominal numbers of every tower."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -35,15 +33,14 @@ class LinearDelta(Ptt3):
 def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, parameter_set, angle_limit_rad=1.0, length_limit_mm=1e4):
     """The mechanism of a printer, whose sliders stand at minus the way down from their endstops.
 
-    radius_mm: tower circle less joint offsets. azimuth_rad, arms_mm, endstop_mm: (3,) per tower. errors: "heights" or
-    "distances" (PARAMETER_NAMES of the 3-PTT). The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
+    radius_mm: tower circle less joint offsets; azimuth_rad, arms_mm, endstop_mm: (3,) per tower; parameter_set:
+    "heights" or "distances" of the 3-PTT. The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
     Raises ConfigError for arms that are too short.
     """
     arms = np.asarray(arms_mm, dtype=float)
     if not (arms > radius_mm).all():
-        raise ConfigError(
-            f"linear delta: an arm of {arms.min():g} mm; allowed: longer than the radius, {radius_mm:g} mm"
-        )
+        allowed = f"longer than the radius, {radius_mm:g} mm"
+        raise ConfigError(f"linear delta: an arm of {arms.min():g} mm; allowed: {allowed}")
     return LinearDelta(
         L_mm=float(arms.mean()),
         R_mm=radius_mm + _PLATFORM_MM,

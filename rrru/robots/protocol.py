@@ -9,13 +9,15 @@ from rrru.errors import ConfigError
 from rrru.parameters import ParameterSet
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
-from rrru.robots.rrru3 import Rrru3, to_identifiable
+from rrru.robots.rrru3 import Rrru3
+
+Array = np.ndarray
 
 
 class Mechanism(Protocol):
-    """A parallel robot as its controller believes it to be, with small errors of its numbers.
+    """A parallel robot as its controller believes it to be, with small deviations of its numbers.
 
-    drive_unit: "rad" or "mm", unit of an actuator value; TRACKED: the set of error parameters that measured positions
+    drive_unit: "rad" or "mm", unit of an actuator value; TRACKED: the set of parameters that measured positions
     identify; angle_arm_mm: the length that makes an angle error comparable with a length error; lengths_mm (5,):
     nominal R, L1, L2, L3, r as effects count them, 0 for what a robot does not have.
     """
@@ -25,61 +27,43 @@ class Mechanism(Protocol):
     drive_unit: str
     TRACKED: str
     angle_arm_mm: float
-    lengths_mm: np.ndarray
+    lengths_mm: Array
 
-    def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
+    def inverse(self, position_mm: Array, deviations: Array | None = None) -> Array:
         """Actuator values (n, k) for positions (n, 3); NaN where out of reach."""
 
-    def forward(
-        self, actuators: np.ndarray, deviations: np.ndarray | None = None, guess_mm: np.ndarray | None = None
-    ) -> np.ndarray:
+    def forward(self, actuators: Array, deviations: Array | None = None, guess_mm: Array | None = None) -> Array:
         """Positions (n, 3) for actuator values (n, k); NaN where there is none near the guess."""
 
-    def forward_batch(
-        self, actuators: np.ndarray, deviations: np.ndarray, guess_mm: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Positions (m, n, 3) for n actuator triples under m error vectors (m, p)."""
+    def forward_batch(self, actuators: Array, deviations: Array, guess_mm: Array | None = None) -> Array:
+        """Positions (m, n, 3) for n actuator triples under m vectors of deviations (m, p)."""
 
-    def actuator_jacobian(
-        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
-    ) -> np.ndarray:
+    def actuator_jacobian(self, position_mm: Array, actuators: Array, deviations: Array | None = None) -> Array:
         """Derivative (n, 3, k) of the position by the actuator values."""
 
-    def parameter_jacobian(
-        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
-    ) -> np.ndarray:
-        """Derivative (n, 3, p) of the position by the errors."""
+    def parameter_jacobian(self, position_mm: Array, actuators: Array, deviations: Array | None = None) -> Array:
+        """Derivative (n, 3, p) of the position by the parameters."""
 
-    def closure_jacobians(
-        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
-    ) -> tuple:
+    def closure_jacobians(self, position_mm: Array, actuators: Array, deviations: Array | None = None) -> tuple:
         """Derivatives of the legs' closures by the position (n, 3, 3) and by the legs' numbers (n, 3, k)."""
 
-    def constraint_moments(
-        self, position_mm: np.ndarray, actuators: np.ndarray, deviations: np.ndarray | None = None
-    ) -> np.ndarray:
+    def constraint_moments(self, position_mm: Array, actuators: Array, deviations: Array | None = None) -> Array:
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning."""
 
 
-# errors that stand for all legs, and the names of the legs' own
-_COMMON = {"dL": ("dL1", "dL2", "dL3")} | {
-    name: tuple(f"{name}_{leg}" for leg in (1, 2, 3)) for name in ("dl1", "dl2", "da")
-}
 MECHANISMS = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
 
 
 def identifiable_truth(mechanism, values):
-    """Mapping of the mechanism's error parameters from a mapping of true errors in its richest set; what is absent is
-    zero.
+    """Mapping of the mechanism's parameters, no two of which act alike, from values of any of its DEVIATIONS.
 
-    NaN for a number that stands for all legs where theirs differ.
+    Absent ones are zero; NaN for a number that stands for all legs where theirs differ.
     """
-    if isinstance(mechanism, Rrru3):
-        return to_identifiable(values)
-    result = {}
+    changes, result = mechanism.leg_changes(values), {}
     for name in mechanism.parameters.names:
-        legs = {float(values.get(own, values.get(name, 0.0))) for own in _COMMON.get(name, (name,))}
-        result[name] = legs.pop() if len(legs) == 1 else float("nan")
+        one = mechanism.DEVIATIONS[name]
+        legs = changes[:, one.column] / one.factor
+        result[name] = float(legs[one.leg - 1] if one.leg or (legs == legs[0]).all() else np.nan)
     return result
 
 

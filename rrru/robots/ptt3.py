@@ -23,36 +23,28 @@ horizontal rails an error of R - r is a common one of the sliders. Lengths in mm
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.three_legs import points
+from rrru.parameters import LEGS
+from rrru.robots.three_legs import Deviation, of_each_leg, points
 from rrru.robots.tripod import Tripod
 
-COLUMNS = ("db_mm", "L_mm", "a_mm", "azimuth_rad", "rise_rad", "swing_rad")
-_LEGS = (1, 2, 3)
-_SLIDERS = tuple(f"db{leg}" for leg in _LEGS)
-_LINKS = tuple(f"dL{leg}" for leg in _LEGS)
-# The gauges: "tied" leaves out a = R - r, which horizontal rails cannot tell from the sliders' zeros; "heights" and
-# "distances" fix the third azimuth, the base's free rotation, which neither kind of measurement sees.
-PARAMETER_NAMES = {
-    "zero": _SLIDERS,
-    "tied": (*_SLIDERS, "dL"),
-    "legs": (*_SLIDERS, *_LINKS),
-    "rails": (*_SLIDERS, *_LINKS, *(f"{kind}{leg}" for leg in _LEGS for kind in ("dphi", "rise", "swing"))),
-    "heights": ("da", "dphi1", "dphi2", *_SLIDERS),
-    "distances": ("da", "dphi1", "dphi2", *_SLIDERS, *_LINKS),
-}
-_KINDS = {"db": 0, "dL": 1, "da": 2, "dphi": 3, "rise": 4, "swing": 5}
+# columns of the legs' numbers: what the slider adds to, L, a = R - r; azimuth, rise and swing of the rail
+_SLIDERS, _LINKS = of_each_leg("db", 0), of_each_leg("dL", 1)
+_RAILS = of_each_leg("dphi", 3, "rad") | of_each_leg("rise", 4, "rad") | of_each_leg("swing", 5, "rad")
+# the first two azimuths only: the base's free rotation, which heights and distances do not see, fixes the third
+_BASE = ("da", "dphi1", "dphi2")
 
 
 @dataclass(frozen=True)
 class Ptt3(Tripod):
-    """The robot with its nominal dimensions in mm and the choice of error parameters, a key of PARAMETER_NAMES.
+    """The robot with its nominal dimensions in mm and its parameter_set, a key of PARAMETER_NAMES.
 
-    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. errors: "zero" (3), "tied" (4), "legs" (6), "rails"
-    (15), "heights" (6), "distances" (9).
+    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. "tied" leaves out a = R - r, which horizontal rails
+    cannot tell from the sliders' zeros.
     """
 
     L_mm: float = 350.0  # ASSUME this and the next two: Table 1 is lost
@@ -68,10 +60,16 @@ class Ptt3(Tripod):
     LINK, OFFSET = 1, 2
     drive_unit = "mm"
     TRACKED = "tied"
-
     DIMENSIONS = ("L_mm", "R_mm", "r_mm")
-    ANGLES = ("dphi", "rise", "swing")
-    PARAMETER_NAMES = PARAMETER_NAMES
+    DEVIATIONS = _SLIDERS | _LINKS | _RAILS | {"dL": Deviation(1), "da": Deviation(2)}
+    PARAMETER_NAMES: ClassVar = {
+        "zero": (*_SLIDERS,),
+        "tied": (*_SLIDERS, "dL"),
+        "legs": (*_SLIDERS, *_LINKS),
+        "rails": (*_SLIDERS, *_LINKS, *(f"{kind}{leg}" for leg in LEGS for kind in ("dphi", "rise", "swing"))),
+        "heights": (*_BASE, *_SLIDERS),
+        "distances": (*_BASE, *_SLIDERS, *_LINKS),
+    }
     SOURCE = "paper B, 2.2; bounds assumed"
 
     def __post_init__(self):
@@ -90,24 +88,12 @@ class Ptt3(Tripod):
         return np.array([self.R_mm, 0.0, 0.0, self.L_mm, self.r_mm])
 
     @cached_property
-    def leg_map(self):
-        """Derivative of the legs' numbers with respect to the errors, shape (3, 6, p)."""
-        matrix = np.zeros((3, len(COLUMNS), len(self.parameters)))
-        for column, name in enumerate(self.parameters.names):
-            leg = name[-1]
-            which = slice(None) if leg not in "123" else int(leg) - 1
-            matrix[which, _KINDS[name.rstrip("123")], column] = 1.0
-        return matrix
-
-    @cached_property
     def nominal_legs(self):
-        """Numbers of the legs (3, 6) without errors."""
+        """Numbers of the legs (3, 6) without deviations."""
         return np.tile([0.0, self.L_mm, self.R_mm - self.r_mm, 0.0, 0.0, 0.0], (3, 1))
 
     def inverse_of_legs(self, position_mm, legs, sign=1.0):
-        """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign; NaN where a leg cannot reach
-        (eq. 2).
-        """
+        """Slider positions (n, 3) in mm under leg numbers (3, 6) by the root of that sign (eq. 2); NaN out of reach."""
         outward, _, rail = self._directions(legs)
         w = legs[:, 2, None] * outward - points(position_mm)[:, None, :]
         along = (w * rail).sum(axis=-1)
@@ -166,19 +152,16 @@ class Ptt3(Tripod):
         Raises ConfigError for other rails.
         """
         if self.rail_inclination_rad != 0.0:
-            raise ConfigError(
-                f"the factors of det J hold for horizontal rails, not for {self.rail_inclination_rad} rad"
-            )
+            rise = self.rail_inclination_rad
+            raise ConfigError(f"the factors of det J hold for horizontal rails, not for {rise} rad")
         position = points(position_mm)
-        cx, cy = self.turn
-        v = position[:, 1:2] * cx - position[:, :1] * cy
+        _, v = self.radial_tangential(position)
         with np.errstate(invalid="ignore"):
             d = np.sqrt(self.L_mm**2 - v**2 - position[:, 2:] ** 2)
         kappa = np.zeros(len(position))
         for j, k in ((1, 2), (2, 0), (0, 1)):
-            kappa += np.sqrt(0.75) * (d[:, j] * d[:, k] + v[:, j] * v[:, k]) + 0.5 * (
-                v[:, k] * d[:, j] - v[:, j] * d[:, k]
-            )
+            across = v[:, k] * d[:, j] - v[:, j] * d[:, k]
+            kappa += np.sqrt(0.75) * (d[:, j] * d[:, k] + v[:, j] * v[:, k]) + 0.5 * across
         return position[:, 2], kappa, d
 
     def _directions(self, legs):

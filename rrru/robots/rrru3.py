@@ -12,74 +12,30 @@ angles in rad.
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
-from rrru.errors import ConfigError
-from rrru.parameters import Parameter, ParameterSet
+from rrru.parameters import LEGS
 from rrru.robots import rrru3_kernels as kernels
-from rrru.robots.three_legs import ThreeLegs, points
+from rrru.robots.three_legs import Deviation, ThreeLegs, of_each_leg, points
 
-LEG_COLUMNS = ("dtheta_rad", "L1_mm", "L2_mm", "L3_mm", "r_minus_R_mm")
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
-
-# ASSUME the paper prints no search bounds; these hold Table 6 read in radians (0.0201 rad) and twice the largest
-# printed length error.
-ANGLE_LIMIT_RAD = 0.03
-LENGTH_LIMIT_MM = 4.0
-_SOURCE = "paper A, section 2.2; bounds assumed"
-_ANGLES = ("dtheta1", "dtheta2", "dtheta3")
-# The gauge: R and r shift every leg by the same r - R, so that in the identifiable set one number, da = dr - dR, stands
-# for both.
-PARAMETER_NAMES = {
-    "published": (*_ANGLES, *(f"dL{leg}{link}" for leg in (1, 2, 3) for link in (1, 2, 3)), "dR", "dr"),
-    "tied": (*_ANGLES, "dL1", "dL2", "dL3", "dR", "dr"),
-    "identifiable": (*_ANGLES, "dL1", "dL2", "dL3", "da"),
-    "zero": _ANGLES,
-}
-
-
-def _error_parameter(name, angle_limit_rad, length_limit_mm):
-    """One error parameter, nominally zero; da, which stands for two lengths, has twice a length's limit."""
-    if name in _ANGLES:
-        return Parameter(name, "rad", 0.0, -angle_limit_rad, angle_limit_rad, _SOURCE)
-    limit = length_limit_mm * (2.0 if name == "da" else 1.0)
-    return Parameter(name, "mm", 0.0, -limit, limit, _SOURCE)
-
-
-def _leg_map(names):
-    """Matrix (3, 5, p) from the named errors to changes of the legs' numbers."""
-    matrix = np.zeros((3, 5, len(names)))
-    for column, name in enumerate(names):
-        if name.startswith("dtheta"):
-            matrix[int(name[-1]) - 1, 0, column] = 1.0
-        elif name.startswith("dL") and len(name) == 4:
-            matrix[int(name[2]) - 1, int(name[3]), column] = 1.0
-        elif name.startswith("dL"):
-            matrix[:, int(name[2]), column] = 1.0
-        else:
-            matrix[:, 4, column] = {"dR": -1.0, "dr": 1.0, "da": 1.0}[name]
-    return matrix
-
-
-def to_identifiable(values):
-    """Mapping of the 7 identifiable errors from a mapping of published or tied ones; what is absent is zero.
-
-    NaN for a link whose errors differ between the legs, since the identifiable set has one number for all three.
-    """
-    result = {name: float(values.get(name, 0.0)) for name in _ANGLES}
-    for link in (1, 2, 3):
-        legs = {float(values.get(f"dL{leg}{link}", values.get(f"dL{link}", 0.0))) for leg in (1, 2, 3)}
-        result[f"dL{link}"] = legs.pop() if len(legs) == 1 else float("nan")
-    result["da"] = float(values.get("da", values.get("dr", 0.0) - values.get("dR", 0.0)))
-    return result
+_LINKS = (1, 2, 3)
+# columns of the legs' numbers: what the drive's angle adds to, L1, L2, L3, r - R
+_DRIVES = of_each_leg("dtheta", 0, "rad")
+_OWN_LINKS = {f"dL{leg}{link}": Deviation(link, leg) for leg in LEGS for link in _LINKS}
+_TIED_LINKS = {f"dL{link}": Deviation(link) for link in _LINKS}
+_RADII = {"dR": Deviation(4, factor=-1.0), "dr": Deviation(4)}
+# The gauge: R and r shift every leg by the same r - R, so that one number, da = dr - dR, stands for both.
+_GAUGED = {"da": Deviation(4, share=2.0)}
 
 
 @dataclass(frozen=True)
 class Rrru3(ThreeLegs):
-    """The robot with its nominal dimensions and the choice of error parameters.
+    """The robot with its nominal dimensions and the choice of its parameters.
 
-    Dimensions in mm as in paper A, Table 2; `errors` is "published" (14), "tied" (8), "identifiable" (7) or "zero" (3).
+    Dimensions in mm as in paper A, Table 2; parameter_set: published (14), tied (8), identifiable (7) or zero (3).
     """
 
     L1_mm: float = 400.0
@@ -89,20 +45,24 @@ class Rrru3(ThreeLegs):
     r_mm: float = 400.0
     azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
     parameter_set: str = "identifiable"
-    angle_limit_rad: float = ANGLE_LIMIT_RAD
-    length_limit_mm: float = LENGTH_LIMIT_MM
+    # ASSUME the paper prints no search bounds; these hold Table 6 read in radians (0.0201 rad) and twice the largest
+    # printed length error
+    angle_limit_rad: float = 0.03
+    length_limit_mm: float = 4.0
     name: str = field(default="rrru3", init=False)
 
-    # unit of an actuator value; the set of error parameters that measured positions identify
+    # unit of an actuator value; the set of parameters that measured positions identify
     drive_unit = "rad"
     TRACKED = "identifiable"
-
-    def __post_init__(self):
-        for key in ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm", "angle_limit_rad", "length_limit_mm"):
-            if not getattr(self, key) > 0.0:
-                raise ConfigError(f"rrru3: {key} is {getattr(self, key)}; allowed: a positive number")
-        if self.parameter_set not in PARAMETER_NAMES:
-            raise ConfigError(f"rrru3: parameter_set is {self.parameter_set!r}; allowed: {', '.join(PARAMETER_NAMES)}")
+    DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
+    DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _GAUGED
+    PARAMETER_NAMES: ClassVar = {
+        "published": (*_DRIVES, *_OWN_LINKS, *_RADII),
+        "tied": (*_DRIVES, *_TIED_LINKS, *_RADII),
+        "identifiable": (*_DRIVES, *_TIED_LINKS, *_GAUGED),
+        "zero": (*_DRIVES,),
+    }
+    SOURCE = "paper A, section 2.2; bounds assumed"
 
     @property
     def angle_arm_mm(self):
@@ -115,23 +75,8 @@ class Rrru3(ThreeLegs):
         return np.array([self.R_mm, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm])
 
     @cached_property
-    def parameters(self):
-        """The error parameters: the meaning of every `errors` vector."""
-        return ParameterSet(
-            tuple(
-                _error_parameter(name, self.angle_limit_rad, self.length_limit_mm)
-                for name in PARAMETER_NAMES[self.parameter_set]
-            )
-        )
-
-    @cached_property
-    def leg_map(self):
-        """Derivative of the legs' numbers with respect to the errors, shape (3, 5, p)."""
-        return _leg_map(self.parameters.names)
-
-    @cached_property
     def nominal_legs(self):
-        """Numbers of the legs (3, 5), LEG_COLUMNS, without errors."""
+        """Numbers of the legs (3, 5) without deviations."""
         return np.tile([0.0, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm - self.R_mm], (3, 1))
 
     def inverse(self, position_mm, deviations=None, elbow="out"):
@@ -145,7 +90,7 @@ class Rrru3(ThreeLegs):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
         position = points(position_mm)
         signs = np.array([ELBOW_SIGN[e] for e in ((elbow,) * 3 if isinstance(elbow, str) else elbow)])
-        u, v = self._radial_tangential(position)
+        u, v = self.radial_tangential(position)
         reach = u + legs[:, 4]
         d = np.hypot(reach, position[:, 2:])
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -175,7 +120,7 @@ class Rrru3(ThreeLegs):
         not meet, the point nearest to all three is taken.
         """
         theta = points(theta_rad)
-        cx, cy = self.turn
+        cx, cy = self.azimuth_cos_sin
         radial = self.L1_mm * np.cos(theta) - (self.r_mm - self.R_mm)
         centre = np.stack([radial * cx, radial * cy, self.L1_mm * np.sin(theta)], axis=-1)
         first, second, third = centre[:, 0], centre[:, 1], centre[:, 2]
@@ -196,7 +141,7 @@ class Rrru3(ThreeLegs):
         start = self.first_guess(theta) if guess_mm is None else points(guess_mm)
         solved = kernels.forward(
             np.ascontiguousarray(legs, dtype=float),
-            self.turn,
+            self.azimuth_cos_sin,
             np.ascontiguousarray(np.cos(theta).T),
             np.ascontiguousarray(np.sin(theta).T),
             np.ascontiguousarray(start.T),
@@ -214,7 +159,7 @@ class Rrru3(ThreeLegs):
         """
         legs = self.legs(deviations)
         big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
-        cx, cy = self.turn
+        cx, cy = self.azimuth_cos_sin
         by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
         arm, forearm = legs[:, 1], legs[:, 3]
         by_leg = 2.0 * np.stack(
@@ -236,7 +181,7 @@ class Rrru3(ThreeLegs):
         """
         legs = self.legs(deviations)
         big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
-        _, v = self._radial_tangential(points(position_mm))
+        _, v = self.radial_tangential(points(position_mm))
         plane = np.arctan2(big_z, big_x)
         second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
         third = np.arcsin(v / legs[:, 3])
@@ -250,20 +195,14 @@ class Rrru3(ThreeLegs):
         """
         passive = self.passive_angles(position_mm, theta_rad, deviations)
         plane = np.asarray(theta_rad, dtype=float) + self.legs(deviations)[:, 0] + passive[..., 0]
-        cx, cy = self.turn
+        cx, cy = self.azimuth_cos_sin
         return np.stack([np.cos(plane) * cx, np.cos(plane) * cy, np.sin(plane)], axis=-1)
-
-    def _radial_tangential(self, position):
-        """Coordinates u and v (n, 3) of the points in the three legs."""
-        cx, cy = self.turn
-        x, y = position[:, :1], position[:, 1:2]
-        return x * cx + y * cy, y * cx - x * cy
 
     def _chain(self, position_mm, theta_rad, legs):
         """X, Z, rho v / s, rho, s and the true drive angle of every leg at every point, each (n, 3)."""
         position = points(position_mm)
         angle = points(theta_rad) + legs[:, 0]
-        u, v = self._radial_tangential(position)
+        u, v = self.radial_tangential(position)
         with np.errstate(invalid="ignore"):
             s = np.sqrt(legs[:, 3] ** 2 - v**2)
         rho = legs[:, 2] + s

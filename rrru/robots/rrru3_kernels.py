@@ -1,7 +1,7 @@
 """Compiled inner loops of the forward kinematics: a population of error vectors times the points of a campaign.
 
 Those of the 3-RRRU come first; their arrays are stored component first, shape (3, n), so that the loop over points is
-the innermost one and vectorises, and `legs` has the columns of `rrru.robots.rrru3.LEG_COLUMNS`. Lengths in mm, angles
+the innermost one and vectorises, and `legs` has the columns of `rrru.robots.rrru3`. Lengths in mm, angles
 in rad.
 """
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.robots.rrru3 import PARAMETER_NAMES, Rrru3
+from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, drive, per_leg, plan_of
 
 
@@ -50,7 +50,7 @@ def test_leg_asymmetry_is_the_papers_robot_with_fourteen_errors():
     motion, position, turned = drive({"leg_asymmetry": section}, plan)
     paper = Rrru3(parameter_set="published")
     named = {f"dL{leg}{link}": values[leg - 1, link - 1] for leg in (1, 2, 3) for link in (1, 2, 3)}
-    assert set(named) < set(PARAMETER_NAMES["published"])
+    assert set(named) < set(Rrru3.PARAMETER_NAMES["published"])
     exact = paper.forward(motion.drive, paper.parameters.vector(named), plan.targets())
     np.testing.assert_allclose(position, exact, atol=1e-8)
     assert turned.max() < 1e-12

@@ -47,7 +47,7 @@ class Lines:
     def __call__(self, deviations):
         """Objective (m,) in mm of errors (m, 8)."""
         self.seen.append(deviations.copy())
-        return kernels.mean_distance(deviations, self.robot.legs(deviations), self.robot.turn, *self._arrays)
+        return kernels.mean_distance(deviations, self.robot.legs(deviations), self.robot.azimuth_cos_sin, *self._arrays)
 
     def best_possible(self):
         """Objective at the least-squares solution, which is within noise of the mean distance's own minimum."""

@@ -119,7 +119,7 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
     # joint 4 lies at the platform's U joint, joint 3 a forearm before it
     passive = _ROBOT.passive_angles(points, theta)
     plane = theta + passive[..., 0]
-    cx, cy = _ROBOT.turn
+    cx, cy = _ROBOT.azimuth_cos_sin
     radial = np.cos(plane) * np.cos(passive[..., 1])
     side = np.sin(passive[..., 1])
     forearm = np.stack(

@@ -11,7 +11,7 @@ from rrru.errors import ConfigError, UnreachableError
 from rrru.fit.identifiability import analyse
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.robots import delta, ptt3, rrru3, singularity
+from rrru.robots import singularity
 from rrru.robots.protocol import MECHANISMS, make_mechanism
 
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))
@@ -40,7 +40,7 @@ CASES = {
     "ptt3_upright": Case("ptt3", _HANGING, (-1500.0, 1500.0), {"rail_inclination_deg": 90.0}),
     "delta": Case("delta", ((-300.0, -300.0, -150.0), (300.0, 300.0, 150.0)), (-np.pi, np.pi)),
 }
-_PARAMETER_NAMES = {"rrru3": rrru3.PARAMETER_NAMES, "ptt3": ptt3.PARAMETER_NAMES, "delta": delta.PARAMETER_NAMES}
+_PARAMETER_NAMES = {name: kind.PARAMETER_NAMES for name, kind in MECHANISMS.items()}
 PAIRS = [(name, kind) for name, case in CASES.items() for kind in _PARAMETER_NAMES[case.robot]]
 # combinations of errors that no position shows: R and r; along level rails R - r and a common slider zero
 GAUGES = {

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
 from rrru.robots import singularity
-from rrru.robots.rrru3 import PARAMETER_NAMES, Rrru3, to_identifiable
+from rrru.robots.protocol import identifiable_truth
+from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 
 # computed apart from this project: elbow out, y = 0, z = 600 (degrees)
@@ -73,7 +74,7 @@ def test_batch_over_errors_equals_one_at_a_time(rich_poses):
         np.testing.assert_array_equal(one, robot.forward(theta, vector, points))
 
 
-@pytest.mark.parametrize("kind", PARAMETER_NAMES)
+@pytest.mark.parametrize("kind", Rrru3.PARAMETER_NAMES)
 def test_parameter_jacobian_equals_finite_differences(rich_poses, kind):
     points, theta = rich_poses
     robot = Rrru3(parameter_set=kind)
@@ -138,19 +139,22 @@ def test_published_tied_and_identifiable_errors_say_the_same(rich_poses):
     published = {**{k: v for k, v in tied.items() if k[:2] != "dL"}, **{f"dL{leg}1": 0.4 for leg in (1, 2, 3)}}
     published |= {f"dL{leg}3": -0.2 for leg in (1, 2, 3)}
     positions = []
-    for kind, values in (("tied", tied), ("published", published), ("identifiable", to_identifiable(tied))):
+    for kind, values in (("tied", tied), ("published", published), ("identifiable", identifiable_truth(Rrru3(), tied))):
         robot = Rrru3(parameter_set=kind)
         positions.append(robot.forward(theta, robot.parameters.vector(values), points))
     np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
     np.testing.assert_allclose(positions[0], positions[2], atol=1e-9)
-    assert to_identifiable(published) == to_identifiable(tied)
+    assert identifiable_truth(Rrru3(), published) == identifiable_truth(Rrru3(), tied)
     assert np.linalg.norm(positions[0] - points, axis=1).min() > 0.1
 
 
 def test_legs_that_differ_have_no_tied_error():
-    assert np.isnan(to_identifiable({"dL11": 0.1, "dL21": 0.2})["dL1"])
-    assert np.isnan(to_identifiable({"dL11": 0.3})["dL1"]) and to_identifiable({"dL11": 0.3})["dL2"] == 0.0
-    assert to_identifiable({"dL1": 0.3, "dL21": 0.3})["dL1"] == 0.3
+    assert np.isnan(identifiable_truth(Rrru3(), {"dL11": 0.1, "dL21": 0.2})["dL1"])
+    assert (
+        np.isnan(identifiable_truth(Rrru3(), {"dL11": 0.3})["dL1"])
+        and identifiable_truth(Rrru3(), {"dL11": 0.3})["dL2"] == 0.0
+    )
+    assert identifiable_truth(Rrru3(), {"dL1": 0.3, "dL21": 0.3})["dL1"] == 0.3
 
 
 def test_out_of_reach_is_nan_in_batches_and_an_error_at_the_boundary():

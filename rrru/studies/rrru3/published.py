@@ -6,7 +6,7 @@ import pandas as pd
 
 from rrru.campaign.measurements import vectors
 from rrru.genetic.campaign_runs import typical_parameters
-from rrru.robots.rrru3 import PARAMETER_NAMES
+from rrru.robots.rrru3 import Rrru3
 from rrru.studies import paper, setup
 from rrru.studies.rrru3.paper import NUMBERS, SETTINGS, TIED, TIED_TO_PRINTED
 from rrru.studies.rrru3.redraw import spread
@@ -62,7 +62,7 @@ def _design(nominal, virtual, genetic):
         **{key: value for key, value in nominal["dimensions"].items() if key in _DIMENSIONS},
         "population": sum(genetic["populations"]),
         **{key: genetic[key] for key in ("crossover_fraction", "migration_fraction")},
-        "errors": len(PARAMETER_NAMES["published"]),
+        "errors": len(Rrru3.PARAMETER_NAMES["published"]),
     }
     if virtual:
         result |= {key: virtual["motion"][key] for key in ("speed_mm_s", "acceleration_mm_s2")}
