@@ -83,7 +83,7 @@ def from_config(section):
         spiral = section["spiral"]
         result += (
             Spiral(
-                "spiral",
+                spiral.get("name", "spiral"),
                 tuple(spiral["centre_mm"]),
                 tuple(spiral["radius_mm"]),
                 tuple(spiral["z_mm"]),

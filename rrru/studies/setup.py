@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
@@ -26,21 +27,38 @@ def mechanism(nominal, parameter_set=None):
 
 @dataclass(frozen=True)
 class VirtualCampaign:
-    """A campaign of a virtual robot: the robot, what it is told to do, the tracker's noise and a generator per purpose."""
+    """A campaign of a virtual robot: the robot, what it is told to do and the tracker's noise.
+
+    origin: first label of its random streams, beside its name; drive: actuator values (N, k) that the controller wants,
+    in the order driven, to those sent to the motors, None where these are the same.
+    """
 
     robot: virtual_robot.DrivenRobot
     plan: object
     noise_mm: float
     seed: int
     name: str
+    origin: str = "campaign"
+    drive: object = None
 
     def generator(self, *labels):
         """Random stream of this campaign for a purpose."""
-        return stream(self.seed, "campaign", self.name, *labels)
+        return stream(self.seed, self.origin, self.name, *labels)
 
-    def run(self):
-        """Measurements and truth with the nominal controller."""
-        return self.robot.run(self.plan, self.noise_mm, self.generator("measure"))
+    def run(self, controller=None, label="measure"):
+        """Measurements, with the actuator values that the controller wants, and truth.
+
+        controller: positions (N, 3) in the order driven to actuator values, by default the nominal inverse kinematics;
+        label: of the noise's random stream.
+        """
+        mechanism, generator = self.robot.mechanism, self.generator(label)
+        if self.drive is None:
+            return self.robot.run(self.plan, self.noise_mm, generator, controller)
+        path, index = self.plan.path()
+        wanted = (controller or mechanism.inverse)(path)
+        measurements, truth = self.robot.run(self.plan, self.noise_mm, generator, lambda _: self.drive(wanted))
+        columns = rows.actuator_columns(mechanism.drive_unit)
+        return measurements.assign(**dict(zip(columns, wanted[index].T, strict=True))), truth
 
 
 def virtual_campaign(nominal, virtual):
@@ -56,7 +74,8 @@ def virtual_campaign(nominal, virtual):
     robot = mechanism(nominal)
     kind = virtual_robot if nominal["name"] == "rrru3" else virtual_tripod
     real = kind.from_config(robot, virtual["robot"])
-    return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"])
+    origin = virtual.get("origin", "campaign")
+    return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
 
 
 def ingest_campaign(nominal, section):

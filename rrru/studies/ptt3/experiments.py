@@ -1,174 +1,177 @@
-"""The five experiments of paper B: robot, curve, what its controller does, and how it is measured. Lengths in mm,
-angles in rad.
+"""The experiments of paper B as campaigns like any other: a 3-PTT drives one curve several times. mm, angles in rad.
 
-Every experiment drives one curve several times and takes the mean of what the tracker sees as a point's position. The
-slider columns of its measurements hold where the controller wants the sliders; the jump that a compensated backlash
-adds to the motor's command is not in them.
+A point's position is the mean of what the tracker sees. Slider columns of the measurements hold where the controller
+wants the sliders; the jump that a compensated backlash adds to the motor's command is not in them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
+import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
-from rrru.campaign.trajectories import Spiral
+from rrru.campaign.trajectories import from_config
 from rrru.compensate.backlash import compensated
-from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
-from rrru.plant.screw import Bench
-from rrru.plant.virtual_tripod import VirtualTripod
-from rrru.robots.protocol import make_mechanism
-from rrru.seeds import stream
+from rrru.studies import setup
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The curve of eq. (18): one turn that rises evenly, and a run-up of some points before and after it."""
+
+    radius_mm: float
+    z_mm: tuple[float, float]
+    start_deg: float
+    points: int
+    run_up_points: int
+
+    @property
+    def trajectories(self):
+        """The curve with its run-up as an entry of the configuration's `trajectories`."""
+        share, (low, high) = self.run_up_points / (self.points - 1), self.z_mm
+        rise = share * (high - low)
+        spiral = {
+            "name": "curve",
+            "centre_mm": (0.0, 0.0),
+            "radius_mm": (self.radius_mm, self.radius_mm),
+            "z_mm": (low - rise, high + rise),
+            "turns": 1.0 + 2.0 * share,
+            "points": self.points + 2 * self.run_up_points,
+            "start_deg": self.start_deg - 360.0 * share,
+        }
+        return {"spiral": spiral}
+
+    def without_run_up(self, values):
+        """Rows (..., points, 3) of the curve itself from values (..., points and run-up, 3)."""
+        return values[..., self.run_up_points : self.run_up_points + self.points, :]
+
+
+@dataclass(frozen=True)
+class Network:
+    """What a network may learn from: number of training points, most neurons, folds, share that is new, spreads in mm."""
+
+    train: int
+    neurons: int
+    folds: int
+    new_share: float
+    spreads_mm: tuple
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One experiment: its campaign, its curve and motion, and what is learned from it how.
+
+    model: the mechanism with the calibrated parameters; repeats: passes that a measured position is the mean of;
+    paper_spread: the paper's, its unit not printed.
+    """
+
+    campaign: setup.VirtualCampaign
+    curve: Curve
+    motion: dict
+    repeats: int
+    payload_kg: float
+    model: object
+    network: Network
+    paper_spread: float
+
+    def plan(self, payload_kg=None, reverse=(False,)):
+        """Plan of passes along the curve, each in its direction; payload_kg: another than the experiment's."""
+        load = self.payload_kg if payload_kg is None else payload_kg
+        passes = [{"payload_kg": load, "reverse": backwards} for backwards in reverse]
+        return make_plan(from_config(self.curve.trajectories), passes, **self.motion)
+
+    def mean_noise(self, *labels):
+        """Tracker noise (n, 3) of the curve's points, each the mean over the repeats, from the stream of the labels."""
+        scale = self.campaign.noise_mm / np.sqrt(self.repeats)
+        return scale * self.campaign.generator(*labels).standard_normal((self.curve.points, 3))
 
 
 def check(config):
     """Raise ConfigError where the `ptt` section does not fit together, before anything runs."""
     section = config["ptt"]
-    for name, members in section["joint"].items():
+    known, joint = section["experiments"], section["joint"]
+    for name, members in joint.items():
         for member in members:
-            if member not in section["experiments"]:
-                raise ConfigError(
-                    f"ptt.joint.{name}: no experiment {member!r}; known: {', '.join(section['experiments'])}"
-                )
-    for name in (*section["experiments"], *section["joint"]):
-        if name in config["campaigns"] or (name in section["experiments"] and name in section["joint"]):
-            raise ConfigError(
-                f"ptt: {name!r} names two things; allowed: names that no campaign and no other experiment has"
-            )
+            if member not in known:
+                raise ConfigError(f"ptt.joint.{name}: no experiment {member!r}; known: {', '.join(known)}")
+    for name in (*known, *joint):
+        if name in config["campaigns"] or (name in known and name in joint):
+            allowed = "names that no campaign and no other experiment has"
+            raise ConfigError(f"ptt: {name!r} names two things; allowed: {allowed}")
     points, train = section["curve"]["points"], section["network"]["train"]
     if not train < points:
         raise ConfigError(f"ptt.network.train is {train}; allowed: below ptt.curve.points, which is {points}")
     travel, reach = section["bench"]["turns"] * section["bench"]["lead_mm"], section["bench"]["range_mm"]
     if travel > reach:
         raise ConfigError(f"ptt.bench: turns times lead_mm is {travel:g} mm; allowed: up to range_mm, {reach:g} mm")
-    robot(config)
+    experiment(config, next(iter(known)))
 
 
-def mechanism(config, parameter_set="tied"):
-    """The nominal 3-PTT with a choice of error parameters, see `rrru.robots.ptt3`."""
-    return make_mechanism("ptt3", config["robots"]["ptt3"], parameter_set=parameter_set)
+def campaign_section(settings, name):
+    """What an entry of `campaigns` would say of an experiment, or of experiments that are diagnosed together."""
+    section = settings["ptt"]
+    loads = [section["experiments"][member]["payload_kg"] for member in section["joint"].get(name, [name])]
+    return {
+        "robot": "ptt3",
+        "passes": [{"payload_kg": load, "reverse": False} for load in loads for _ in range(section["repeats"])],
+        "noise_mm": section["noise_mm"],
+        "errors": section["parameters"],
+    }
 
 
-def robot(config):
-    """The virtual robot that all experiments share; raises ConfigError for an unknown error or effect."""
-    section, loads = config["ptt"]["robot"], config["loads"]
-    return VirtualTripod(
-        mechanism(config),
-        deviations={name: float(value) for name, value in section["errors"].items()},
-        effects=active_effects(section["effects"], "mm"),
-        platform_mass_kg=loads["platform_mass_kg"],
-        forearm_mass_kg=loads["forearm_mass_kg"],
-        arm_mass_kg=loads["arm_mass_kg"],
-    )
+def nominal(settings):
+    """The robot as the builder wants it, see `rrru.studies.config`."""
+    return {"name": "ptt3", "dimensions": settings["robots"]["ptt3"]}
 
 
-def bench(config):
-    """The encoder's bench."""
-    section = config["ptt"]["bench"]
-    return Bench(**{key: value for key, value in section.items() if key != "range_mm"})
+def experiment(settings, name, widths_mm=(0.0, 0.0, 0.0), compensate=None):
+    """The experiment of that name, of the parts seed, robots.ptt3, loads and ptt of the configuration.
 
-
-def curve(config, radius_mm=0.0, height_mm=0.0):
-    """The curve of eq. (18) with its run-up before and after, with what is added to its radius and heights in mm."""
-    section = config["ptt"]["curve"]
-    radius, (low, high), extra = section["radius_mm"] + radius_mm, section["z_mm"], section["run_up_points"]
-    share = extra / (section["points"] - 1)
-    low, high = low - share * (high - low) + height_mm, high + share * (high - low) + height_mm
-    start = section["start_deg"] - 360.0 * share
-    return Spiral(
-        "curve", (0.0, 0.0), (radius, radius), (low, high), 1.0 + 2.0 * share, section["points"] + 2 * extra, start
-    )
-
-
-def plan(config, payload_kg, path=None, reverse=(False,), repeats=None):
-    """Plan of passes along a curve under a payload; reverse: directions of the passes, taken in turn.
-
-    path, repeats: another curve and number of passes than the configured ones.
+    widths_mm (3,): the backlash as measured; compensate: whether the command jumps by it at a reversal, instead of as
+    configured. Raises ConfigError for an unknown error or effect of the robot.
     """
-    section = config["ptt"]
-    passes = [
-        {"payload_kg": payload_kg, "reverse": reverse[k % len(reverse)]} for k in range(repeats or section["repeats"])
-    ]
-    return make_plan(
-        [path or curve(config)],
-        passes,
-        *(section["motion"][key] for key in ("speed_mm_s", "acceleration_mm_s2", "dwell_s")),
-    )
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """One experiment: the virtual robot, whether its backlash is compensated, its payload, plan, tracker noise and
-    seed.
-    """
-
-    name: str
-    robot: VirtualTripod
-    compensated: bool
-    payload_kg: float
-    plan: object
-    noise_mm: float
-    seed: int
-
-    def generator(self, *labels):
-        """Random stream of the experiment for a purpose."""
-        return stream(self.seed, "ptt", self.name, *labels)
-
-    def run(self, widths_mm, generator, sliders=None, plan=None):
-        """Measurements of a plan, by default the experiment's.
-
-        widths_mm (3,): the backlash as measured, which the command compensates if the experiment does; sliders:
-        positions (N, 3) in the order driven to slider positions (N, 3), by default the nominal inverse kinematics.
-        """
-        plan, sliders = plan or self.plan, sliders or self.robot.mechanism.inverse
-        path, index = plan.path()
-        wanted = sliders(path)
-        measured, _ = self.robot.run(plan, self.noise_mm, generator, lambda _: self._sent(wanted, widths_mm))
-        return measured.assign(**dict(zip(rows.actuator_columns("mm"), wanted[index].T, strict=True)))
-
-    def positions(self, widths_mm, sliders, plan):
-        """True positions (n, 3) at a plan's points, driven as in `run`; raises UnreachableError."""
-        self.robot.mechanism.require_reachable(plan.targets())
-        position, _ = self.robot.positions(self.robot.motion(plan, lambda path: self._sent(sliders(path), widths_mm)))
-        return position
-
-    def _sent(self, wanted_mm, widths_mm):
-        """Drive commands (N, 3) for wanted slider positions (N, 3) in the order driven."""
-        return compensated(wanted_mm, widths_mm) if self.compensated else wanted_mm
-
-
-def experiment(config, name, compensate=None):
-    """The experiment of that name; compensate: whether its backlash is, instead of as configured."""
-    section = config["ptt"]
-    own = section["experiments"][name]
-    load = own["payload_kg"]
+    section = settings["ptt"]
+    own, curve = section["experiments"][name], Curve(**section["curve"])
+    campaign = campaign_section(settings, name)
+    virtual = {
+        "name": name,
+        "origin": "ptt",
+        "seed": settings["seed"],
+        "robot": section["robot"] | settings["loads"],
+        "trajectories": curve.trajectories,
+        "motion": section["motion"],
+        **{key: campaign[key] for key in ("passes", "noise_mm")},
+    }
+    driven = setup.virtual_campaign(nominal(settings), virtual)
+    if own["compensate_backlash"] if compensate is None else compensate:
+        driven = replace(driven, drive=partial(compensated, widths_mm=widths_mm))
     return Experiment(
-        name=name,
-        robot=robot(config),
-        compensated=own["compensate_backlash"] if compensate is None else compensate,
-        payload_kg=load,
-        plan=plan(config, load),
-        noise_mm=section["noise_mm"],
-        seed=config["seed"],
+        campaign=driven,
+        curve=curve,
+        motion=section["motion"],
+        repeats=section["repeats"],
+        payload_kg=own["payload_kg"],
+        model=setup.mechanism(nominal(settings), section["parameters"]),
+        network=Network(**section["network"]),
+        paper_spread=own["paper_spread"],
     )
 
 
-def point_means(config, measurements):
-    """Commanded positions, wanted slider positions and mean measured positions, each (n, 3), of the curve's points
-    without the run-up.
+def point_means(experiment, measurements):
+    """Commanded positions, wanted sliders and mean measured positions, each (n, 3), of the curve's points.
 
     measurements: of passes in one direction.
     """
-    extra, passes = config["ptt"]["curve"]["run_up_points"], measurements["run"].nunique()
+    passes = measurements["run"].nunique()
     every = (rows.command(measurements), rows.actuators(measurements), rows.measured(measurements))
-    return tuple(values.reshape(passes, -1, 3)[:, extra : -extra or None].mean(axis=0) for values in every)
+    return tuple(experiment.curve.without_run_up(v.reshape(passes, -1, 3)).mean(axis=0) for v in every)
 
 
 def joined(measured, dwell_s):
-    """Measurements of several experiments as one campaign, one after another with a rest between them, runs numbered
-    on.
-    """
+    """Measurements of several experiments as one campaign, one after another with a rest between, runs numbered on."""
     parts, runs, time = [], 0, 0.0
     for frame in measured:
         parts.append(frame.assign(run=frame["run"] + runs, time_s=frame["time_s"] + time))
