@@ -53,7 +53,8 @@ def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError for an unknown error and for axis errors,
     which these do not have.
     """
-    if section["axis_errors"]["position_mm"] or section["axis_errors"]["angle_rad"]:
+    axes = section.get("axis_errors", {})
+    if axes.get("position_mm") or axes.get("angle_rad"):
         raise ConfigError(
             f"virtual robot: axis_errors on a {mechanism.name}; allowed: none, its platform does not turn; see errors and effects"
         )
@@ -61,7 +62,7 @@ def from_config(mechanism, section):
         mechanism,
         {name: float(value) for name, value in section["errors"].items()},
         active_effects(section["effects"], mechanism.drive_unit),
-        section["wobble_mm"],
+        section.get("wobble_mm", 0.0),
         section["platform_mass_kg"],
         section["forearm_mass_kg"],
         section["arm_mass_kg"],

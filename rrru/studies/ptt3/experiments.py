@@ -51,7 +51,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Network:
-    """What a network may learn from: number of training points, most neurons, folds, share that is new, spreads in mm."""
+    """A network's training points, most neurons, folds, least share that is new of a neuron, and candidate spreads."""
 
     train: int
     neurons: int

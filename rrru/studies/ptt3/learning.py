@@ -1,5 +1,4 @@
-"""What can be learned from a measured curve, each as a controller: positions (n, 3) to slider positions (n, 3). Lengths
-in mm.
+"""What can be learned from a measured curve, each as a controller: positions (n, 3) to slider positions (n, 3) in mm.
 
 Where the paper is followed, a height error counts from that of the curve's first point (3.3), so that a common height
 error stays. The networks with `absolute` heights and the calibrated model take it out as well.
@@ -15,18 +14,7 @@ from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.compensate.rbf import ROUNDING, fit, grow, make_folds, validation_mse
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.studies.ptt3 import experiments as robot
-
-METHODS = (
-    "rbf_inverse",
-    "rbf_jacobian",
-    "rbf_absolute",
-    "rbf_paper",
-    "rbf_paper_mm",
-    "interpolator",
-    "parameters",
-    "rbf_after_parameters",
-)
+from rrru.studies.ptt3.experiments import Network
 
 
 def relative(error_mm):
@@ -34,11 +22,21 @@ def relative(error_mm):
     return error_mm - np.array([0.0, 0.0, error_mm[0, 2]])
 
 
+def remembered(function):
+    """The function of an array with its answer kept until it is asked about another array."""
+    last = [None, None]
+
+    def answer(array):
+        if last[0] is not array:
+            last[:] = array, function(array)
+        return last[1]
+
+    return answer
+
+
 @dataclass(frozen=True)
 class Choice:
-    """A spread in mm and a number of neurons, and the cross-validated mean squared errors (s, neurons + 1) they are the
-    best of.
-    """
+    """The best spread and number of neurons, and all cross-validated mean squared errors (s, neurons + 1)."""
 
     spread_mm: float
     neurons: int
@@ -50,7 +48,7 @@ class Learning:
     """One experiment's curve as measured, and what is learned from its training points.
 
     command_mm, sliders_mm, measured_mm: (n, 3); train (n,): which points are learned from; folds: fold of every
-    training point; network: `ptt.network` of the configuration; paper_spread: the paper's, unit not printed.
+    training point; paper_spread: the paper's, unit not printed.
     """
 
     mechanism: object
@@ -59,7 +57,7 @@ class Learning:
     measured_mm: np.ndarray
     train: np.ndarray
     folds: np.ndarray
-    network: dict
+    network: Network
     paper_spread: float
 
     @property
@@ -68,32 +66,24 @@ class Learning:
         return self.measured_mm - self.command_mm
 
     @property
-    def half_range_mm(self):
-        """Half the largest range of a coordinate: what scaling the network's inputs to -1 .. 1 divides by."""
-        return 0.5 * float(np.ptp(self.command_mm, axis=0).max())
-
-    @property
     def paper_spreads_mm(self):
-        """The paper's spread by both readings of its unit: of inputs scaled to -1 .. 1 ("paper_scaled"), or mm
-        ("paper_mm").
-        """
-        return {"paper_scaled": self.paper_spread * self.half_range_mm, "paper_mm": self.paper_spread}
+        """The paper's spread by both readings of its unit: of inputs scaled to -1 .. 1, or mm."""
+        half_range_mm = 0.5 * float(np.ptp(self.command_mm, axis=0).max())
+        return {"paper_scaled": self.paper_spread * half_range_mm, "paper_mm": self.paper_spread}
 
     def choose(self, targets):
         """The candidate spread and the number of neurons with the least cross-validated error on targets (n, q)."""
         points, wanted = self.command_mm[self.train], targets[self.train]
-        spreads, most, share = (self.network[key] for key in ("spreads_mm", "neurons", "new_share"))
+        spreads, most, share = self.network.spreads_mm, self.network.neurons, self.network.new_share
         curves = np.array([validation_mse(points, wanted, spread, most, self.folds, share) for spread in spreads])
         best, neurons = np.unravel_index(curves.argmin(), curves.shape)
         return Choice(float(spreads[best]), int(neurons), curves)
 
     def trained(self, targets, spread_mm, neurons, new_share=None):
-        """Network on the training points with targets (n, q); new_share: another one than the configured, see
-        `grow`.
-        """
+        """Network on the training points with targets (n, q); new_share: another than the configured one."""
         points, wanted = self.command_mm[self.train], targets[self.train]
-        share = self.network["new_share"] if new_share is None else new_share
-        return fit(points, wanted, spread_mm, grow(points, wanted, spread_mm, neurons, share).order)
+        order = grow(points, wanted, spread_mm, neurons, new_share or self.network.new_share).order
+        return fit(points, wanted, spread_mm, order)
 
     @cached_property
     def choice(self):
@@ -102,29 +92,25 @@ class Learning:
 
     @cached_property
     def chosen(self):
-        """The network of that choice."""
-        return self.trained(relative(self.error_mm), self.choice.spread_mm, self.choice.neurons)
+        """The network of that choice; several methods ask it about the same path."""
+        return remembered(self.trained(relative(self.error_mm), self.choice.spread_mm, self.choice.neurons))
 
     @cached_property
     def calibration(self):
         """Least-squares fit of the mechanism's parameters on the training points."""
-        rows = self.train
-        return least_squares(
-            Residuals(self.mechanism, self.sliders_mm[rows], self.measured_mm[rows], self.command_mm[rows])
-        )
+        points = (values[self.train] for values in (self.sliders_mm, self.measured_mm, self.command_mm))
+        return least_squares(Residuals(self.mechanism, *points))
 
     @cached_property
     def rest(self):
         """The network of a choice of its own, on what the calibration leaves."""
         left = self.measured_mm - self.mechanism.forward(self.sliders_mm, self.calibration.deviations)
-        again = self.choose(left)
-        return self.trained(left, again.spread_mm, again.neurons)
+        choice = self.choose(left)
+        return self.trained(left, choice.spread_mm, choice.neurons)
 
     @cached_property
     def paper(self):
-        """Networks of the paper's spread by both readings, with all the neurons that its target of zero error asks
-        for.
-        """
+        """Networks of the paper's spread by both readings, with all neurons that its target of zero error asks for."""
         error, count = relative(self.error_mm), int(self.train.sum())
         return {key: self.trained(error, spread, count, ROUNDING) for key, spread in self.paper_spreads_mm.items()}
 
@@ -133,47 +119,44 @@ class Learning:
         """The biharmonic spline through the training points: in three dimensions its kernel is the distance itself."""
         return RBFInterpolator(self.command_mm[self.train], relative(self.error_mm)[self.train], kernel="linear")
 
-    def controllers(self):
-        """Every method's controller by name; what one needs is learned when it is first called.
+    def _absolute(self, path):
+        """The chosen network's answers with the common height error added."""
+        return self.chosen(path) + self.error_mm[0] * np.array([0.0, 0.0, 1.0])
 
-        rbf_inverse, rbf_jacobian: the cross-validated network, through eq. (11) or eq. (12); rbf_absolute: with the
-        common height error learned; rbf_paper, rbf_paper_mm: the paper's spread, scaled or in mm, and all the neurons
-        that its target of zero error asks for; interpolator: scipy's biharmonic spline through the training points,
-        which has nothing to choose; parameters: calibrated model; rbf_after_parameters: a network on what the
-        calibration leaves.
-        """
-        mechanism, height = self.mechanism, self.error_mm[0] * np.array([0.0, 0.0, 1.0])
-        return {
-            "rbf_inverse": lambda path: through_inverse(mechanism, path, self.chosen(path)),
-            "rbf_jacobian": lambda path: through_jacobian(mechanism, path, self.chosen(path)),
-            "rbf_absolute": lambda path: through_inverse(mechanism, path, self.chosen(path) + height),
-            "rbf_paper": lambda path: through_inverse(mechanism, path, self.paper["paper_scaled"](path)),
-            "rbf_paper_mm": lambda path: through_inverse(mechanism, path, self.paper["paper_mm"](path)),
-            "interpolator": lambda path: through_inverse(mechanism, path, self.spline(path)),
-            "parameters": lambda path: mechanism.inverse(path, self.calibration.deviations),
-            "rbf_after_parameters": lambda path: through_inverse(
-                mechanism, path, self.rest(path), self.calibration.deviations
-            ),
-        }
+    def sliders(self, method, path):
+        """Slider positions (N, 3) for positions (N, 3) in the order driven by one of METHODS."""
+        return METHODS[method](self, path)
 
 
-def learning(config, experiment, means, labels=()):
-    """What an experiment's point means (see `robot.point_means`) allow to learn.
+def _network(answers):
+    """The method that takes a network's answers out through the exact inverse kinematics, eq. (11)."""
+    return lambda learned, path: through_inverse(learned.mechanism, path, answers(learned, path))
+
+
+# The cross-validated network through eq. (11) or eq. (12), and with the common height error learned; the paper's
+# spread, scaled or in mm; scipy's biharmonic spline, which has nothing to choose; the calibrated model, and a network
+# on what it leaves.
+METHODS = {
+    "rbf_inverse": _network(lambda learned, path: learned.chosen(path)),
+    "rbf_jacobian": lambda learned, path: through_jacobian(learned.mechanism, path, learned.chosen(path)),
+    "rbf_absolute": _network(Learning._absolute),
+    "rbf_paper": _network(lambda learned, path: learned.paper["paper_scaled"](path)),
+    "rbf_paper_mm": _network(lambda learned, path: learned.paper["paper_mm"](path)),
+    "interpolator": _network(lambda learned, path: learned.spline(path)),
+    "parameters": lambda learned, path: learned.mechanism.inverse(path, learned.calibration.deviations),
+    "rbf_after_parameters": lambda learned, path: through_inverse(
+        learned.mechanism, path, learned.rest(path), learned.calibration.deviations
+    ),
+}
+
+
+def learning(experiment, means, labels=()):
+    """What an experiment's point means (see `experiments.point_means`) allow to learn.
 
     Which points train, and their folds, are drawn from the experiment's streams of those labels.
     """
-    section = config["ptt"]
-    command, sliders, measured = means
-    count, size = section["network"]["train"], len(command)
-    train = np.zeros(size, dtype=bool)
-    train[experiment.generator("split", *labels).permutation(size)[:count]] = True
-    return Learning(
-        robot.mechanism(config, section["parameters"]),
-        command,
-        sliders,
-        measured,
-        train,
-        make_folds(count, section["network"]["folds"], experiment.generator("folds", *labels)),
-        section["network"],
-        section["experiments"][experiment.name]["paper_spread"],
-    )
+    network, generator = experiment.network, experiment.campaign.generator
+    train = np.zeros(len(means[0]), dtype=bool)
+    train[generator("split", *labels).permutation(len(train))[: network.train]] = True
+    folds = make_folds(network.train, network.folds, generator("folds", *labels))
+    return Learning(experiment.model, *means, train, folds, network, experiment.paper_spread)

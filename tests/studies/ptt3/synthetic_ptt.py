@@ -5,10 +5,10 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from tests.schemas import check
-from rrru.studies.ptt3.controllers import METHODS
-from tests.schemas import TABLES
+from rrru.studies.ptt3.learning import METHODS as _METHODS
+from tests.schemas import TABLES, check
 
+METHODS = tuple(_METHODS)
 EXPERIMENTS = tuple(f"ptt_{k}" for k in range(1, 6))
 _POINTS = 24
 _NO_RANGE = {"benefit_low_percent": np.nan, "benefit_high_percent": np.nan}
