@@ -5,7 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from rrru.store.tables import check, columns
+from tests.schemas import TABLES, check
 
 EFFECTS = (
     *(
@@ -153,7 +153,9 @@ def _score(generator, label, truth):
 def withheld_confusion(scores):
     """`withheld_confusion` of the scores."""
     counted = scores.groupby(["check", "truth", "verdict"]).size().rename("robots").reset_index()
-    return check("withheld_confusion", counted if len(counted) else pd.DataFrame(columns=columns("withheld_confusion")))
+    return check(
+        "withheld_confusion", counted if len(counted) else pd.DataFrame(columns=TABLES["withheld_confusion"].names)
+    )
 
 
 def withheld_tables():

@@ -5,8 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from rrru.store.tables import check, columns
-from tests.schemas import TABLES
+from tests.schemas import TABLES, check
 
 CAMPAIGN = "made_up"
 OPTIONS = {
@@ -209,7 +208,7 @@ def genetic(seeds=5):
                 "polished_excess": 0.0,
             }
             runs.append(label | numbers | excess | _found() | {"da": 0.0})
-    return check("genetic", pd.DataFrame(runs).reindex(columns=columns("genetic"))), check(
+    return check("genetic", pd.DataFrame(runs).reindex(columns=TABLES["genetic"].names)), check(
         "genetic_history", pd.concat(history, ignore_index=True)
     )
 

@@ -29,9 +29,9 @@ def test_round_trip_keeps_values_types_and_nulls(tmp_path):
     tables.write(TABLES["correlations"], _ROWS[list(_ROWS)[::-1]], path)
     pd.testing.assert_frame_equal(tables.read(path), _ROWS, check_dtype=False)
     schema = parquet.read_schema(path)
-    assert [str(t) for t in schema.types] == ["string"] * 4 + ["double"] and schema.names == tables.columns(
+    assert [str(t) for t in schema.types] == ["string"] * 4 + ["double"] and schema.names == TABLES[
         "correlations"
-    )
+    ].names
     assert parquet.read_table(path)["correlation"].null_count == 1
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
-from rrru.plant import virtual_robot
 from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.robots.protocol import make_mechanism
 from rrru.seeds import stream
-from rrru.studies import setup as study
+from rrru.studies import config as parts
+from rrru.studies import setup
 from rrru.studies.delta import twin as delta_robot
 from rrru.studies.ptt3 import experiments as ptt_robot
 
@@ -88,9 +88,7 @@ def _robot(config, name):
     limits = {"angle_limit_rad": bounds["angle_rad"], "length_limit_mm": bounds["length_mm"]}
     if name == "rrru3":
         campaign = config["reproduce"]["campaign"]
-        return virtual_robot.from_config(
-            study.mechanism(config, campaign), config["virtual_robots"][config["campaigns"][campaign]["virtual"]]
-        )
+        return setup.virtual_campaign(parts.nominal(config, campaign), parts.virtual(config, campaign)).robot
     if name == "ptt3":
         robot = ptt_robot.robot(config)
         return replace(robot, mechanism=replace(robot.mechanism, **limits))

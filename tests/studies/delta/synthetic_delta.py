@@ -5,8 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from tests.schemas import check
-from tests.schemas import TABLES
+from tests.schemas import TABLES, check
 
 VARIANTS = ("none", "paper", "converged", "shape", "tracker_positions", "of_my_own")
 
