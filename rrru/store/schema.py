@@ -48,6 +48,11 @@ def xyz(prefix, suffix, text, nullable=False):
     return tuple(Column(f"{prefix}_{axis}_{suffix}", "float64", f"{text}, {axis}", nullable) for axis in "xyz")
 
 
+def numbers(nullable=False, **texts):
+    """One column of numbers per name, with its description."""
+    return tuple(Column(name, "float64", text, nullable) for name, text in texts.items())
+
+
 CAMPAIGN = Column("campaign", "str", "name of the campaign in the configuration")
 CALIBRATION = Column("calibration", "str", "set of trajectories that was calibrated on; none before any calibration")
 METHOD = Column(

@@ -1,29 +1,29 @@
 """Tables of the comparison of methods across the robots."""
 
-from rrru.store.schema import NUMBER, Column, Table
+from rrru.store.schema import Column, Table, numbers
 
+_POINTS = "points measured to learn from; of jacobian_step the targets themselves, of images the poses"
 _ROBOT = Column("robot", "str", "mechanism: rrru3, ptt3 or delta")
 _METHOD = Column("method", "str", "what is learned; see `needs` in methods")
+_TEST_TEXT = "targets inside the region that was learned on, or outside of it"
 _RESULT = (
     _ROBOT,
     _METHOD,
-    Column(
-        "test", "str", "targets inside the region that was learned on, or outside of it", allowed=("inside", "outside")
+    Column("test", "str", _TEST_TEXT, allowed=("inside", "outside")),
+    Column("points", "int64", _POINTS),
+    *numbers(
+        before_mean_mm="mean true distance from the target with the nominal controller",
+        before_max_mm="largest one",
+        after_mean_mm="mean true distance from the target, the robot driven again with the corrected commands",
+        after_max_mm="largest one",
     ),
-    Column(
-        "points", "int64", "points measured to learn from; of jacobian_step the targets themselves, of images the poses"
-    ),
-    Column("before_mean_mm", NUMBER, "mean true distance from the target with the nominal controller"),
-    Column("before_max_mm", NUMBER, "largest one"),
-    Column(
-        "after_mean_mm",
-        NUMBER,
-        "mean true distance from the target, the robot driven again with the corrected commands",
-    ),
-    Column("after_max_mm", NUMBER, "largest one"),
     Column("numbers", "int64", "numbers learned: parameters, or weights and thresholds"),
-    Column("measuring_time_s", NUMBER, "time of the robot's campaign, moves and rests"),
+    *numbers(measuring_time_s="time of the robot's campaign, moves and rests"),
     Column("evaluations", "int64", "model positions solved; 0 where a method needs no model to learn"),
+)
+_NEEDED = (
+    "fewest points tried from which on the mean error inside stays within a tenth, or the tracker's noise, of that "
+    "with all points"
 )
 TABLES = (
     Table(
@@ -32,13 +32,9 @@ TABLES = (
         "Every method on every robot where it makes sense: what it removes, what it takes, what it needs to measure.",
         (
             *_RESULT,
-            Column("removed_share", NUMBER, "1 - after_mean_mm / before_mean_mm"),
-            Column(
-                "points_needed",
-                "int64",
-                "fewest points tried from which on the mean error inside stays within a tenth, or the tracker's noise, of that with all points",
-            ),
-            Column("needed_time_s", NUMBER, "measuring time of these"),
+            *numbers(removed_share="1 - after_mean_mm / before_mean_mm"),
+            Column("points_needed", "int64", _NEEDED),
+            *numbers(needed_time_s="measuring time of these"),
             Column("needs", "str", "what has to be measured"),
         ),
         ("robot", "method", "test"),
@@ -55,10 +51,8 @@ TABLES = (
         "timings/methods_{robot}.parquet",
         "Computing time of every method on this machine; differs from run to run, as all of timings/ does.",
         (
-            _ROBOT,
-            _METHOD,
-            Column("points", "int64", "points to learn from"),
-            Column("seconds", NUMBER, "wall time of learning"),
+            *(_ROBOT, _METHOD, Column("points", "int64", "points to learn from")),
+            *numbers(seconds="wall time of learning"),
         ),
         ("robot", "method", "points"),
     ),
