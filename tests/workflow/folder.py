@@ -9,7 +9,7 @@ SNAKEMAKE = str(Path(sys.executable).parent / "snakemake")
 
 def link(folder):
     """Link what a run needs into a folder, once."""
-    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests"):
+    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests", "data"):
         place = folder / name
         if not place.exists():
             place.symlink_to(ROOT / name)

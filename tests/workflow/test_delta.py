@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots.delta import Delta
-from rrru.studies.delta import draws, fits, views, vision
-from rrru.studies.delta import robot_search as search
-from rrru.studies.delta import twin as robot
+from rrru.studies.delta import draws, robot_search, views, virtual_delta, vision
+from rrru.studies.delta.variants import VARIANTS
 from tests.workflow.folder import ROOT, SNAKEMAKE, link
 
 _OVERLAY = (
@@ -57,7 +56,7 @@ def _columns(table, name):
 
 def test_images_lead_to_smaller_errors_and_every_variant_stands_in_the_tables(finished):
     calibrations = _table(finished, "calibrations").set_index("variant")
-    assert calibrations.index.tolist() == ["none", *(variant.name for variant in fits.VARIANTS)]
+    assert calibrations.index.tolist() == ["none", *(variant.name for variant in VARIANTS)]
     assert (calibrations["rank"].iloc[1:] == 3).all() and calibrations.loc["paper", "equations"] == 8
     assert calibrations.loc["paper", "plane_mean_mm"] < calibrations.loc["none", "plane_mean_mm"]
     poses = _table(finished, "poses")
@@ -95,7 +94,7 @@ def test_errors_on_the_plane_are_those_of_a_robot_driven_again(finished, config)
 
 def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(finished, config):
     robots = _table(finished, "robots").set_index(["length_error_mm", "variant"])
-    assert (robots["robots"] == 12).all() and len(robots) == 3 * (len(fits.VARIANTS) + 1)
+    assert (robots["robots"] == 12).all() and len(robots) == 3 * (len(VARIANTS) + 1)
     small, large = (robots.loc[length] for length in (0.0, 0.2))
     assert (large["base_median_mm"].drop("none") > small["base_median_mm"].drop("none")).all()
     assert (robots["plane_median_mm"] <= robots["plane_high_mm"]).all()
@@ -109,7 +108,7 @@ def test_over_robots_lengths_hurt_and_the_base_frame_needs_the_tracker(finished,
 
 def test_other_draws_move_what_images_find_and_leave_the_rest(finished, config):
     rows, noise = _table(finished, "draws").set_index("variant"), config["delta"]["tracker_noise_mm"]
-    assert rows.index.tolist() == ["none", *(variant.name for variant in fits.VARIANTS)] and (rows["draws"] == 3).all()
+    assert rows.index.tolist() == ["none", *(variant.name for variant in VARIANTS)] and (rows["draws"] == 3).all()
     for size in ("plane_mean", "plane_max", "base_mean", "base_max"):
         low, median, high = (rows[f"{size}_{side}_mm"] for side in ("low", "median", "high"))
         assert ((low <= median) & (median <= high)).all()
@@ -133,12 +132,13 @@ def test_dots_that_are_projected_are_those_of_the_rendered_images(finished, conf
     assert draws.centre_noise_px(config, truth, found) == pytest.approx(expected, rel=0.15)
     lens = _table(finished, "camera")["found"].to_numpy()
     matrix = np.array([[lens[0], 0.0, lens[2]], [0.0, lens[1], lens[3]], [0.0, 0.0, 1.0]])
-    model = vision.CameraModel(matrix, lens[4:8], lens[8], 7)
-    view = views.scene(config)
-    seen = [draws.seen_dots(view, *place) for place in views.pose_places(view, truth)]
-    exact = np.array(
-        [vision.camera_pose(model, dots, target["pitch_mm"], target["diameter_mm"]).centre_mm for dots in seen]
+    model, lattice = (
+        vision.CameraModel(matrix, lens[4:8], lens[8]),
+        vision.Lattice(target["pitch_mm"], target["diameter_mm"]),
     )
+    view = views.scene(config)
+    seen = [draws.seen_dots(view, *place) for place in view.pose_places(truth)]
+    exact = np.array([vision.camera_pose(model, dots, lattice).centre_mm for dots in seen])
     rendered, projected = (
         places - _columns(truth, "true") for places in (_columns(_table(finished, "centres"), "centre"), exact)
     )
@@ -167,7 +167,7 @@ def test_draws_differ_and_the_same_label_gives_the_same(config):
 
 
 def test_every_robot_has_its_own_tracker_noise(config):
-    one = robot.twin(config)
+    one = virtual_delta.twin(config)
     runs = [
         replace(one, labels=("robots", k)).generator("tracker", "tracker_heights").standard_normal(50) for k in range(2)
     ]
@@ -178,19 +178,21 @@ def test_an_own_frame_has_its_axes_where_the_robot_went():
     turn = Rotation.from_rotvec([0.1, -0.2, 0.3])
     places = np.random.default_rng(1).normal(size=(6, 3))
     axes = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.4, 3.0, 0.0]])
-    np.testing.assert_allclose(robot.in_own_frame(turn.apply(axes) + 5.0, turn.apply(places) + 5.0), places, atol=1e-12)
+    np.testing.assert_allclose(
+        virtual_delta.in_own_frame(turn.apply(axes) + 5.0, turn.apply(places) + 5.0), places, atol=1e-12
+    )
 
 
 def test_poses_are_spread_evenly_and_steps_stay_short(config):
-    planes, command = robot.pose_commands(config["delta"])
+    planes, command = virtual_delta.Poses(**config["delta"]["poses"]).commands()
     first = command[planes == "first"]
     assert len(first) == 20 and (first[:, 2] == 100.0).all() and (command[planes == "second"][:, 2] == 0.0).all()
     assert len(np.unique(first, axis=0)) == 20
     np.testing.assert_allclose(first.mean(axis=0), [0.0, 0.0, 100.0])
     # joined by whole pitches: the target's turn over a step stays below half a pitch
     assert np.linalg.norm(np.diff(command[:, :2], axis=0), axis=1).max() <= 200.0
-    two = next(variant for variant in fits.VARIANTS if variant.planes == "two")
-    assert fits.chosen(two, planes).sum() == 20
+    two = next(variant for variant in VARIANTS if variant.planes == "two")
+    assert two.used(planes).sum() == 20
 
 
 def test_the_vision_job_is_given_images_only(finished):
@@ -214,9 +216,9 @@ def test_a_step_of_the_search_stays_near_the_configured_robot(finished, config):
     first = (truth["plane"] == "first").to_numpy()
     drawn = [one["centre"][first] for one in draws.drawn_errors(own, truth, noise, 2, "search")]
     small = own | {"delta": own["delta"] | {"errors": deviations}}
-    here = search.numbers(robot.twin(small), _columns(truth, "command")[first], drawn)
-    published = {"before_mean": 0.932, "before_max": 1.442, "after_mean": 0.211, "after_max": 0.374}
-    assert misfit == pytest.approx(np.sqrt(np.mean([(here[k] / v - 1.0) ** 2 for k, v in published.items()])), abs=2e-4)
+    here = robot_search.numbers(virtual_delta.twin(small), _columns(truth, "command")[first], drawn)
+    published = np.array([0.932, 1.442, 0.211, 0.374])
+    assert misfit == pytest.approx(np.sqrt(np.mean((here / published - 1.0) ** 2)), abs=2e-4)
 
 
 @pytest.mark.parametrize(
@@ -234,4 +236,4 @@ def test_a_wrong_section_is_refused_before_anything_runs(tmp_path, overlay, told
 def test_a_plane_out_of_reach_is_named(config):
     far = config | {"delta": config["delta"] | {"plane": {"z_mm": 0.0, "radius_mm": 2000.0, "step_mm": 500.0}}}
     with pytest.raises(ConfigError, match=r"delta\.plane: a point is out of the robot's reach"):
-        robot.twin(far)
+        virtual_delta.twin(far)

@@ -2,16 +2,19 @@
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.delta import draws, fits, spread, twin, views
+from rrru.studies.delta import draws, fits, spread, views
+from rrru.studies.delta.centres import pose_errors
 from rrru.studies.delta.schemas import TABLES
+from rrru.studies.delta.virtual_delta import twin
 
 
 def main(settings, inputs, outputs):
     """Write calibrations, what they see, errors on the plane, those of other draws and robots, and the camera."""
     centres, truth = tables.read(inputs["delta_centres"]), tables.read(inputs["delta_truth"])
-    robot, section = twin.twin(settings), settings["delta"]
+    robot, section = twin(settings), settings["delta"]
+    others = spread.Spread(**section["spread"])
     noise = draws.centre_noise_px(settings, truth, tables.read(inputs["delta_dots"]))
-    errors = draws.drawn_errors(settings, truth, noise, section["spread"]["draws"], "draws")
+    errors = draws.drawn_errors(settings, truth, noise, others.draws, "draws")
     calibrations, observability, points = fits.study(robot, centres, truth, section["length_error_mm"])
     frames = {
         "delta_camera": tables.read(inputs["delta_lens"]).assign(true=views.true_camera(settings)),
@@ -19,8 +22,8 @@ def main(settings, inputs, outputs):
         "delta_observability": observability,
         "delta_points": points,
         "delta_draws": spread.other_draws(robot, truth, errors),
-        "delta_robots": spread.other_robots(robot, truth, errors, section["spread"]),
-        "delta_poses": fits.pose_errors(centres, truth),
+        "delta_robots": spread.other_robots(robot, truth, errors, others),
+        "delta_poses": pose_errors(centres, truth),
     }
     tables.write_all(TABLES, frames, outputs)
 

@@ -6,13 +6,15 @@ from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.delta import views
 from rrru.studies.delta.schemas import TABLES
+from rrru.studies.delta.virtual_delta import twin
 
 
 def main(settings, inputs, outputs):
     """Write both sets of images, and the truth apart from them."""
-    truth = views.true_poses(settings)
-    tilted, poses = views.tilted_images(settings), views.pose_images(settings, truth)
-    np.savez_compressed(outputs["images"], tilted=tilted, poses=poses)
+    view, truth = views.scene(settings), views.true_poses(settings)
+    by_hand, mounted = (twin(settings).generator(f"{kind} images") for kind in ("tilted", "pose"))
+    tilted = view.images(view.tilted_places(by_hand), by_hand)
+    np.savez(outputs["images"], tilted=tilted, poses=view.images(view.pose_places(truth), mounted))
     tables.write_all(TABLES, {"delta_truth": truth}, outputs)
 
 

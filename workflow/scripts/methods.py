@@ -4,7 +4,7 @@ import numpy as np
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.delta.twin import pose_commands
+from rrru.studies.delta.virtual_delta import Poses
 from rrru.studies.methods import benches, compare
 from rrru.studies.methods.schemas import TABLES
 
@@ -22,7 +22,7 @@ def main(settings, inputs, outputs):
 def _from_images(config, bench, calibrations):
     """What the Delta's study found from its images by the paper's way, and the time of its poses."""
     found = calibrations.set_index("variant").loc["paper"]
-    planes, poses = pose_commands(config["delta"])
+    planes, poses = Poses(**config["delta"]["poses"]).commands()
     return {
         "dtheta_rad": np.array([found[f"dtheta{leg}_found_rad"] for leg in (1, 2, 3)]),
         "poses": int(found["poses"]),

@@ -1,87 +1,79 @@
-"""The same calibrations with other plates and on other robots: one draw may be lucky with a variant. Lengths in mm,
-angles in rad.
-"""
+"""The same calibrations with other plates and on other robots: one draw may be lucky with a variant. mm and rad."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 
-from rrru.studies.delta import fits
+from rrru.campaign.measurements import vector_columns, vectors
+from rrru.studies.delta.variants import VARIANTS
 
 _SIZES = ("plane_mean", "plane_max", "base_mean", "base_max")
 
 
+@dataclass(frozen=True)
+class Spread:
+    """Draws of plate and noise; robots, with 1 sigma of their zero errors and, one after the other, of all lengths."""
+
+    draws: int
+    robots: int
+    zero_rad: float
+    lengths_mm: tuple[float, ...]
+
+
 def other_draws(twin, truth, errors):
-    """Rows of `delta_draws`: errors on the plane before and after every variant, over draws of everything that is
-    random.
+    """Rows of `delta_draws`: errors on the plane before and after every variant, over draws of all that is random.
 
-    truth: the table `delta_truth`; errors: those of the optical centres in every draw, see `rrru.studies.delta.draws`.
-    Plate, views and the noise of camera and tracker are drawn anew, the robot stays.
+    truth: the table `delta_truth`; errors: those of the optical centres in every draw, see `draws.drawn_errors`. Plate,
+    views and the noise of camera and tracker are drawn anew, the robot stays.
     """
-    sizes = {}
-    for number, draw in enumerate(errors, 1):
-        _measure(replace(twin, labels=("draws", number)), truth, draw, sizes)
-    shares = {"low": 5.0, "median": 50.0, "high": 95.0}
-    return pd.DataFrame(
-        [{"variant": name, "draws": len(errors)} | _percentiles(rows, _SIZES, shares) for name, rows in sizes.items()]
-    )
-
-
-def other_robots(twin, truth, errors, section):
-    """Rows of `delta_robots`: errors on the plane before and after every variant, over robots with drawn zero and
-    length errors.
-
-    truth, errors: as in `other_draws`; the robots take the draws in turn, since their cameras see nearly the same dots.
-    section: `spread` of the configuration. Every size of length errors has the same zero errors, directions and noise.
-    """
+    measured = [
+        plane_sizes(replace(twin, labels=("draws", number)), truth, draw) for number, draw in enumerate(errors, 1)
+    ]
     rows = []
-    for length in section["lengths_mm"]:
-        sizes = {}
-        for robot in range(section["robots"]):
-            own = replace(twin, labels=("robots", robot))
-            unit = own.generator().standard_normal(len(twin.deviations))
-            own = replace(own, deviations=np.concatenate([section["zero_rad"] * unit[:3], length * unit[3:]]))
-            _measure(own, truth, errors[robot % len(errors)], sizes)
-        shares = {"median": 50.0, "high": 90.0}
-        for name, of in sizes.items():
-            columns = {
-                column.replace("_mean", ""): value
-                for column, value in _percentiles(of, _SIZES, shares).items()
-                if "_max" not in column
-            }
-            rows.append({"variant": name, "length_error_mm": length, "robots": len(of)} | columns)
+    for name in measured[0]:
+        low, median, high = np.percentile([sizes[name] for sizes in measured], [5.0, 50.0, 95.0], axis=0)
+        shares = {"low": low, "median": median, "high": high}
+        columns = {f"{size}_{share}_mm": of[k] for k, size in enumerate(_SIZES) for share, of in shares.items()}
+        rows.append({"variant": name, "draws": len(errors)} | columns)
     return pd.DataFrame(rows)
 
 
-def _measure(twin, truth, draw, sizes):
-    """Adds the sizes (4,) of the errors on the plane of a robot before and after every variant to the lists by
-    variant.
+def other_robots(twin, truth, errors, spread):
+    """Rows of `delta_robots`: errors on the plane over robots with drawn zero and length errors; spread: `Spread`.
+
+    truth, errors: as in `other_draws`; the robots take the draws in turn, since their cameras see nearly the same dots.
+    Every size of length errors has the same zero errors, directions and noise.
     """
-    seen = _seen(twin, truth, draw)
-    found = {"none": None}
-    for variant in fits.VARIANTS:
-        found[variant.name] = fits.fit(variant, twin.mechanism, *fits.places(variant, twin, *seen))[0].deviations
-    for name, deviations in found.items():
-        lengths = [
-            np.linalg.norm(error, axis=1) for error in twin.plane_errors(deviations, twin.generator("plane", name))
-        ]
-        sizes.setdefault(name, []).append([of(length) for length in lengths for of in (np.mean, np.max)])
+    rows = []
+    for length in spread.lengths_mm:
+        measured = []
+        for number in range(spread.robots):
+            own = replace(twin, labels=("robots", number))
+            unit = own.generator().standard_normal(len(twin.deviations))
+            own = replace(own, deviations=unit * np.where(np.arange(len(unit)) < 3, spread.zero_rad, length))
+            measured.append(plane_sizes(own, truth, errors[number % len(errors)]))
+        for name in measured[0]:
+            median, high = np.percentile([sizes[name] for sizes in measured], [50.0, 90.0], axis=0)
+            columns = {"plane_median_mm": median[0], "plane_high_mm": high[0]}
+            columns |= {"base_median_mm": median[2], "base_high_mm": high[2]}
+            rows.append({"variant": name, "length_error_mm": length, "robots": len(measured)} | columns)
+    return pd.DataFrame(rows)
 
 
-def _percentiles(rows, names, shares):
-    """Percentiles by column, of rows of one size per name."""
-    return {
-        f"{name}_{label}_mm": np.percentile([row[k] for row in rows], share)
-        for k, name in enumerate(names)
-        for label, share in shares.items()
-    }
+def plane_sizes(twin, truth, draw):
+    """Sizes (4,), as in `_SIZES`, of a robot's errors on the plane before ("none") and after every variant, by name.
 
-
-def _seen(twin, truth, draw):
-    """The tables `delta_centres` and `delta_truth` of a robot, in the base frame."""
-    places = twin.drive(fits.columns(truth, "command"))
-    centres = {
-        f"{name}_{axis}_mm": (places + error)[:, k] for name, error in draw.items() for k, axis in enumerate("xyz")
-    }
-    return pd.DataFrame(centres), truth.assign(**{f"true_{axis}_mm": places[:, k] for k, axis in enumerate("xyz")})
+    draw: errors (n, 3) of the optical centres by how they are found.
+    """
+    places = twin.drive(vectors(truth, "command"))
+    centres = pd.DataFrame({k: v for name, off in draw.items() for k, v in vector_columns(name, places + off).items()})
+    truth = truth.assign(**vector_columns("true", places))
+    zero_rad = {"none": None}
+    for variant in VARIANTS:
+        zero_rad[variant.name] = variant.fit(twin.mechanism, *variant.places(twin, centres, truth))[0].deviations
+    sizes = {}
+    for name, fed_back in zero_rad.items():
+        plane, base = (np.linalg.norm(e, axis=1) for e in twin.plane_errors(fed_back, twin.generator("plane", name)))
+        sizes[name] = [plane.mean(), plane.max(), base.mean(), base.max()]
+    return sizes

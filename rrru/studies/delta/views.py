@@ -4,14 +4,15 @@ The robot's calibration frame has z upwards; the target lies below with its own 
 its columns along -y. How camera and target stand exactly nobody knows but this module: the study reads images only.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from rrru.campaign.measurements import vector_columns, vectors
 from rrru.plant.camera import Camera, Target, render
-from rrru.studies.delta.twin import pose_commands, twin
+from rrru.studies.delta.virtual_delta import Poses, twin
 
 _LOOKING_DOWN = np.diag([1.0, -1.0, -1.0])
 
@@ -22,7 +23,9 @@ class Scene:
 
     camera_turn (3, 3): columns are the camera's axes in the robot's frame; target_turn (3, 3) likewise, and
     target_place_mm (3,) its origin there; mount_mm (3,): optical centre less platform centre; distance_mm: optical
-    centre above the target at the first plane.
+    centre above the target at the first plane; dot_error_mm: 1 sigma of the dots' places; tilted_count, tilt_deg: views
+    for the camera's own calibration. Places of the camera are rotations (3, 3) and translations (3,) from the target's
+    frame to the camera's.
     """
 
     camera: Camera
@@ -32,76 +35,74 @@ class Scene:
     target_place_mm: np.ndarray
     mount_mm: np.ndarray
     distance_mm: float
+    dot_error_mm: float
+    tilted_count: int
+    tilt_deg: float
+
+    def with_plate(self, generator):
+        """The scene with a plate whose dots are drawn anew."""
+        size = self.target.rows, self.target.columns, 2
+        offsets = self.dot_error_mm * generator.standard_normal(size)
+        return replace(self, target=replace(self.target, offsets_mm=offsets))
+
+    def pose_places(self, truth):
+        """Places of the camera at every pose of `delta_truth`."""
+        rotation = self.camera_turn.T @ self.target_turn
+        return [(rotation, -rotation @ centre) for centre in vectors(truth, "true")]
+
+    def tilted_places(self, generator):
+        """Places of the camera from all sides, one after the other, held by hand before it is mounted."""
+        for side in 2.0 * np.pi * np.arange(self.tilted_count) / self.tilted_count:
+            about = np.radians(self.tilt_deg) * np.array([np.cos(side), np.sin(side), 0.0])
+            rotation = Rotation.from_rotvec(about).as_matrix() @ _LOOKING_DOWN
+            # ASSUME by hand: a tenth nearer or farther, aimed a few dots off the middle
+            distance = self.distance_mm * generator.uniform(0.9, 1.1)
+            aim = self.target.middle_mm + np.append(generator.uniform(-60.0, 60.0, 2), 0.0)
+            yield rotation, [0.0, 0.0, distance] - rotation @ aim
+
+    def images(self, places, generator):
+        """Images (n, height, width) taken at places of the camera."""
+        return np.stack([render(self.camera, self.target, *place, generator) for place in places])
 
 
-def scene(config, labels=()):
-    """The scene of the configuration's `delta` section, with another plate for other labels."""
+def scene(config):
+    """The scene of the configuration's `delta` section."""
     section = config["delta"]
     given, mount, plate = dict(section["camera"]), section["mount"], dict(section["target"])
-    for key in ("centre_offset_px", "distortion"):
-        given[key] = tuple(given[key])
-    turns = [Rotation.from_rotvec(part["turn_deg"], degrees=True).as_matrix() for part in (mount, plate)]
-    generator = twin(config).generator("target", *labels)
-    offsets = plate.pop("dot_error_mm") * generator.standard_normal((plate["rows"], plate["columns"], 2))
+    given |= {key: tuple(given[key]) for key in ("centre_offset_px", "distortion")}
+    camera_turn, target_turn = (
+        Rotation.from_rotvec(part["turn_deg"], degrees=True).as_matrix() for part in (mount, plate)
+    )
+    dot_error = plate.pop("dot_error_mm")
     plate.pop("turn_deg")
-    target = Target(**plate, offsets_mm=offsets)
-    offset = np.array(mount["offset_mm"])
+    target, offset = Target(**plate, offsets_mm=None), np.array(mount["offset_mm"])
     # the dots' middle lies below the camera when the platform is in the middle of its poses
     middle = offset + np.array([0.0, 0.0, section["poses"]["z_mm"] - section["distance_mm"]])
-    place = middle - turns[1] @ target.middle_mm
-    return Scene(Camera(**given), target, turns[0] @ _LOOKING_DOWN, turns[1], place, offset, section["distance_mm"])
+    bare = Scene(
+        Camera(**given),
+        target,
+        camera_turn @ _LOOKING_DOWN,
+        target_turn,
+        middle - target_turn @ target.middle_mm,
+        offset,
+        section["distance_mm"],
+        dot_error,
+        section["tilted_views"]["count"],
+        section["tilted_views"]["tilt_deg"],
+    )
+    return bare.with_plate(twin(config).generator("target"))
 
 
 def true_poses(config):
-    """Rows of `delta_truth`: the commands of every photographed pose and where the optical centre really is in the
-    target's frame.
-    """
-    view, robot = scene(config), twin(config)
-    planes, command = pose_commands(config["delta"])
-    centre = (robot.drive(command) + view.mount_mm - view.target_place_mm) @ view.target_turn
-    return pd.DataFrame(
-        {
-            "pose": np.arange(1, len(command) + 1),
-            "plane": planes,
-            **{f"command_{axis}_mm": command[:, k] for k, axis in enumerate("xyz")},
-            **{f"true_{axis}_mm": centre[:, k] for k, axis in enumerate("xyz")},
-        }
-    )
-
-
-def pose_places(view, truth):
-    """Rotation (3, 3) and translation (3,) from the target's frame to the camera's at every pose of `true_poses`."""
-    rotation = view.camera_turn.T @ view.target_turn
-    return [(rotation, -rotation @ centre) for centre in truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()]
-
-
-def pose_images(config, truth):
-    """Images (n, height, width) of every pose of `true_poses`."""
-    view, generator = scene(config), twin(config).generator("pose images")
-    return np.stack([render(view.camera, view.target, *place, generator) for place in pose_places(view, truth)])
+    """Rows of `delta_truth`: commands of every photographed pose, and where the optical centre really is."""
+    view = scene(config)
+    planes, command = Poses(**config["delta"]["poses"]).commands()
+    centre = (twin(config).drive(command) + view.mount_mm - view.target_place_mm) @ view.target_turn
+    pose = pd.DataFrame({"pose": np.arange(1, len(command) + 1), "plane": planes})
+    return pose.assign(**vector_columns("command", command), **vector_columns("true", centre))
 
 
 def true_camera(config):
     """The true numbers that `delta_lens` estimates, in its order; NaN for what has none."""
     camera = scene(config).camera
     return np.array([camera.focal_px, camera.focal_px, *camera.centre_px, *camera.distortion, np.nan])
-
-
-def tilted_images(config):
-    """Images (n, height, width) of the target from all sides, taken by hand before the camera is mounted."""
-    view, generator = scene(config), twin(config).generator("tilted images")
-    places = tilted_places(view, config["delta"]["tilted_views"], generator)
-    return np.stack([render(view.camera, view.target, *place, generator) for place in places])
-
-
-def tilted_places(view, tilted, generator):
-    """Rotation (3, 3) and translation (3,) from the target's frame to the camera's of one tilted view after the
-    other.
-    """
-    for side in 2.0 * np.pi * np.arange(tilted["count"]) / tilted["count"]:
-        about = np.radians(tilted["tilt_deg"]) * np.array([np.cos(side), np.sin(side), 0.0])
-        rotation = Rotation.from_rotvec(about).as_matrix() @ _LOOKING_DOWN
-        # ASSUME by hand: a tenth nearer or farther, aimed a few dots off the middle
-        distance = view.distance_mm * generator.uniform(0.9, 1.1)
-        aim = view.target.middle_mm + np.append(generator.uniform(-60.0, 60.0, 2), 0.0)
-        yield rotation, [0.0, 0.0, distance] - rotation @ aim

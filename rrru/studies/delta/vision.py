@@ -1,21 +1,20 @@
-"""From images of a dot target to the camera's places, paper C, 2: dots, their numbers, the camera itself, R_j and T_j,
-O_cj = -R_j^T T_j.
+"""From images of a dot target to the camera's places (paper C, 2): dots, their numbers, the camera, O_cj = -R_j^T T_j.
 
 A target is a lattice of dots in the plane z = 0 of its frame. Dots are numbered within an image from one near its
-middle, x to the image's right and y upwards, so that an image alone does not say which dots of the plate it shows.
-Centres in pixels, the first pixel's is (0, 0); mm, rad.
+middle, x to the image's right and y upwards: an image alone does not say which dots of the plate it shows. Centres in
+pixels, the first pixel's is (0, 0); mm, rad.
 """
 
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
 
-# the camera's calibration adds up in an order that depends on OpenCV's threads: one thread gives the same bytes
-# everywhere
+# the camera's calibration adds up in an order that depends on OpenCV's threads: one gives the same bytes everywhere
 cv2.setNumThreads(1)
 
 # pixels by which the window of a dot's centre exceeds the dot, so that it holds the blurred edge
@@ -29,7 +28,20 @@ _BESIDE = 1.3
 _FEWEST_DOTS = 12
 # a commanded step tells the dots' numbers when it is off their lattice by less than this share of the pitch
 _SURE_SHARE = 0.4
-_POLYGON = 36
+# corners of the polygon that stands for a dot's edge
+_CORNERS = 36
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A target as its maker states it: distance of neighbouring dots and their diameter."""
+
+    pitch_mm: float
+    diameter_mm: float
+
+    def places(self, number):
+        """Places (n, 3) in the target's frame of dots with numbers (n, 2)."""
+        return np.column_stack([self.pitch_mm * number, np.zeros(len(number))])
 
 
 @dataclass(frozen=True)
@@ -42,21 +54,54 @@ class Dots:
 
 @dataclass(frozen=True)
 class CameraModel:
-    """A calibrated camera: matrix (3, 3), distortion (k1, k2, p1, p2), rms in px that the calibration left, views it is
-    from.
-    """
+    """A calibrated camera: matrix (3, 3), distortion (k1, k2, p1, p2), rms in px that the calibration left."""
 
     matrix: np.ndarray
     distortion: np.ndarray
     rms_px: float
-    views: int
+
+    def project(self, plane_mm, turn, shift_mm):
+        """Pixels (2, ...) of points (2, ...) of the target's plane; turn, shift_mm (3,): target's frame to camera's.
+
+        The same bits as `cv2.projectPoints`, which always adds a Jacobian at six times the cost.
+        """
+        shift_mm = np.ravel(shift_mm)
+        x, y, z = (
+            row[0] * plane_mm[0] + row[1] * plane_mm[1] + shift
+            for row, shift in zip(cv2.Rodrigues(turn)[0], shift_mm, strict=True)
+        )
+        inverse = 1.0 / z
+        x, y = x * inverse, y * inverse
+        k1, k2, p1, p2 = self.distortion
+        square, across = x * x + y * y, 2.0 * x * y
+        radial = 1.0 + k1 * square + k2 * (square * square)
+        return np.stack(
+            [
+                (x * radial + p1 * across + p2 * (square + 2.0 * x * x)) * self.matrix[0, 0] + self.matrix[0, 2],
+                (y * radial + p1 * (square + 2.0 * y * y) + p2 * across) * self.matrix[1, 1] + self.matrix[1, 2],
+            ]
+        )
+
+    def centre_bias(self, number, turn, shift_mm, lattice):
+        """Pixels (n, 2) from the image of each dot's centre to its image's centroid: a tilted circle's is off it.
+
+        number (n, 2): of the dots; turn, shift_mm: as in `project`.
+        """
+        angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+        edge = lattice.diameter_mm / 2.0 * np.stack([np.cos(angle), np.sin(angle)])
+        middle = lattice.pitch_mm * number.T[:, None].astype(float)
+        image = self.project(np.concatenate([middle, middle + edge[:, :, None]], axis=1), turn, shift_mm)
+        x, y = image[:, 1:] - image[:, :1]
+        next_x, next_y = np.roll(x, -1, axis=0), np.roll(y, -1, axis=0)
+        area = x * next_y - y * next_x
+        sums = np.stack([((x + next_x) * area).sum(axis=0), ((y + next_y) * area).sum(axis=0)], axis=-1)
+        # summed pairwise, which numpy does along contiguous axes
+        return sums / (3.0 * np.ascontiguousarray(area.T).sum(axis=1))[:, None]
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Camera against target: rotation (3, 3) and translation_mm (3,) from the target's frame to the camera's, rms_px of
-    the dots.
-    """
+    """Rotation (3, 3) and translation_mm (3,) from the target's frame to the camera's, rms_px of the dots."""
 
     rotation: np.ndarray
     translation_mm: np.ndarray
@@ -69,13 +114,11 @@ class Pose:
 
 
 def read_dots(image, name):
-    """Dots of an image (height, width) of 8 bits; raises FitError with the image's name where too few make a
-    lattice.
-    """
+    """Dots of an image (height, width) of 8 bits; raises FitError with its name where too few make a lattice."""
     centres = find_dots(image)
-    numbers, known = (
-        number_dots(centres) if len(centres) >= _FEWEST_DOTS else (centres, np.zeros(len(centres), dtype=bool))
-    )
+    numbers, known = centres, np.zeros(len(centres), dtype=bool)
+    if len(centres) >= _FEWEST_DOTS:
+        numbers, known = number_dots(centres)
     if known.sum() < _FEWEST_DOTS:
         raise FitError(f"{name}: {known.sum()} dots make a lattice; allowed: at least {_FEWEST_DOTS}")
     return Dots(centres[known], numbers[known])
@@ -84,26 +127,20 @@ def read_dots(image, name):
 def find_dots(image):
     """Centres (n, 2) of the dark dots that an image shows whole: mean of the pixels weighted by their darkness."""
     _, dark = cv2.threshold(image, 0, 1, cv2.THRESH_BINARY_INV + cv2.THRESH_OTSU)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(dark)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(dark)
     left, top, width, height, area = stats.T
-    inner = (left >= _EDGE_PX) & (top >= _EDGE_PX)
-    inner &= (left + width <= image.shape[1] - _EDGE_PX) & (top + height <= image.shape[0] - _EDGE_PX)
+    whole = (left >= _EDGE_PX) & (top >= _EDGE_PX)
+    whole &= (left + width <= image.shape[1] - _EDGE_PX) & (top + height <= image.shape[0] - _EDGE_PX)
     # label 0 is the plate
-    inner[0] = False
-    if not inner.any():
+    whole[0] = False
+    if not whole.any():
         return np.zeros((0, 2))
-    share = area / np.median(area[inner])
-    inner &= (share > _AREA_SHARE[0]) & (share < _AREA_SHARE[1])
-    window = cv2.dilate(
-        labels.astype(np.uint16), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
-    )
+    share = area / np.median(area[whole])
+    whole &= (share > _AREA_SHARE[0]) & (share < _AREA_SHARE[1])
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1))
+    window = cv2.dilate(labels.astype(np.uint16), disc)
     darkness = np.median(image[window == 0]) - image.astype(float)
-    y, x = np.indices(image.shape)
-    sums = [
-        np.bincount(window.ravel(), weights=(darkness * factor).ravel(), minlength=count)[inner]
-        for factor in (1.0, x, y)
-    ]
-    return np.stack([sums[1] / sums[0], sums[2] / sums[0]], axis=-1)
+    return np.array(ndimage.center_of_mass(darkness, window, np.flatnonzero(whole)))[:, ::-1]
 
 
 def number_dots(centre_px):
@@ -117,10 +154,10 @@ def number_dots(centre_px):
     distance = np.linalg.norm(steps, axis=-1)
     np.fill_diagonal(distance, np.inf)
     beside = distance < _BESIDE * distance.min(axis=1, keepdims=True)
-    whole = beside.sum(axis=1) == 4
-    if not whole.any():
+    inner = beside.sum(axis=1) == 4
+    if not inner.any():
         return np.zeros(centre_px.shape, dtype=int), np.zeros(len(centre_px), dtype=bool)
-    start = np.where(whole, np.linalg.norm(centre_px - centre_px.mean(axis=0), axis=1), np.inf).argmin()
+    start = np.where(inner, np.linalg.norm(centre_px - centre_px.mean(axis=0), axis=1), np.inf).argmin()
     near = steps[start][beside[start]]
     right = near[near[:, 0].argmax()]
     basis = np.column_stack([right, near[(right[0] * near[:, 1] - right[1] * near[:, 0]).argmin()]])
@@ -136,90 +173,71 @@ def number_dots(centre_px):
         reach *= 2
 
 
-def calibrate_camera(views, size_px, pitch_mm, diameter_mm):
+def calibrate_camera(views, size_px, lattice):
     """CameraModel from Dots of several tilted views of one target; size_px: width and height.
 
     Parallel views would not do: they see the focal length and the distance only together. A first calibration tells how
-    far every dot's image is off that of its centre (`centre_bias`), the second is free of that.
+    far every dot's image is off that of its centre, the second is free of that.
     """
-    lattice = [_lattice(view, pitch_mm).astype(np.float32) for view in views]
-    centres = [view.centre_px for view in views]
-    for _ in range(2):
-        rms, matrix, distortion, turns, shifts = cv2.calibrateCamera(
-            lattice, [c.astype(np.float32) for c in centres], size_px, None, None, flags=cv2.CALIB_FIX_K3
-        )
-        distortion = distortion.ravel()[:4]
-        poses = zip(views, turns, shifts, strict=True)
-        centres = [v.centre_px - centre_bias(matrix, distortion, v, r, t, pitch_mm, diameter_mm) for v, r, t in poses]
-    return CameraModel(matrix, distortion, float(rms), len(views))
+    places = [lattice.places(view.number).astype(np.float32) for view in views]
+
+    def fitted(centres):
+        centres = [centre.astype(np.float32) for centre in centres]
+        flags = {"flags": cv2.CALIB_FIX_K3}
+        rms, matrix, distortion, turns, shifts = cv2.calibrateCamera(places, centres, size_px, None, None, **flags)
+        return CameraModel(matrix, distortion.ravel()[:4], float(rms)), zip(views, turns, shifts, strict=True)
+
+    rough, poses = fitted([view.centre_px for view in views])
+    centres = [view.centre_px - rough.centre_bias(view.number, turn, shift, lattice) for view, turn, shift in poses]
+    return fitted(centres)[0]
 
 
-def camera_pose(model, dots, pitch_mm, diameter_mm):
+def camera_pose(model, dots, lattice):
     """Pose of the calibrated camera against the target from the dots of one image."""
-    lattice, centres = _lattice(dots, pitch_mm), dots.centre_px
+    places, centres, lens = lattice.places(dots.number), dots.centre_px, (model.matrix, model.distortion)
     for _ in range(2):
-        found, turn, shift = cv2.solvePnP(lattice, centres, model.matrix, model.distortion)
-        if not found:
-            raise FitError(f"no camera pose fits {len(lattice)} dots")
-        centres = dots.centre_px - centre_bias(model.matrix, model.distortion, dots, turn, shift, pitch_mm, diameter_mm)
-    turn, shift = cv2.solvePnPRefineLM(lattice, centres, model.matrix, model.distortion, turn, shift)
-    left = cv2.projectPoints(lattice, turn, shift, model.matrix, model.distortion)[0][:, 0] - centres
-    return Pose(cv2.Rodrigues(turn)[0], shift[:, 0], float(np.sqrt((left**2).sum(axis=1).mean())))
+        solved, turn, shift = cv2.solvePnP(places, centres, *lens)
+        if not solved:
+            raise FitError(f"no camera pose fits {len(places)} dots")
+        centres = dots.centre_px - model.centre_bias(dots.number, turn, shift, lattice)
+    turn, shift = cv2.solvePnPRefineLM(places, centres, *lens, turn, shift)
+    left = model.project(places.T[:2], turn, shift) - centres.T
+    return Pose(cv2.Rodrigues(turn)[0], shift[:, 0], float(np.sqrt((left**2).sum(axis=0).mean())))
 
 
-def with_one_rotation(model, views, poses, pitch_mm):
-    """Poses of a camera that never turned: all with the mean rotation, translations (3,) fitted anew to the Dots of
-    every image.
+def camera_poses(model, views, lattice):
+    """Poses for the Dots of every image: each by itself ("centre"), and of a camera that never turns ("one_rotation").
 
-    With the rotation known the translation follows from linear equations, x (R X + t)_z = (R X + t)_x of every dot and
-    the same for y.
+    For the latter all have the mean rotation, with which the translation t follows from linear equations,
+    x (R X + t)_z = (R X + t)_x of every dot and the same for y.
     """
+    poses = [camera_pose(model, dots, lattice) for dots in views]
     rotation = Rotation.from_matrix([pose.rotation for pose in poses]).mean().as_matrix()
-    result = []
+    together = []
     for dots, pose in zip(views, poses, strict=True):
         x, y = cv2.undistortPoints(dots.centre_px[:, None], model.matrix, model.distortion)[:, 0].T
-        turned = _lattice(dots, pitch_mm) @ rotation.T
+        turned = lattice.places(dots.number) @ rotation.T
         one, none = np.ones(len(x)), np.zeros(len(x))
         rows = np.concatenate([np.column_stack([one, none, -x]), np.column_stack([none, one, -y])])
         right = np.concatenate([x * turned[:, 2] - turned[:, 0], y * turned[:, 2] - turned[:, 1]])
-        result.append(replace(pose, rotation=rotation, translation_mm=np.linalg.lstsq(rows, right, rcond=None)[0]))
-    return result
-
-
-def centre_bias(matrix, distortion, dots, turn, shift_mm, pitch_mm, diameter_mm):
-    """Pixels (n, 2) from the image of each dot's centre to the centroid of the dot's image: a tilted circle's image is
-    not centred on it.
-    """
-    angle = 2.0 * np.pi * np.arange(_POLYGON) / _POLYGON
-    edge = diameter_mm / 2.0 * np.stack([np.cos(angle), np.sin(angle), np.zeros(_POLYGON)], axis=-1)
-    middle = _lattice(dots, pitch_mm)
-    points = np.concatenate([middle[:, None], middle[:, None] + edge], axis=1)
-    image = cv2.projectPoints(points.reshape(-1, 3), turn, shift_mm, matrix, distortion)[0].reshape(len(middle), -1, 2)
-    outline = image[:, 1:] - image[:, :1]
-    after = np.roll(outline, -1, axis=1)
-    area = outline[..., 0] * after[..., 1] - outline[..., 1] * after[..., 0]
-    return ((outline + after) * area[..., None]).sum(axis=1) / (3.0 * area.sum(axis=1))[:, None]
+        together.append(replace(pose, rotation=rotation, translation_mm=np.linalg.lstsq(rows, right, rcond=None)[0]))
+    return {"centre": poses, "one_rotation": together}
 
 
 def join_places(centre_mm, command_mm, pitch_mm):
-    """Optical centres (n, 3) in one target frame, from those whose dots were numbered image by image; the first one's
-    numbers hold.
+    """Optical centres (n, 3) in one target frame, from those whose dots were numbered image by image.
 
-    command_mm (n, 3): commanded positions. The step between two images is known to whole pitches from the command, as
-    long as the robot's error and the target's turn against the robot's axes make less than half a pitch of it. Raises
-    FitError where that is in doubt.
+    The first one's numbers hold. command_mm (n, 3): commanded positions. The step between two images is known to whole
+    pitches from the command, as long as the robot's error and the target's turn against the robot's axes make less than
+    half a pitch of it. Raises FitError where that is in doubt.
     """
     missing = (np.diff(command_mm, axis=0) - np.diff(centre_mm, axis=0))[:, :2] / pitch_mm
-    doubtful = np.flatnonzero((np.abs(missing - np.rint(missing)) > _SURE_SHARE).any(axis=1))
+    off = np.abs(missing - np.rint(missing)).max(axis=1)
+    doubtful = np.flatnonzero(off > _SURE_SHARE)
     if doubtful.size:
         raise FitError(
-            f"pose {doubtful[0] + 2}: the step from the pose before is {np.abs(missing - np.rint(missing))[doubtful[0]].max():.2f} pitches off "
-            f"the dots' lattice; allowed: {_SURE_SHARE}, shorter steps or a target that is better aligned help"
+            f"pose {doubtful[0] + 2}: the step from the pose before is {off[doubtful[0]]:.2f} pitches off the dots' "
+            f"lattice; allowed: {_SURE_SHARE}, shorter steps or a target that is better aligned help"
         )
     whole = pitch_mm * np.column_stack([np.rint(missing), np.zeros(len(missing))])
     return centre_mm + np.concatenate([np.zeros((1, 3)), np.cumsum(whole, axis=0)])
-
-
-def _lattice(dots, pitch_mm):
-    """Places (n, 3) of the dots in the target's frame."""
-    return np.column_stack([pitch_mm * dots.number, np.zeros(len(dots.number))]).astype(float)

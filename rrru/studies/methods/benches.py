@@ -14,7 +14,7 @@ from rrru.robots.protocol import make_mechanism
 from rrru.seeds import stream
 from rrru.studies import config as parts
 from rrru.studies import setup
-from rrru.studies.delta import twin as delta_robot
+from rrru.studies.delta import virtual_delta
 from rrru.studies.ptt3 import experiments as ptt_robot
 
 ROBOTS = ("rrru3", "ptt3", "delta")
@@ -92,7 +92,7 @@ def _robot(config, name):
     if name == "ptt3":
         robot = ptt_robot.robot(config)
         return replace(robot, mechanism=replace(robot.mechanism, **limits))
-    twin = delta_robot.twin(config)
+    twin = virtual_delta.twin(config)
     return VirtualTripod(
         make_mechanism("delta", config["robots"]["delta"], parameter_set="tied", **limits),
         twin.truth.parameters.mapping(twin.deviations),

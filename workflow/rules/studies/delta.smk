@@ -1,7 +1,7 @@
-from rrru.studies.delta import twin as delta_twin
+from rrru.studies.delta import virtual_delta
 
 # refuses commands out of reach before anything runs
-delta_twin.twin(config)
+virtual_delta.twin(config)
 
 DELTA_IMAGE_TABLES = ["delta_centres", "delta_dots", "delta_picture"]
 DELTA_TABLES = [

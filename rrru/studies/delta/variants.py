@@ -1,0 +1,76 @@
+"""Every way to find the Delta's zero errors: what it is given and what it fits. Lengths in mm, angles in rad."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.campaign.measurements import vectors
+from rrru.fit.least_squares import least_squares
+from rrru.fit.residuals import Residuals
+from rrru.plant.tracker import measure
+from rrru.studies.delta.zero_offset import Distances, Heights, Shape, step_fit
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to find the zero errors.
+
+    source: images, one_rotation (images of a camera that is known not to turn), true_centres (for comparison only) or
+    tracker; measure: distances, shape, positions or heights; planes: one or two; step: the paper's single linear step
+    instead of a fit that has converged.
+    """
+
+    name: str
+    source: str
+    measure: str
+    planes: str
+    step: bool = False
+
+    def used(self, planes):
+        """Which poses (n,) it uses: the whole first plane, or every other pose of it and the second plane."""
+        first = planes == "first"
+        return first if self.planes == "one" else ~first | (np.cumsum(first) % 2 == 1)
+
+    def places(self, twin, centres, truth):
+        """Commands (n, 3) and places (n, 3) that it is given of `delta_centres` or `delta_truth`, in its own frame."""
+        used = self.used(truth["plane"].to_numpy())
+        command = vectors(truth, "command")[used]
+        if self.source == "tracker":
+            return command, measure(twin.drive(command), twin.tracker_noise_mm, twin.generator("tracker", self.name))
+        if self.source == "true_centres":
+            return command, vectors(truth, "true")[used]
+        return command, vectors(centres, "centre" if self.source == "images" else "one_rotation")[used]
+
+    def residuals(self, mechanism, command_mm, actuators, places_mm):
+        """What it fits: residuals of the mechanism at actuators (n, 3) for places (n, 3)."""
+        if self.measure == "distances":
+            return Distances(mechanism, actuators, places_mm, alike=self.step)
+        if self.measure == "shape":
+            return Shape(mechanism, actuators, places_mm)
+        kind = Heights if self.measure == "heights" else Residuals
+        return kind(mechanism, actuators, places_mm, command_mm)
+
+    def fit(self, mechanism, command_mm, places_mm):
+        """Fit to places (n, 3) for commands (n, 3), the covariance (3, 3) of its deviations in rad^2, its residuals."""
+        points = self.residuals(mechanism, command_mm, mechanism.require_reachable(command_mm), places_mm)
+        if self.step:
+            return *step_fit(points), points
+        result = least_squares(points)
+        return result, result.identifiability.covariance(result.noise_mm), points
+
+
+VARIANTS = (
+    Variant("paper", "images", "distances", "one", step=True),
+    Variant("converged", "images", "distances", "one"),
+    Variant("two_heights", "images", "distances", "two"),
+    Variant("shape", "images", "shape", "one"),
+    Variant("shape_two_heights", "images", "shape", "two"),
+    Variant("one_rotation", "one_rotation", "distances", "one"),
+    Variant("one_rotation_two_heights", "one_rotation", "distances", "two"),
+    Variant("one_rotation_shape", "one_rotation", "shape", "one"),
+    Variant("true_centres", "true_centres", "distances", "one"),
+    Variant("true_centres_two_heights", "true_centres", "distances", "two"),
+    Variant("tracker_heights", "tracker", "heights", "one"),
+    Variant("tracker_positions", "tracker", "positions", "one"),
+)
+PAPER = VARIANTS[0]

@@ -1,0 +1,121 @@
+"""The Delta of the vision study: its twin, where it is sent, and the tracker's errors on the plane. mm and rad.
+
+Errors are counted in two frames. The paper's calibration frame o-xyz (1.1) is laid out by driving the robot: origin
+where it stands at the command (0, 0, 0), x axis towards where it goes for x, y in the plane of where it goes for y.
+ASSUME it is laid out anew before and after the calibration. The other is the frame of the robot's base, which a tracker
+knows from the drive axes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.plant.tracker import measure
+from rrru.robots.delta import Delta
+from rrru.robots.protocol import make_mechanism
+from rrru.seeds import stream
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Where images are taken: counts and half_mm along x and y of a field at z_mm; half of it again at second_z_mm."""
+
+    counts: tuple[int, int]
+    half_mm: tuple[float, float]
+    z_mm: float
+    second_z_mm: float
+
+    def commands(self):
+        """Planes' names (n,) and commands (n, 3) of every pose that is photographed, in the order driven.
+
+        The paper's poses, spread evenly over its plane ("first"), row by row to and fro so that steps are short; then
+        every other of them on a second height ("second"), backwards, so that the step between the planes is short too.
+        """
+        x, y = (np.linspace(-half, half, count) for half, count in zip(self.half_mm, self.counts, strict=True))
+        rows = [np.column_stack([x[:: (-1) ** r], np.full(len(x), y[r])]) for r in range(len(y))]
+        field = np.concatenate(rows)
+        first, second = (
+            np.column_stack([flat, np.full(len(flat), z)])
+            for flat, z in ((field, self.z_mm), (field[::-2], self.second_z_mm))
+        )
+        return np.repeat(["first", "second"], [len(first), len(second)]), np.concatenate([first, second])
+
+
+@dataclass(frozen=True)
+class DeltaTwin:
+    """A virtual Delta and its tasks.
+
+    mechanism: what the controller believes, its parameters are the drives' zero errors; truth: the same robot with
+    every leg's lengths as parameters, deviations (12,) the true ones; plane_mm (n, 3): where errors are counted;
+    axes_mm (3, 3): commands that lay out the calibration frame; tracker_noise_mm: 1 sigma per axis; labels: which
+    repetition of the study this is, every one has its own noise.
+    """
+
+    mechanism: Delta
+    truth: Delta
+    deviations: np.ndarray
+    plane_mm: np.ndarray
+    axes_mm: np.ndarray
+    tracker_noise_mm: float
+    seed: int
+    labels: tuple = ()
+
+    @property
+    def zero_errors_rad(self):
+        """The drives' true zero errors (3,)."""
+        return self.deviations[:3]
+
+    def generator(self, *labels):
+        """Random stream of the study for a purpose."""
+        return stream(self.seed, "delta", *self.labels, *labels)
+
+    def positions(self, actuators):
+        """Where the robot really stands (n, 3), base frame, at the drive angles (n, 3) that its controller commands."""
+        return self.truth.forward(actuators, self.deviations)
+
+    def drive(self, command_mm, zero_rad=None):
+        """Where it really goes (n, 3), base frame, for commands (n, 3) when zero errors (3,) are fed back."""
+        return self.positions(self.mechanism.require_reachable(command_mm, zero_rad))
+
+    def plane_errors(self, zero_rad, generator):
+        """Errors (n, 3) on the plane in the calibration frame and in the base's, as a tracker measures; see `drive`."""
+        command = np.concatenate([self.axes_mm, self.plane_mm])
+        measured = measure(self.drive(command, zero_rad), self.tracker_noise_mm, generator)
+        own = in_own_frame(measured[:3], measured[3:])
+        return own - self.plane_mm, measured[3:] - self.plane_mm
+
+
+def twin(config):
+    """The twin of the configuration's `delta` section; raises ConfigError where it cannot go where it is sent."""
+    section, sets = config["delta"], ("zero", "legs")
+    mechanism, truth = (make_mechanism("delta", config["robots"]["delta"], parameter_set=name) for name in sets)
+    result = DeltaTwin(
+        mechanism,
+        truth,
+        truth.parameters.vector(section["errors"]),
+        disc(**section["plane"]),
+        section["plane"]["z_mm"] * np.array([0.0, 0.0, 1.0]) + section["plane"]["radius_mm"] * np.eye(3, k=-1),
+        section["tracker_noise_mm"],
+        config["seed"],
+    )
+    for key, command in (("plane", result.plane_mm), ("poses", Poses(**section["poses"]).commands()[1])):
+        if not np.isfinite(result.positions(mechanism.inverse(command))).all():
+            raise ConfigError(f"delta.{key}: a point is out of the robot's reach")
+    return result
+
+
+def disc(radius_mm, step_mm, z_mm):
+    """Points (n, 3) of a square grid within a circle about the origin of a horizontal plane."""
+    side = step_mm * np.arange(-np.floor(radius_mm / step_mm), np.floor(radius_mm / step_mm) + 1.0)
+    x, y = (axis.ravel() for axis in np.meshgrid(side, side))
+    inside = np.hypot(x, y) <= radius_mm * (1.0 + 1e-9)
+    return np.column_stack([x, y, np.full(len(x), z_mm)])[inside]
+
+
+def in_own_frame(axes_mm, places_mm):
+    """Places (n, 3) in the frame of three (3, 3): its origin, one on the x axis, one in the xy plane where y > 0."""
+    x = axes_mm[1] - axes_mm[0]
+    z = np.cross(x, axes_mm[2] - axes_mm[0])
+    frame = np.array([x, np.cross(z, x), z])
+    return (places_mm - axes_mm[0]) @ (frame / np.linalg.norm(frame, axis=1, keepdims=True)).T
