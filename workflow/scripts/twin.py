@@ -10,25 +10,25 @@ from rrru.studies.rrru3 import twin, twin_search
 
 def main(settings, inputs, outputs):
     """Write the twin as an overlay of the configuration."""
-    section, nominal = settings["twin"], settings["nominal"]
-    campaign = setup.virtual_campaign(nominal, settings["virtual"])
+    virtual, section = settings["virtual"], settings["twin"]
+    campaign = setup.virtual_campaign(settings["nominal"], virtual)
     count = len(campaign.plan.targets())
-    draws = tuple(twin_search.draw(campaign.generator(name), count) for name in ("measure", "closed_loop"))
-    best, misfit = twin_search.search(
-        setup.mechanism(nominal),
+    task = twin_search.Task(
+        setup.mechanism(settings["nominal"]),
+        virtual["motion"],
+        virtual["trajectories"],
         campaign.noise_mm,
-        draws,
+        tuple(twin_search.draw(campaign.generator(name), count) for name in ("measure", "closed_loop")),
         settings["reproduce"]["line_calibration"],
-        section["seed"],
-        section["generations"],
-        section["population"],
-        twin.from_config(settings["virtual"]) if section["refine"] else None,
-        settings["workers"],
-        lambda intermediate_result: logging.info(
-            "generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun
-        ),
     )
+    start = twin.from_config(virtual) if section["refine"] else None
+    best, misfit = twin_search.search(task, section, start, settings["workers"], _log)
     overlay.write(twin.overlay(best), misfit, outputs["twin"])
+
+
+def _log(intermediate_result):
+    """Tell how far a generation has come."""
+    logging.info("generation %d: misfit %.3f", intermediate_result.nit, intermediate_result.fun)
 
 
 if __name__ == "__main__":

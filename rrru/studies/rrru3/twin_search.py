@@ -1,26 +1,25 @@
 """Search for a twin whose errors come as near as they can to the numbers that paper A prints.
 
 Searched: the 7 identifiable geometry errors, clearance and play per leg, a periodic drive error (amplitude and phase
-per leg, whole number of periods per turn), non-repeating wobble, the line groups' spacing and the spiral's shape.
+per leg, whole number of periods per turn), non-repeatability, the line groups' spacing and the spiral's shape.
 Nothing else: no number of the paper is fed into the simulation. For speed the search solves eq. (8) with clearance to
 first order, which equals the spatial closure to micrometres as long as the axes are ideal, and calibrates on a
 linearised model, which is true to hundredths of a millimetre; what it finds is then run and calibrated like every other
 campaign. Lengths in mm, angles in rad.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from scipy.optimize import differential_evolution
 
 from rrru.campaign.plan import Plan, make_run
-from rrru.campaign.trajectories import line_groups
 from rrru.effects.effect import Contribution
 from rrru.errors import ConfigError, FitError, UnreachableError
-from rrru.fit.identifiability import RANK_TOLERANCE
 from rrru.plant.virtual_robot import VirtualRobot, non_repeatability
 from rrru.robots import singularity
+from rrru.robots.rrru3 import Rrru3
+from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM
 from rrru.studies.rrru3.study_numbers import UPPER_LIMITS, group_orders, study_numbers
 from rrru.studies.rrru3.twin import SEARCH_BOUNDS, Twin
@@ -32,6 +31,7 @@ LINE_CALIBRATIONS = ("group_1", "lines")
 # a refinement starts this share of the bounds' width about its twin, 1 sigma
 _REFINE_SPREAD = 0.02
 _WORST = 1e6
+_line_run = cache(make_run)
 
 
 class TranslationalRobot(VirtualRobot):
@@ -40,126 +40,95 @@ class TranslationalRobot(VirtualRobot):
     def positions(self, motion, target):
         """Platform centres (n, 3); clearance to first order."""
         change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
-        drive = motion.drive + change.drive
-        deviations = self.mechanism.parameters.vector(
-            {k: v for k, v in self.deviations.items() if k != "dr"} | {"da": self.deviations["dr"]}
-        )
-        solved = self.mechanism.forward(drive, deviations, target)
-        along = np.einsum(
-            "nlk,nlk->nl", motion.force_direction, np.broadcast_to(change.joint_mm, motion.force_direction.shape)
-        )
+        named = {name: value for name, value in self.deviations.items() if name != "dr"}
+        deviations = self.mechanism.parameters.vector(named | {"da": self.deviations["dr"]})
+        solved = self.mechanism.forward(motion.drive + change.drive, deviations, target)
+        along = np.einsum("nlk,nlk->nl", motion.force_direction, change.joint_mm)
         return solved + np.linalg.solve(motion.force_direction, along[..., None])[..., 0], np.zeros(len(target))
 
 
-def draw(generator, count):
-    """Random numbers of one drive in the order in which a virtual robot draws them: unit wobble (count, 3) and unit
-    noise (count, 3).
+@dataclass(frozen=True)
+class Task:
+    """What every candidate is driven through and calibrated with.
+
+    motion, trajectories: sections of the configuration; draws: see `draw`, for the measurement and for the drives with
+    corrected commands; line_calibration: one of LINE_CALIBRATIONS. Raises ConfigError for another one.
     """
+
+    mechanism: Rrru3
+    motion: dict
+    trajectories: dict
+    noise_mm: float
+    draws: tuple
+    line_calibration: str = "group_1"
+
+    def __post_init__(self):
+        if self.line_calibration not in LINE_CALIBRATIONS:
+            allowed = ", ".join(LINE_CALIBRATIONS)
+            raise ConfigError(f"twin: line calibration is {self.line_calibration!r}; allowed: {allowed}")
+
+    def plan(self, twin):
+        """Plan of a candidate: seven lines and the spiral, each once."""
+        *lines, spiral = twin.trajectories(self.trajectories)
+        speed, acceleration = self.motion["speed_mm_s"], self.motion["acceleration_mm_s2"]
+        # the first line is every candidate's, the other groups' are the same, shifted
+        first, runs = _line_run(lines[0], speed, acceleration), []
+        for line in lines:
+            shift = np.subtract(line.start_mm, lines[0].start_mm)
+            moved = {"points_mm": first.points_mm + shift, "path_mm": first.path_mm + shift}
+            runs.append(replace(first, trajectory=line.name, **moved))
+        return Plan((*runs, make_run(spiral, speed, acceleration)), self.motion["dwell_s"])
+
+
+def draw(generator, count):
+    """Unit non-repeatability and unit noise, both (count, 3), of one drive, in the order in which a robot draws them."""
     return non_repeatability(generator, count), generator.standard_normal((count, 3))
 
 
-def simulate(mechanism, twin, noise_mm, draws, line_calibration="group_1", kind=TranslationalRobot):
-    """Numbers and order margins of a candidate: calibrate on lines and on the spiral, drive the corrected commands,
-    compare.
+def simulate(task, twin, kind=TranslationalRobot):
+    """Numbers and order margins of a candidate: calibrate on lines and spiral, drive the corrected commands, compare.
 
-    draws: see `draw`, for the measurement and for the drives with corrected commands; line_calibration: one of
-    LINE_CALIBRATIONS. Raises UnreachableError or FitError where the candidate cannot be driven or calibrated.
+    Raises UnreachableError or FitError where the candidate cannot be driven or calibrated.
     """
-    if line_calibration not in LINE_CALIBRATIONS:
-        raise ConfigError(f"twin: line calibration is {line_calibration!r}; allowed: {', '.join(LINE_CALIBRATIONS)}")
-    plan = _plan(twin)
+    mechanism, plan = task.mechanism, task.plan(twin)
     target = plan.targets()
     theta = mechanism.require_reachable(target)
     trajectory = np.concatenate([np.full(len(run.points_mm), run.trajectory) for run in plan.runs])
     curve = trajectory == "spiral"
-    margin = min(
-        singularity.translational_measure(mechanism, target[curve], theta[curve]).min(),
-        singularity.constraint_measure(mechanism, target[curve], theta[curve]).min(),
-    )
-    if margin < SPIRAL_MARGIN:
-        raise UnreachableError(f"the spiral comes within {margin:.3f} of a singularity; allowed: {SPIRAL_MARGIN}")
+    _require_clear(mechanism, target[curve], theta[curve])
     robot = twin.robot(mechanism, kind)
 
     def drive(controller, drawn):
         position, _ = robot.positions(robot.motion(plan, controller), target)
-        return position + robot.non_repeatability_mm * drawn[0] + noise_mm * drawn[1]
+        return position + robot.non_repeatability_mm * drawn[0] + task.noise_mm * drawn[1]
 
-    measured = drive(mechanism.inverse, draws[0])
-    fits = {}
-    for name, chosen in (
-        ("lines", trajectory == "line_1" if line_calibration == "group_1" else ~curve),
-        ("spiral", curve),
-    ):
-        fits[name] = _linear_fit(mechanism, theta[chosen], measured[chosen], target[chosen])
-    lines, spiral = (
-        drive(lambda x, e=fits[name][0]: mechanism.inverse(x, e), draws[1]) - target for name in ("lines", "spiral")
+    measured = drive(mechanism.inverse, task.draws[0])
+    calibrated = trajectory == "line_1" if task.line_calibration == "group_1" else ~curve
+    fits = [linear_fit(mechanism, theta[rows], measured[rows], target[rows]) for rows in (calibrated, curve)]
+    before, lines, spiral = (
+        measured - target,
+        *(
+            drive(lambda x, deviations=deviations: mechanism.inverse(x, deviations), task.draws[1]) - target
+            for deviations, _ in fits
+        ),
     )
-    numbers = study_numbers(trajectory, measured - target, lines, spiral) | {"lines_objective": fits["lines"][1]}
-    return numbers, group_orders(trajectory, measured - target, lines)
+    numbers = study_numbers(trajectory, before, lines, spiral) | {"lines_objective": fits[0][1]}
+    return numbers, group_orders(trajectory, before, lines)
 
 
-@cache
-def _line_run(start_mm, end_mm):
-    """Run along the first line; the other groups' are the same, shifted."""
-    return make_run(line_groups(start_mm, end_mm, (0.0,), 26)[0], 80.0, 40.0)
-
-
-def _plan(twin):
-    """Plan of a candidate: seven lines and the spiral, each once."""
-    *lines, spiral = twin.trajectories()
-    base = _line_run(lines[0].start_mm, lines[0].end_mm)
-    runs = []
-    for line in lines:
-        shift = np.subtract(line.start_mm, lines[0].start_mm)
-        runs.append(replace(base, trajectory=line.name, points_mm=base.points_mm + shift, path_mm=base.path_mm + shift))
-    return Plan((*runs, make_run(spiral, 80.0, 40.0)), 60.0)
-
-
-def _linear_fit(mechanism, theta, measured, start):
-    """Errors (p,) of least mean distance and the minimum, on the model linearised at its least-squares errors.
-
-    Raises FitError where the iteration leaves the reach.
-    """
-    deviations = mechanism.parameters.nominal
-    for _ in range(3):
-        residual = measured - mechanism.forward(theta, deviations, start)
-        jacobian = mechanism.parameter_jacobian(measured - residual, theta, deviations)
-        if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
-            raise FitError("the candidate's calibration leaves the reach")
-        flat = jacobian.reshape(-1, jacobian.shape[-1])
-        step = np.linalg.lstsq(flat, residual.ravel(), rcond=RANK_TOLERANCE)[0]
-        deviations = deviations + step
-    residual = residual - jacobian @ step
-    # damped Newton on the mean distance of the linear model
-    width, q = np.linalg.qr(flat), np.zeros(len(deviations))
-    basis = width.Q.reshape(jacobian.shape)
-    value = np.linalg.norm(residual, axis=1).mean()
-    for _ in range(30):
-        now = residual - basis @ q
-        distance = np.maximum(np.linalg.norm(now, axis=1), 1e-9)
-        along = np.einsum("na,nap->np", now / distance[:, None], basis)
-        scaled, along_scaled = (
-            (basis / np.sqrt(distance)[:, None, None]).reshape(flat.shape),
-            along / np.sqrt(distance)[:, None],
-        )
-        newton = np.linalg.solve(scaled.T @ scaled - along_scaled.T @ along_scaled, along.sum(axis=0))
-        size = 1.0
-        while size > 1e-3 and np.linalg.norm(residual - basis @ (q + size * newton), axis=1).mean() > value:
-            size *= 0.5
-        if size <= 1e-3:
-            break
-        q = q + size * newton
-        previous, value = value, np.linalg.norm(residual - basis @ q, axis=1).mean()
-        if previous - value < 1e-10:
-            break
-    return deviations + np.linalg.solve(width.R, q), value
+def _require_clear(mechanism, position, theta):
+    """Raise UnreachableError for a spiral near a singularity."""
+    measures = (singularity.translational_measure, singularity.constraint_measure)
+    margin = min(measure(mechanism, position, theta).min() for measure in measures)
+    if margin < SPIRAL_MARGIN:
+        raise UnreachableError(f"the spiral comes within {margin:.3f} of a singularity; allowed: {SPIRAL_MARGIN}")
 
 
 def misfit(numbers, orders):
-    """How far a candidate is from the paper: what exceeds a deviation of 8 %, in units of 7 %, to the fourth power, and
-    broken orders.
+    """How far a candidate is from the paper: what exceeds a deviation of 8 %, in units of 7 %, to the fourth power.
 
-    A deviation of 15 % counts 1. An order counts as broken while its margin is below 1.5 %, and 9 where it is none.
+    Broken orders add to it. A deviation of 15 % counts 1. An order counts as broken while its margin is below 1.5 %,
+    and 9 where it is none.
     """
     total = 0.0
     for item, published in ERRORS_MM.items():
@@ -169,46 +138,47 @@ def misfit(numbers, orders):
     return total + sum((max(0.015 - margin, 0.0) / 0.005) ** 2 for margin in orders.values())
 
 
-def cost(vector, mechanism, noise_mm, draws, line_calibration):
+def _twin(vector):
+    """The Twin of a search vector."""
+    return Twin(dict(zip(SEARCH_BOUNDS, np.asarray(vector).tolist(), strict=True)))
+
+
+def cost(vector, task):
     """Misfit of a search vector; a large number for candidates that cannot be driven."""
     try:
-        value = misfit(
-            *simulate(mechanism, Twin(dict(zip(SEARCH_BOUNDS, vector, strict=True))), noise_mm, draws, line_calibration)
-        )
+        value = misfit(*simulate(task, _twin(vector)))
     except (UnreachableError, FitError, np.linalg.LinAlgError):
         return _WORST
     return value if np.isfinite(value) else _WORST
 
 
-def search(
-    mechanism, noise_mm, draws, line_calibration, seed, generations, population, start=None, workers=1, callback=None
-):
-    """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit). The same seed gives the same twin on any
-    number of workers.
+def search(task, section, start=None, workers=1, callback=None):
+    """Differential evolution over SEARCH_BOUNDS; returns (Twin, misfit).
 
-    noise_mm, draws, line_calibration: see `simulate`; population: candidates per searched number; start: a Twin to
-    refine, around which the first generation is drawn, or None for the whole of the bounds; callback: scipy's, called
-    with each generation's intermediate result.
+    section: the configuration's `twin`, whose population is per searched number; start: a Twin to begin around instead
+    of anywhere. The same seed gives the same twin on any number of workers.
     """
-    generator = np.random.default_rng(seed)
-    first = "latinhypercube" if start is None else _around(start, population * len(SEARCH_BOUNDS), generator)
+    from scipy.optimize import differential_evolution
+
+    generator = np.random.default_rng(section["seed"])
+    count = section["population"] * len(SEARCH_BOUNDS)
     result = differential_evolution(
         cost,
         list(SEARCH_BOUNDS.values()),
-        args=(mechanism, noise_mm, draws, line_calibration),
-        maxiter=generations,
-        popsize=population,
+        args=(task,),
+        maxiter=section["generations"],
+        popsize=section["population"],
         mutation=(0.4, 0.9),
         recombination=0.8,
         rng=generator,
-        init=first,
+        init="latinhypercube" if start is None else _around(start, count, generator),
         updating="deferred",
         polish=False,
         tol=0.0,
         workers=workers,
         callback=callback,
     )
-    return Twin(dict(zip(SEARCH_BOUNDS, result.x.tolist(), strict=True))), float(result.fun)
+    return _twin(result.x), float(result.fun)
 
 
 def _around(start, count, generator):
