@@ -297,7 +297,7 @@ def test_the_rules_name_tables_that_exist_and_every_figure_has_a_caption():
 
 def test_figures_know_no_computing_package():
     allowed = re.compile(
-        r"(numpy|pandas|matplotlib|rrru\.errors|rrru\.figures|rrru\.studies\.\w+\.figures)(\.|$)"
+        r"(numpy|pandas|matplotlib|rrru\.errors|rrru\.figures|rrru\.studies\.\w+\.(figures|paper))(\.|$)"
         r"|(re|contextlib|functools|itertools|pathlib|fnmatch|textwrap|dataclasses)$"
     )
     files = [
