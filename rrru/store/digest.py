@@ -1,27 +1,26 @@
-"""What a workflow script depends on: the import closure of its code, computed, so that an edit reruns exactly what it
-changes.
-"""
+"""What a workflow script depends on: the import closure of its code, computed, so that an edit reruns what it changes."""
 
-import ast
 import hashlib
+import re
 from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+# import statements of the package's own modules, inside of functions too
+_FROM = re.compile(r"^[ \t]*from[ \t]+(rrru[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*import[ \t]+(rrru[\w.]*)", re.MULTILINE)
 
 
 def closure(*modules):
-    """Files that the given files or modules of the package import, by themselves or through others, themselves
-    included, sorted.
+    """Files that the given ones import, by themselves or through others, themselves included, sorted.
 
-    modules: paths of Python files, or dotted names such as "rrru.gap.figure". Imports inside of functions count;
-    packages outside of this one do not, they are the lock's.
+    modules: paths of Python files below the project's root, or dotted names such as "rrru.figures.gap". Packages other
+    than this one do not count: they are the lock's.
     """
-    waiting = [Path(module).resolve() if str(module).endswith(".py") else _file(module) for module in modules]
-    found = set()
+    waiting, found = [_start(module) for module in modules], set()
     while waiting:
         file = waiting.pop()
-        if file is not None and file not in found:
+        if file not in found:
             found.add(file)
             waiting.extend(_imported(file))
     return sorted(found)
@@ -32,24 +31,28 @@ def code_digest(*modules):
     """Digest (16 hex digits) of all files of the `closure` of modules."""
     digest = hashlib.sha256()
     for file in closure(*modules):
-        digest.update(file.name.encode())
+        digest.update(str(file.relative_to(ROOT)).encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def _start(module):
+    """The file that a path or a dotted name stands for."""
+    return ROOT / module if module.endswith(".py") else _file(module)
 
 
 @cache
 def _imported(file):
     """Files of the package that a file imports, the `__init__.py` of every folder on the way included."""
-    names = set()
-    for node in ast.walk(ast.parse(file.read_bytes())):
-        if isinstance(node, ast.Import):
-            names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.update((node.module, *(f"{node.module}.{alias.name}" for alias in node.names)))
-    parts = [name.split(".") for name in names if name.split(".")[0] == "rrru"]
+    text = file.read_text()
+    names = set(_IMPORT.findall(text))
+    for module, targets in _FROM.findall(text):
+        names.update(f"{module}.{word}" for word in re.findall(r"(\w+)(?:[ \t]+as[ \t]+\w+)?", targets))
+    parts = [name.split(".") for name in names]
     return tuple(filter(None, {_file(".".join(p[:k])) for p in parts for k in range(1, len(p) + 1)}))
 
 
+@cache
 def _file(name):
     """The file of a dotted name, None where the name is no module."""
     place = ROOT.joinpath(*name.split("."))
