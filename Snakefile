@@ -26,6 +26,10 @@ include: "workflow/rules/pipeline/published.smk"
 include: "workflow/rules/pipeline/gap.smk"
 
 
+# what is refused is refused before anything runs
+check_once(config, CHECKS, own_effects(), ".snakemake/rrru_checked")
+
+
 rule all:
     default_target: True
     input:

@@ -60,3 +60,8 @@ def _with_known(effect, values):
         for pairs in dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
     )
     return replace(effect, coordinates=replace(coordinates, shapes=shapes))
+
+
+def check(config):
+    """Raise ConfigError where the `gap` section names an effect or a parameter that does not exist."""
+    GapSettings.from_config(config["gap"]).library()

@@ -59,11 +59,16 @@ def masses(config, section):
 
 
 def check(config):
-    """Raise ConfigError where names in a valid configuration refer to nothing, before anything runs."""
+    """Raise ConfigError where names in a valid configuration refer to nothing."""
     for name, section in config["campaigns"].items():
         if "virtual" in section:
             _check_virtual(config, name, section)
-        elif not Path(section["ingest"]).is_file():
+
+
+def check_files(config):
+    """Raise ConfigError where a measured campaign has no file."""
+    for name, section in config["campaigns"].items():
+        if "ingest" in section and not Path(section["ingest"]).is_file():
             raise ConfigError(f"campaigns.{name}.ingest: there is no file {section['ingest']}")
 
 

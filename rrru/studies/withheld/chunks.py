@@ -4,7 +4,6 @@ are.
 
 from dataclasses import dataclass
 
-from rrru.effects.library import EFFECTS
 from rrru.errors import ConfigError
 
 
@@ -26,16 +25,18 @@ class Chunk:
 def chunks(section):
     """Chunks by name of the configuration's `withheld` section."""
     result = _split("label", "", section["robots"], section["chunk"])
-    for effect in section.get("effects", EFFECTS):
+    for effect in section["effects"]:
         result |= _split("effect", effect, section["per_effect"], section["chunk"])
     return result
 
 
 def check(config):
     """Raise ConfigError where the `withheld` section names a campaign or an effect that does not exist."""
+    from rrru.effects.library import EFFECTS
+
     section = config["withheld"]
     for key, known in (("field", config["campaigns"]), ("effects", EFFECTS)):
-        for name in section.get(key, []):
+        for name in section[key]:
             if name not in known:
                 raise ConfigError(f"withheld.{key} has {name!r}; known: {', '.join(known)}")
 

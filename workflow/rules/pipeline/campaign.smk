@@ -1,4 +1,4 @@
-parts.check(config)
+parts.check_files(config)
 
 
 def campaign_file(wildcards):

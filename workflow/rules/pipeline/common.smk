@@ -1,5 +1,6 @@
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
+from rrru.studies.checks import check_once
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
@@ -7,6 +8,8 @@ CAMPAIGNS = sorted(config["campaigns"])
 DIAGNOSED = dict(config["campaigns"])
 # what `snakemake` makes; every study adds its own
 TARGETS = []
+# functions that refuse a configuration; every study adds its own
+CHECKS = ["rrru.studies.config:check"]
 # what a study has of a paper's numbers, by the paper's letter: its package with `published` and `audit`, the tables
 # that hold its own numbers, and what it reads of the configuration
 PAPERS = {}

@@ -1,11 +1,7 @@
 import hashlib
 from pathlib import Path
 
-from rrru.gap.settings import GapSettings
-
-# refuses unknown effects before anything runs
-GapSettings.from_config(config["gap"]).library()
-
+CHECKS.append("rrru.gap.settings:check")
 GAP_TABLES = [
     "gap_verdicts",
     "gap_locate",
@@ -33,9 +29,8 @@ def diagnosed(wildcards):
 
 
 def own_effects():
-    """Digest of the files that hold the user's own effects, so that editing one reruns what it changes."""
-    files = [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
-    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.exists()]
+    """The files that hold the user's own effects."""
+    return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
 
 
 # one job per campaign; it sees the measurements and what the configuration says of the robot
@@ -48,7 +43,7 @@ rule diagnose:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
         settings=diagnosed,
-        own_effects=own_effects(),
+        own_effects=[hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()],
         code=code("diagnose"),
     script:
         "../../scripts/diagnose.py"

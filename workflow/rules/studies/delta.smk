@@ -1,7 +1,4 @@
-from rrru.studies.delta import virtual_delta
-
-# refuses commands out of reach before anything runs
-virtual_delta.twin(config)
+CHECKS.append("rrru.studies.delta.virtual_delta:twin")
 
 DELTA_IMAGE_TABLES = ["delta_centres", "delta_dots", "delta_picture"]
 DELTA_TABLES = [

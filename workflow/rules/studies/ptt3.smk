@@ -1,6 +1,4 @@
-from rrru.studies.ptt3 import experiments as ptt_experiments
-
-ptt_experiments.check(config)
+CHECKS.append("rrru.studies.ptt3.experiments:check")
 
 PTT_EXPERIMENTS = sorted(config["ptt"]["experiments"])
 # experiments that are diagnosed together, as one campaign
@@ -28,7 +26,10 @@ PTT_FIGURES = {
     "ptt_extrapolation": (f"{_PTT}.learning:ptt_extrapolation", ["ptt_extrapolation"]),
 }
 # they are diagnosed as every campaign is
-DIAGNOSED |= {name: ptt_experiments.campaign_section(config, name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)}
+DIAGNOSED |= {
+    name: {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
+    for name in (*PTT_EXPERIMENTS, *PTT_JOINT)
+}
 PAPERS["B"] = {
     "study": "rrru.studies.ptt3",
     "tables": ["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"],

@@ -1,3 +1,7 @@
+from rrru.studies.rrru3 import settings as paper_a_settings
+
+paper_a_settings.check(config)
+
 SWEPT = ["crossover_fraction", "migration_fraction"]
 SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
 REPRODUCED = config["reproduce"]["campaign"]

@@ -1,6 +1,6 @@
-from rrru.studies.withheld.chunks import check as check_withheld, chunks
+from rrru.studies.withheld.chunks import chunks
 
-check_withheld(config)
+CHECKS.append("rrru.studies.withheld.chunks:check")
 WITHHELD = chunks(config["withheld"])
 WITHHELD_TABLES = [
     "withheld_verdicts",
