@@ -3,7 +3,6 @@
 from fnmatch import fnmatchcase
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 # degrees of freedom from which on repeated points tell the noise
 ENOUGH_REPEATS = 30
@@ -60,10 +59,10 @@ def repeat_noise(measurements):
     Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
     nothing repeats. What moves the robot from pass to pass counts as noise here.
     """
-    frame = measurements.loc[usable(measurements)].copy()
-    axes = [f"measured_{axis}_mm" for axis in "xyz"]
-    frame["direction"] = direction(frame)
-    keys = ["trajectory", "direction", *(f"command_{axis}_mm" for axis in "xyz"), "speed_mm_s", "payload_kg"]
+    frame = measurements.loc[usable(measurements)]
+    frame = frame.assign(direction=direction(frame))
+    axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
+    keys = ["trajectory", "direction", *places, "speed_mm_s", "payload_kg"]
     groups = frame.groupby(keys, dropna=False, sort=False)[axes]
     deviation = (frame[axes] - groups.transform("mean")).to_numpy()
     freedom = 3 * int(len(frame) - groups.ngroups)
@@ -72,21 +71,19 @@ def repeat_noise(measurements):
 
 def direction(measurements):
     """+1 or -1 (n,): whether a run passes its trajectory in the order of the first run along it or against it."""
-    result = np.ones(len(measurements), dtype=int)
-    first = {}
-    position = command(measurements)
-    for (trajectory, _), rows in measurements.reset_index(drop=True).groupby(["trajectory", "run"], sort=False):
-        points = position[rows.index.to_numpy()]
-        tree = first.setdefault(trajectory, cKDTree(points))
+    from scipy.spatial import cKDTree
+
+    result, position, first = np.ones(len(measurements), dtype=int), command(measurements), {}
+    for (trajectory, _), run in measurements.reset_index(drop=True).groupby(["trajectory", "run"], sort=False):
+        rows = run.index.to_numpy()
+        tree = first.setdefault(trajectory, cKDTree(position[rows]))
         # most steps tell, so that a closed path's equal ends or a missing point do not matter
-        steps = np.sign(np.diff(tree.query(points)[1])).sum()
-        result[rows.index.to_numpy()] = -1 if steps < 0 else 1
+        steps = np.sign(np.diff(tree.query(position[rows])[1])).sum()
+        result[rows] = -1 if steps < 0 else 1
     return result
 
 
 def mark_near_singularity(measurements, constraint_measure, margin):
-    """The table with status "near_singularity" where the measure (n,) is below the margin and the point is otherwise
-    fine.
-    """
+    """The table with status "near_singularity" where the measure (n,) is below the margin and all else is fine."""
     near = (measurements["status"] == "ok") & (np.asarray(constraint_measure) < margin)
     return measurements.assign(status=measurements["status"].where(~near, "near_singularity"))

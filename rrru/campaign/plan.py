@@ -1,16 +1,11 @@
-"""What the robot is told to do: runs along trajectories, with time stamps, speed, payload and the path between the
-sampled points.
-
-Lengths in mm, times in s, angles in rad.
-"""
+"""What the robot is told to do: runs along trajectories with times, speed, payload and path. Lengths mm, times s."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy.interpolate import CubicSpline
 
-from rrru.campaign.measurements import actuator_columns
+from rrru.campaign.measurements import actuator_columns, vector_columns
 from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import sample
 
@@ -46,59 +41,58 @@ class Plan:
 
         Raises UnreachableError where a point is out of the mechanism's reach.
         """
-        frames, first, time = [], 0, self.time_s()
-        for number, run in enumerate(self.runs, start=1):
-            values = mechanism.require_reachable(run.points_mm)
-            frames.append(
-                pd.DataFrame(
-                    {
-                        "run": number,
-                        "trajectory": run.trajectory,
-                        "point": np.arange(1, len(run.points_mm) + 1),
-                        "time_s": time[first : first + len(run.points_mm)],
-                        **{f"command_{axis}_mm": run.points_mm[:, k] for k, axis in enumerate("xyz")},
-                        **dict(zip(actuator_columns(mechanism.drive_unit), values.T, strict=True)),
-                        "speed_mm_s": run.speed_mm_s,
-                        "payload_kg": run.payload_kg,
-                    }
-                )
-            )
-            first += len(run.points_mm)
-        return pd.concat(frames, ignore_index=True)
+        target, counts = self.targets(), [len(run.points_mm) for run in self.runs]
+        columns = {
+            "run": np.arange(1, len(self.runs) + 1),
+            "trajectory": [run.trajectory for run in self.runs],
+            "speed_mm_s": [run.speed_mm_s for run in self.runs],
+            "payload_kg": [run.payload_kg for run in self.runs],
+        }
+        table = pd.DataFrame(columns).loc[np.repeat(np.arange(len(counts)), counts)].reset_index(drop=True)
+        values = mechanism.require_reachable(target)
+        drives = dict(zip(actuator_columns(mechanism.drive_unit), values.T, strict=True))
+        point = np.concatenate([np.arange(1, count + 1) for count in counts])
+        table = table.assign(point=point, time_s=self.time_s(), **vector_columns("command", target), **drives)
+        return table[["run", "trajectory", "point", "time_s", *table.columns[6:], "speed_mm_s", "payload_kg"]]
 
     def time_s(self):
         """Times (n,) of all sampled points since the campaign's start, the rests between the runs included."""
-        times, start = [], 0.0
-        for run in self.runs:
-            times.append(start + run.time_s)
-            start += run.time_s[-1] + self.dwell_s
-        return np.concatenate(times)
+        ends = np.array([run.time_s[-1] + self.dwell_s for run in self.runs])
+        starts = np.concatenate([[0.0], np.cumsum(ends)[:-1]])
+        return np.concatenate([start + run.time_s for start, run in zip(starts, self.runs, strict=True)])
 
     def targets(self):
         """Commanded positions (n, 3) of all sampled points in order."""
         return np.concatenate([run.points_mm for run in self.runs])
 
     def path(self):
-        """Positions (N, 3) along everything that is driven, transfers between runs included, and the rows (n,) of the
-        sampled points.
+        """Positions (N, 3) along all that is driven, transfers included, and the rows (n,) of the sampled points.
 
         # ASSUME the robot goes straight from the end of a run to the start of the next.
         """
-        pieces, index, length, last = [], [], 0, None
-        for run in self.runs:
-            if last is not None and not np.allclose(last, run.path_mm[0]):
-                transfer = last + np.linspace(0.0, 1.0, 2 * _PATH_STEPS)[1:-1, None] * (run.path_mm[0] - last)
-                pieces.append(transfer)
-                length += len(transfer)
-            pieces.append(run.path_mm)
-            index.append(length + run.path_index)
-            length += len(run.path_mm)
-            last = run.path_mm[-1]
-        return np.concatenate(pieces), np.concatenate(index)
+        return connect([run.path_mm for run in self.runs], [run.path_index for run in self.runs], 2 * _PATH_STEPS)
+
+
+def connect(paths, rows, steps):
+    """Positions (N, 3) along paths (k, 3) with straight transfers between them, and where their rows (m,) are in it.
+
+    A transfer has `steps` points with its two ends; there is none where a path begins at the end of the one before.
+    """
+    pieces, index, length, last = [], [], 0, None
+    for path, row in zip(paths, rows, strict=True):
+        if last is not None and not np.allclose(last, path[0]):
+            pieces.append(last + np.linspace(0.0, 1.0, steps)[1:-1, None] * (path[0] - last))
+            length += steps - 2
+        pieces.append(path)
+        index.append(length + row)
+        length, last = length + len(path), path[-1]
+    return np.concatenate(pieces), np.concatenate(index)
 
 
 def make_run(trajectory, speed_mm_s, acceleration_mm_s2, payload_kg=0.0, reverse=False):
     """One pass along a trajectory, forward or in reverse, with the trapezoidal profile over its arc length."""
+    from scipy.interpolate import CubicSpline
+
     shares = _CURVE_SHARES[::-1] if reverse else _CURVE_SHARES
     curve = CubicSpline(_CURVE_SHARES, trajectory.curve(shares))
     arc = CubicSpline(_CURVE_SHARES, np.linalg.norm(curve(_CURVE_SHARES, 1), axis=1)).antiderivative()

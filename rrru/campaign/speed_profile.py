@@ -9,8 +9,7 @@ from rrru.errors import ConfigError
 
 @dataclass(frozen=True)
 class Trapezoid:
-    """Rest to rest over `length_mm` with a constant acceleration, a constant speed and the same deceleration (paper A,
-    3.2).
+    """Rest to rest over `length_mm`: constant acceleration, constant speed, the same deceleration (paper A, 3.2).
 
     A path too short to reach the speed gets a triangular profile.
     """
@@ -20,11 +19,10 @@ class Trapezoid:
     acceleration_mm_s2: float
 
     def __post_init__(self):
-        if not (self.length_mm > 0.0 and self.speed_mm_s > 0.0 and self.acceleration_mm_s2 > 0.0):
-            raise ConfigError(
-                f"motion: length {self.length_mm} mm, speed {self.speed_mm_s} mm/s, acceleration {self.acceleration_mm_s2} mm/s^2; "
-                "allowed: positive numbers"
-            )
+        if not min(self.length_mm, self.speed_mm_s, self.acceleration_mm_s2) > 0.0:
+            motion = f"length {self.length_mm} mm, speed {self.speed_mm_s} mm/s"
+            motion += f", acceleration {self.acceleration_mm_s2} mm/s^2"
+            raise ConfigError(f"motion: {motion}; allowed: positive numbers")
 
     @property
     def peak_mm_s(self):
@@ -38,18 +36,14 @@ class Trapezoid:
 
     def time(self, distance_mm):
         """Times (n,) at which distances (n,) along the path are passed."""
-        distance = np.clip(np.asarray(distance_mm, dtype=float), 0.0, self.length_mm)
         a, v, length = self.acceleration_mm_s2, self.peak_mm_s, self.length_mm
-        ramp = 0.5 * v**2 / a
-        return np.where(
-            distance < ramp,
+        distance, ramp = np.clip(np.asarray(distance_mm, dtype=float), 0.0, length), 0.5 * v**2 / a
+        speeding_up, slowing_down = (
             np.sqrt(2.0 * distance / a),
-            np.where(
-                distance > length - ramp,
-                self.duration_s - np.sqrt(2.0 * (length - distance) / a),
-                v / a + (distance - ramp) / v,
-            ),
+            self.duration_s - np.sqrt(2.0 * (length - distance) / a),
         )
+        steady = v / a + (distance - ramp) / v
+        return np.select([distance < ramp, distance > length - ramp], [speeding_up, slowing_down], steady)
 
     def speed(self, time_s):
         """Speeds (n,) in mm/s at times (n,)."""
@@ -58,8 +52,6 @@ class Trapezoid:
 
     def acceleration(self, time_s):
         """Accelerations (n,) along the path in mm/s^2 at times (n,)."""
-        time = np.asarray(time_s, dtype=float)
-        ramp = self.peak_mm_s / self.acceleration_mm_s2
-        return np.where(
-            time < ramp, self.acceleration_mm_s2, np.where(time > self.duration_s - ramp, -self.acceleration_mm_s2, 0.0)
-        )
+        time, a = np.asarray(time_s, dtype=float), self.acceleration_mm_s2
+        ramp = self.peak_mm_s / a
+        return np.select([time < ramp, time > self.duration_s - ramp], [a, -a], 0.0)

@@ -1,7 +1,6 @@
 """Point to point: what a robot is told when every point is measured at rest. Lengths in mm, times in s."""
 
 import numpy as np
-from scipy.stats import qmc
 
 from rrru.campaign.plan import Plan, Run
 from rrru.campaign.speed_profile import Trapezoid
@@ -11,20 +10,14 @@ _STEPS = 8
 
 
 def cylinder_points(centre_mm, radius_mm, z_mm, count, generator):
-    """Points (count, 3) spread evenly over an upright cylinder about centre (x, y) between two heights: a scrambled
-    Sobol sequence.
-    """
+    """Points (count, 3) spread evenly over an upright cylinder about (x, y) between two heights: a Sobol sequence."""
+    from scipy.stats import qmc
+
     share = qmc.Sobol(3, rng=generator).random_base2(int(np.ceil(np.log2(count))))[:count]
     radius, angle = radius_mm * np.sqrt(share[:, 0]), 2.0 * np.pi * share[:, 1]
+    x, y = centre_mm[0] + radius * np.cos(angle), centre_mm[1] + radius * np.sin(angle)
     low, high = sorted(z_mm)
-    return np.stack(
-        [
-            centre_mm[0] + radius * np.cos(angle),
-            centre_mm[1] + radius * np.sin(angle),
-            low + share[:, 2] * (high - low),
-        ],
-        axis=-1,
-    )
+    return np.stack([x, y, low + share[:, 2] * (high - low)], axis=-1)
 
 
 def nearest_first(points_mm):
@@ -37,9 +30,7 @@ def nearest_first(points_mm):
 
 
 def stops(name, points_mm, speed_mm_s, acceleration_mm_s2, settle_s, payload_kg=0.0):
-    """Plan of one run that goes straight from point to point (n, 3) and is measured at rest, `settle_s` after each
-    arrival.
-    """
+    """Plan of one run straight from point to point (n, 3), measured at rest, `settle_s` after each arrival."""
     points = np.asarray(points_mm, dtype=float)
     ways = np.linalg.norm(np.diff(points, axis=0), axis=1)
     durations = [Trapezoid(float(way), speed_mm_s, acceleration_mm_s2).duration_s if way > 0.0 else 0.0 for way in ways]

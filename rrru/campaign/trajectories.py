@@ -55,9 +55,8 @@ class Spiral:
         angle = np.radians(self.start_deg) + 2.0 * np.pi * self.turns * share
         radius = self.radius_mm[0] + share * (self.radius_mm[1] - self.radius_mm[0])
         height = self.z_mm[0] + share * (self.z_mm[1] - self.z_mm[0])
-        return np.stack(
-            [self.centre_mm[0] + radius * np.cos(angle), self.centre_mm[1] + radius * np.sin(angle), height], axis=-1
-        )
+        x, y = self.centre_mm[0] + radius * np.cos(angle), self.centre_mm[1] + radius * np.sin(angle)
+        return np.stack([x, y, height], axis=-1)
 
 
 def sample(trajectory):
@@ -77,21 +76,11 @@ def from_config(section):
     """Trajectories of one `trajectories:` entry of the configuration: line groups first, then the spiral."""
     result = ()
     if "lines" in section:
-        lines = section["lines"]
-        result += line_groups(lines["start_mm"], lines["end_mm"], lines["offsets_y_mm"], lines["points"])
+        lines = dict(section["lines"])
+        result += line_groups(count=lines.pop("points"), **lines)
     if "spiral" in section:
-        spiral = section["spiral"]
-        result += (
-            Spiral(
-                spiral.get("name", "spiral"),
-                tuple(spiral["centre_mm"]),
-                tuple(spiral["radius_mm"]),
-                tuple(spiral["z_mm"]),
-                spiral["turns"],
-                spiral["points"],
-                spiral["start_deg"],
-            ),
-        )
+        spiral = {key: tuple(value) if isinstance(value, list) else value for key, value in section["spiral"].items()}
+        result += (Spiral("spiral", count=spiral.pop("points"), **spiral),)
     return result
 
 
