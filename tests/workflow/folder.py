@@ -1,15 +1,74 @@
 """A folder of its own to run snakemake in, which sees the project's files through links."""
 
+import contextlib
+import hashlib
+import io
+import os
+import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.places import ROOT
+
 SNAKEMAKE = str(Path(sys.executable).parent / "snakemake")
+MINIMAL = "tests/minimal.yaml"
 
 
 def link(folder):
     """Link what a run needs into a folder, once."""
-    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "tests", "data"):
+    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "data", "tests"):
         place = folder / name
         if not place.exists():
             place.symlink_to(ROOT / name)
+
+
+def start(folder, *targets, overlays=(MINIMAL,), cores=2, record=None):
+    """A running snakemake in a folder; record: a folder for what its scripts read."""
+    link(folder)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    if record:
+        environment |= {
+            "PYTHONPATH": f"{ROOT / 'tests/workflow/recorder'}{os.pathsep}{ROOT}",
+            "RRRU_RECORD": str(record),
+        }
+    command = [SNAKEMAKE, "--cores", str(cores), *targets, *(["--configfile", *overlays] if overlays else [])]
+    return subprocess.Popen(
+        command,
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(folder, *targets, **options):
+    """Exit code and output of snakemake in a folder, see `start`."""
+    process = start(folder, *targets, **options)
+    output, _ = process.communicate(timeout=900)
+    return process.returncode, output
+
+
+def dry_run(folder, *targets, overlays=()):
+    """Exit code and output of a dry run within this process, which costs a tenth of a process of its own."""
+    from snakemake.cli import main
+
+    link(folder)
+    output = io.StringIO()
+    chosen = ["--configfile", *overlays] if overlays else []
+    with contextlib.chdir(folder), contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+        try:
+            main(["-n", "--cores", "1", *targets, *chosen])
+        except SystemExit as stopped:
+            return stopped.code, output.getvalue()
+    return 0, output.getvalue()
+
+
+def digests(folder):
+    """Digest of every result file of a folder that has to be the same in every run."""
+    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and p.relative_to(folder).parts[0] not in _VARYING]
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+_VARYING = ("timings", "logs")
