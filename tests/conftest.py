@@ -20,3 +20,11 @@ def rich_poses():
     )
     assert clear.sum() >= 200
     return points[clear][:200], theta[clear][:200]
+
+
+def pytest_collection_modifyitems(items):
+    """A module's tests stay on one worker, so that what they share is made once; the workflow's begin first."""
+    for item in items:
+        folder, name = item.path.parent.name, item.module.__name__
+        item.add_marker(pytest.mark.xdist_group("workflow" if folder == "workflow" else name))
+    items.sort(key=lambda item: item.path.parent.name != "workflow")

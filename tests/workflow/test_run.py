@@ -14,7 +14,7 @@ from tests.workflow.folder import MINIMAL, digests, dry_run, run, start
 def test_everything_is_there_and_a_second_run_does_nothing(shared, results):
     made = digests(results)
     assert {"tables/published.parquet", "tables/audit.parquet", "tables/errors.parquet", "figures/fig09.png"} <= set(
-        digests
+        made
     )
     campaigns = pd.read_parquet(results / "tables/campaigns.parquet")
     assert {"paper", "crooked", "field_01", "field_09"} == set(campaigns["campaign"])

@@ -2,22 +2,22 @@
 
 import ast
 import re
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.workflow.folder import ROOT, SNAKEMAKE
+from tests.places import ROOT
+from tests.workflow.folder import MINIMAL, dry_run
 
 
 @pytest.fixture(scope="module")
-def jobs():
+def jobs(tmp_path_factory):
     """(rule, inputs, outputs) of every job of the check, as snakemake plans them."""
-    command = [SNAKEMAKE, "-n", "--forceall", "withheld", "gap", "--configfile", "tests/minimal.yaml"]
-    plan = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert plan.returncode == 0, plan.stderr
+    folder = tmp_path_factory.mktemp("planned")
+    code, output = dry_run(folder, "--forceall", "withheld", "gap", overlays=(MINIMAL,))
+    assert code == 0, output
     result = []
-    for block in re.split(r"^(?=(?:local)?rule \w+:$)", plan.stdout + plan.stderr, flags=re.MULTILINE):
+    for block in re.split(r"^(?=(?:local)?rule \w+:$)", output, flags=re.MULTILINE):
         rule = re.search(r"^(?:local)?rule (\w+):$", block, re.MULTILINE)
         if rule:
             lists = {key: re.search(rf"^    {key}: (.*)$", block, re.MULTILINE) for key in ("input", "output")}
