@@ -19,34 +19,20 @@ Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Funda
 1991. Typical size assumed: 0.1 mm over a bearing distance of 100 mm.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
-_PARAMETERS = ParameterSet(
-    tuple(
-        Parameter(f"tilt_{axis}{k}", "rad", 0.0, -0.03, 0.03, "seat of the drive, size assumed")
-        for k in LEGS
-        for axis in "xz"
-    )
-)
-_COORDINATES = plain_coordinates(_PARAMETERS, 1e-3)
+_TILTS = (("tilt_x", "rad", -0.03, 0.03), ("tilt_z", "rad", -0.03, 0.03))
+_PARAMETERS = ParameterSet(leg_parameters("seat of the drive, size assumed", *_TILTS))
 
 
-@dataclass(frozen=True)
-class AxisTilt:
-    """Drive axes turned about the radial and the vertical axis of their legs."""
+def _seats(_, values):
+    """Displacement of the legs' seats under tilts about x and z of leg 1, then of legs 2 and 3, (6,) in rad."""
+    turn = np.zeros((3, 3))
+    turn[:, [0, 2]] = np.reshape(values, (3, 2))
+    return Contribution(displacement=base_displacement(np.zeros((3, 3)), turn))
 
-    name: str = "axis_tilt"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
 
-    def contribute(self, motion, values):
-        """Displacement of the legs' seats under tilts about x and z of leg 1, then of legs 2 and 3, (6,) in rad."""
-        turn = np.zeros((3, 3))
-        turn[:, [0, 2]] = np.reshape(values, (3, 2))
-        return Contribution(displacement=base_displacement(np.zeros((3, 3)), turn))
+EFFECTS = (Effect("axis_tilt", _PARAMETERS, plain_coordinates(_PARAMETERS, 1e-3), _seats, drives=("rad",)),)

@@ -17,24 +17,20 @@ angle of the campaign; motor and path are those commanded. Points of the path at
 over.
 
 Source: as above; Nordin and Gutman, Controlling mechanical systems with backlash - a survey, Automatica 38, 2002. The
-size is assumed: worm and planetary drives of the cheaper kind have some arc minutes, 1 arc minute is 2.9e-4 rad. SLIDER
-is the law of a screw drive, with the play of its nut in mm (paper B, section 3.1).
+size is assumed: cheaper worm and planetary drives have some arc minutes, 1 arc minute is 2.9e-4 rad. A screw drive has
+the play of its nut in mm (paper B, section 3.1).
 """
-
-from dataclasses import dataclass
 
 import numba
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
 
 @numba.njit(cache=True)
 def play(path, half_width):
-    """Play operator along a path (N, k) with half widths (k,), same unit; returns y - u, shape (N, k), NaN where the
-    path is.
-    """
+    """Play operator along a path (N, k) with half widths (k,), same unit: y - u (N, k), NaN where unknown."""
     result = np.empty_like(path)
     for leg in range(path.shape[1]):
         y = np.nan
@@ -48,31 +44,18 @@ def play(path, half_width):
     return result
 
 
-_PARAMETERS = ParameterSet(
-    tuple(
-        Parameter(f"width{k}", "rad", 0.0, 0.0, 0.02, "play of worm and harmonic drives: up to some arc minutes")
-        for k in LEGS
-    )
+def _played(motion, values):
+    """Changes (n, 3) of the actuator values under widths (3,) in their unit."""
+    return Contribution(drive=play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index])
+
+
+def _effect(drive_unit, highest, typical, source):
+    """The law for drives of one kind."""
+    parameters = ParameterSet(leg_parameters(source, ("width", drive_unit, 0.0, highest)))
+    return Effect("backlash", parameters, plain_coordinates(parameters, typical), _played, drives=(drive_unit,))
+
+
+EFFECTS = (
+    _effect("rad", 0.02, 5e-4, "play of worm and harmonic drives: up to some arc minutes"),
+    _effect("mm", 1.0, 0.02, "paper B, eq. (19) measures it; size assumed"),
 )
-_COORDINATES = plain_coordinates(_PARAMETERS, 5e-4)
-
-
-@dataclass(frozen=True)
-class Backlash:
-    """Play of a width per leg in the drive."""
-
-    name: str = "backlash"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the actuator values under widths (3,) in their unit."""
-        along_path = play(np.ascontiguousarray(motion.path_drive), 0.5 * np.asarray(values, dtype=float))
-        return Contribution(drive=along_path[motion.path_index])
-
-
-_SCREW = ParameterSet(
-    tuple(Parameter(f"width{k}", "mm", 0.0, 0.0, 1.0, "paper B, eq. (19) measures it; size assumed") for k in LEGS)
-)
-SLIDER = Backlash(parameters=_SCREW, coordinates=plain_coordinates(_SCREW, 0.02))

@@ -20,36 +20,23 @@ Source: geometry; leg placement as in Mooring, Roth and Driels, Fundamentals of 
 assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
-_SOURCE = "drilling of the base, size assumed"
-_KINDS = (("azimuth", "rad", 0.03), ("radius", "mm", 30.0), ("height", "mm", 30.0))
-_PARAMETERS = ParameterSet(
-    tuple(Parameter(f"{name}{k}", unit, 0.0, -limit, limit, _SOURCE) for k in LEGS for name, unit, limit in _KINDS)
-)
+_KINDS = (("azimuth", "rad", -0.03, 0.03), ("radius", "mm", -30.0, 30.0), ("height", "mm", -30.0, 30.0))
+_PARAMETERS = ParameterSet(leg_parameters("drilling of the base, size assumed", *_KINDS))
 _COORDINATES = plain_coordinates(_PARAMETERS, np.tile([1e-3, 0.5, 0.5], 3))
 
 
-@dataclass(frozen=True)
-class BasePlacement:
-    """Azimuth, radius and height of every leg on the base."""
+def _feet(motion, values):
+    """Displacement of the legs' feet under azimuth (rad), radius and height (mm) of leg 1, then 2 and 3, (9,)."""
+    azimuth, radius, height = np.reshape(values, (3, 3)).T
+    foot = motion.lengths_mm[0] + radius
+    nothing = np.zeros(3)
+    shift = np.stack([foot * np.cos(azimuth) - motion.lengths_mm[0], foot * np.sin(azimuth), height], axis=-1)
+    return Contribution(displacement=base_displacement(shift, np.stack([nothing, nothing, azimuth], axis=-1)))
 
-    name: str = "base_placement"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
 
-    def contribute(self, motion, values):
-        """Displacement of the legs' feet under azimuth (rad), radius and height (mm) of leg 1, then of legs 2 and 3,
-        (9,).
-        """
-        azimuth, radius, height = np.reshape(values, (3, 3)).T
-        foot = motion.lengths_mm[0] + radius
-        nothing = np.zeros(3)
-        shift = np.stack([foot * np.cos(azimuth) - motion.lengths_mm[0], foot * np.sin(azimuth), height], axis=-1)
-        return Contribution(displacement=base_displacement(shift, np.stack([nothing, nothing, azimuth], axis=-1)))
+EFFECTS = (Effect("base_placement", _PARAMETERS, _COORDINATES, _feet),)

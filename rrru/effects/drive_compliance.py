@@ -19,47 +19,30 @@ Assumptions: linear spring (harmonic drives stiffen with torque by a factor of a
 motion (that is `backlash`), wind-up small enough that loads are those at the commanded pose, no vibration (a motion
 slow against the drive's resonance).
 
-SLIDER is the law of a carriage on a screw or belt: b_i errs by k_i F_i with the force F_i of all loads along its rail.
+A carriage on a screw or belt gives way likewise: b_i errs by k_i F_i with the force F_i of all loads along its rail.
 
 Source: Tsai, Robot Analysis, 1999, chapter 10 (loads); Spong, Modeling and control of elastic joint robots, ASME
 Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsion spring). The size is assumed: 15 N m
 on 50 kN m/rad make 3e-4 rad.
 """
 
-from dataclasses import dataclass
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
-import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+def _wind_up(motion, values):
+    """Changes (n, 3) of the actuator values under compliances (3,), rad/(N mm) or mm/N."""
+    return Contribution(drive=values * motion.drive_load)
 
-_PARAMETERS = ParameterSet(
-    tuple(
-        Parameter(f"compliance{k}", "rad/(N mm)", 0.0, 0.0, 1e-6, "torsion spring; a small drive's 1 kN m/rad as bound")
-        for k in LEGS
-    )
+
+def _effect(drive_unit, unit, highest, typical, source):
+    """The law for drives of one kind."""
+    parameters = ParameterSet(leg_parameters(source, ("compliance", unit, 0.0, highest)))
+    coordinates = plain_coordinates(parameters, typical)
+    return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",), (drive_unit,))
+
+
+EFFECTS = (
+    _effect("rad", "rad/(N mm)", 1e-6, 2e-8, "torsion spring; a small drive's 1 kN m/rad as bound"),
+    _effect("mm", "mm/N", 0.05, 1e-3, "screw, nut, bearing and carriage, size assumed"),
 )
-_COORDINATES = plain_coordinates(_PARAMETERS, 2e-8)
-
-
-@dataclass(frozen=True)
-class DriveCompliance:
-    """Drives that give way to static and inertial loads, compliance per leg."""
-
-    name: str = "drive_compliance"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("drive_load",)
-
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the actuator values under compliances (3,), rad/(N mm) or mm/N."""
-        return Contribution(drive=np.asarray(values, dtype=float) * motion.drive_load)
-
-
-_SCREW = ParameterSet(
-    tuple(
-        Parameter(f"compliance{k}", "mm/N", 0.0, 0.0, 0.05, "screw, nut, bearing and carriage, size assumed")
-        for k in LEGS
-    )
-)
-SLIDER = DriveCompliance(parameters=_SCREW, coordinates=plain_coordinates(_SCREW, 1e-3))

@@ -1,15 +1,11 @@
-"""What an effect is: a physical law that knows the motion and says what it changes, and where. Lengths mm, angles rad,
-forces N, times s.
-"""
+"""What an effect is: a physical law that knows the motion and says what it changes, and where. mm, rad, N, s."""
 
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from rrru.parameters import ParameterSet
+from rrru.parameters import LEGS, Parameter, ParameterSet
 
-LEGS = (1, 2, 3)
 # where a displacement may act, along the chain of a leg
 PLACES = ("base", "elbow", "knee", "wrist", "cross", "platform")
 
@@ -62,13 +58,7 @@ class Contribution:
     frame: np.ndarray | float = 0.0
 
     def __add__(self, other):
-        return Contribution(
-            self.drive + other.drive,
-            self.length_mm + other.length_mm,
-            self.joint_mm + other.joint_mm,
-            self.displacement + other.displacement,
-            self.frame + other.frame,
-        )
+        return Contribution(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -93,30 +83,33 @@ class Coordinates:
 
 
 def base_displacement(shift_mm, turn_rad):
-    """Contribution.displacement (3 legs, 6 places, 6) of shifts (3, 3) and rotation vectors (3, 3) of the legs' feet,
-    leg frame.
-    """
+    """Contribution.displacement (3 legs, 6 places, 6) of shifts and rotation vectors (3, 3) of the feet, leg frame."""
     result = np.zeros((3, len(PLACES), 6))
     result[:, PLACES.index("base"), :3] = shift_mm
     result[:, PLACES.index("base"), 3:] = turn_rad
     return result
 
 
-def plain_coordinates(parameters, typical, shapes=({},)):
-    """Coordinates that are the parameters themselves, but for those that the shapes fix.
+def leg_parameters(source, *kinds):
+    """Parameters of every leg, those of leg 1 first; kinds: (name, unit, low, high), the leg's number is added."""
+    return tuple(
+        Parameter(f"{name}{leg}", unit, 0.0, low, high, source, leg) for leg in LEGS for name, unit, low, high in kinds
+    )
 
-    typical: one size for all coordinates or one each. A parameter whose name ends in 1, 2 or 3 belongs to that leg; one
-    whose lower bound is zero is positive.
+
+def plain_coordinates(parameters, typical, shapes=({},)):
+    """Coordinates that are the parameters themselves, but for those that the shapes fix; a low of zero makes positive.
+
+    typical: one size for all coordinates or one each.
     """
-    fixed = set(shapes[0])
-    free = [p for p in parameters if p.name not in fixed]
+    free = [p for p in parameters if p.name not in shapes[0]]
 
     def to_values(coordinates, shape):
         return parameters.vector(dict(shape) | {p.name: value for p, value in zip(free, coordinates, strict=True)})
 
     return Coordinates(
         typical=np.broadcast_to(np.asarray(typical, dtype=float), len(free)),
-        legs=np.array([int(p.name[-1]) if p.name[-1] in "123" else 0 for p in free]),
+        legs=np.array([p.leg for p in free]),
         positive=np.array([p.low >= 0.0 for p in free]),
         to_values=to_values,
         shapes=tuple(shapes),
@@ -124,19 +117,24 @@ def plain_coordinates(parameters, typical, shapes=({},)):
     )
 
 
-class Effect(Protocol):
-    """One physical effect.
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: names of fields of Motion without which the law says nothing.
+    needs: fields of Motion without which the law says nothing; drives: units of the actuator values ("rad", "mm") of
+    the robots that it is written for.
     """
 
     name: str
     parameters: ParameterSet
     coordinates: Coordinates
-    needs: tuple
+    law: object
+    needs: tuple = ()
+    drives: tuple = ("rad", "mm")
 
-    def contribute(self, motion: Motion, values: np.ndarray) -> Contribution:
+    def contribute(self, motion, values):
         """Changes at the points of a motion under parameter values (p,)."""
+        return self.law(motion, np.asarray(values, dtype=float))
 
 
 @dataclass(frozen=True)
@@ -149,3 +147,8 @@ class ActiveEffect:
     def contribute(self, motion):
         """Changes at the points of a motion."""
         return self.effect.contribute(motion, self.effect.parameters.vector(self.values))
+
+
+def together(effects, motion):
+    """Contribution of active effects together at the points of a motion."""
+    return sum((effect.contribute(motion) for effect in effects), Contribution())

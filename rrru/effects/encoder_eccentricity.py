@@ -1,5 +1,4 @@
-"""Encoder eccentricity: the encoder's disc sits off the shaft's centre, so that its reading errs once per turn of the
-drive arm.
+"""Encoder eccentricity: the encoder's disc sits off its shaft's centre and errs once per turn of the drive arm.
 
 A disc of grating radius rho whose centre lies at a distance e from the shaft's axis is read at the arc rho theta + e
 sin(theta + p), where p is the direction in which the centre lies off. One reading head therefore sees an angle that
@@ -20,25 +19,17 @@ Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 201
 assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
-from dataclasses import dataclass
-
-from rrru.effects.effect import Contribution, Coordinates
+from rrru.effects.effect import Contribution, Effect
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
 from rrru.parameters import ParameterSet
 
 _PARAMETERS = ParameterSet(harmonic_parameters("eccentricity over grating radius; up to some arc minutes, assumed"))
+
+
+def _once_per_turn(motion, values):
+    """Changes (n, 3) of the drive angles under amplitudes (3,) and phases (3,) in rad."""
+    return Contribution(drive=harmonic(motion.drive, 1.0, values))
+
+
 _COORDINATES = harmonic_coordinates(_PARAMETERS, 3e-4)
-
-
-@dataclass(frozen=True)
-class EncoderEccentricity:
-    """Once-per-turn sine in the drive angle, amplitude and phase per leg."""
-
-    name: str = "encoder_eccentricity"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the drive angles under amplitudes (3,) and phases (3,) in rad."""
-        return Contribution(drive=harmonic(motion.drive, 1.0, values))
+EFFECTS = (Effect("encoder_eccentricity", _PARAMETERS, _COORDINATES, _once_per_turn, drives=("rad",)),)

@@ -19,37 +19,25 @@ Source: rigid motion between point sets: Arun, Huang and Blostein, Least-squares
 Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed: marks off by 0.5 mm, a metre apart.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
+_KINDS = (("shift", "mm", 100.0), ("turn", "rad", 0.1))
 _PARAMETERS = ParameterSet(
-    (
-        *(
-            Parameter(f"shift_{axis}", "mm", 0.0, -100.0, 100.0, "setting of the tracker's frame, size assumed")
-            for axis in "xyz"
-        ),
-        *(
-            Parameter(f"turn_{axis}", "rad", 0.0, -0.1, 0.1, "setting of the tracker's frame, size assumed")
-            for axis in "xyz"
-        ),
+    tuple(
+        Parameter(f"{kind}_{axis}", unit, 0.0, -limit, limit, "setting of the tracker's frame, size assumed")
+        for kind, unit, limit in _KINDS
+        for axis in "xyz"
     )
 )
 _COORDINATES = plain_coordinates(_PARAMETERS, np.repeat([0.5, 5e-4], 3))
 
 
-@dataclass(frozen=True)
-class FrameMisregistration:
-    """Rigid motion between the robot's and the tracker's frame."""
+def _moved(_, values):
+    """The frame's shift (mm) and rotation vector (rad), (6,)."""
+    return Contribution(frame=values)
 
-    name: str = "frame_misregistration"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
 
-    def contribute(self, motion, values):
-        """The frame's shift (mm) and rotation vector (rad), (6,)."""
-        return Contribution(frame=np.array(values, dtype=float))
+EFFECTS = (Effect("frame_misregistration", _PARAMETERS, _COORDINATES, _moved),)

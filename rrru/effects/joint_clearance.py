@@ -16,56 +16,41 @@ shows itself by the jump where the force changes sign.
 Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time);
 the contact lies on the forearm's line; the pin's radius left out.
 
-SLIDER is the law of a robot whose link has no joint of its own that could be held.
-
 Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005.
 Paper A, section 3.3, blames it for what calibration leaves; its size is assumed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
     (
-        *(
-            Parameter(f"clearance{k}", "mm", 0.0, 0.0, 2.0, "paper A, section 3.3 blames it; size assumed")
-            for k in LEGS
-        ),
+        *leg_parameters("paper A, section 3.3 blames it; size assumed", ("clearance", "mm", 0.0, 2.0)),
         Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
         Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
     )
 )
-_SHAPES = tuple({"transition": force, "held": held} for held in (0.0, 1.0) for force in (0.2, 0.7, 2.0))
-_COORDINATES = plain_coordinates(_PARAMETERS, 0.05, _SHAPES)
 
 
-@dataclass(frozen=True)
-class JointClearance:
-    """Radial clearance per leg in the U joint."""
+def _sides(motion, values):
+    """Shifts (n, 3, 3) of the platform's U-joint centres against the forearms.
 
-    name: str = "joint_clearance"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("force_n",)
-
-    def contribute(self, motion, values):
-        """Shifts (n, 3, 3) of the platform's U-joint centres against the forearms.
-
-        values: clearances (3,) in mm, the transition in N and the share to which joint 3 is held.
-        """
-        transition, held = values[3:]
-        force = motion.force_n + held * (motion.held_force_n - motion.force_n)
-        side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
-        push = side * np.asarray(values[:3], dtype=float)
-        return Contribution(joint_mm=-push[..., None] * motion.force_direction)
+    values: clearances (3,) in mm, the transition in N and the share to which joint 3 is held.
+    """
+    transition, held = values[3:]
+    force = motion.force_n + held * (motion.held_force_n - motion.force_n)
+    side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
+    return Contribution(joint_mm=-(side * values[:3])[..., None] * motion.force_direction)
 
 
-SLIDER = JointClearance(
-    coordinates=plain_coordinates(
-        _PARAMETERS, 0.05, tuple({"transition": force, "held": 0.0} for force in (0.2, 0.7, 2.0))
-    )
-)
+def _effect(drive_unit, shares_held):
+    """The law for robots whose joint 3 may be held to these shares."""
+    shapes = tuple({"transition": force, "held": held} for held in shares_held for force in (0.2, 0.7, 2.0))
+    coordinates = plain_coordinates(_PARAMETERS, 0.05, shapes)
+    return Effect("joint_clearance", _PARAMETERS, coordinates, _sides, ("force_n",), (drive_unit,))
+
+
+# a slider's link has no joint of its own that could be held
+EFFECTS = (_effect("rad", (0.0, 1.0)), _effect("mm", (0.0,)))

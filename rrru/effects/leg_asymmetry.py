@@ -12,7 +12,7 @@ The part common to the legs, (dLk_1 + dLk_2 + dLk_3) / 3, is the calibration's o
 three numbers per link are new. L2 and L3 of one leg act nearly alike, since rho = L2 + sqrt(L3^2 - v^2) tells them
 apart only where the tangential offset v of the platform is large.
 
-A robot with one link per leg (SLIDER) has the three dL3_i only.
+A robot with one link per leg has the three dL3_i only.
 
 Assumptions: rigid links, constant over the campaign.
 
@@ -20,44 +20,27 @@ Source: paper A, section 2.2 (the 14 errors); the bounds are those of its calibr
 workshop holds on welded or clamped links of this length, ISO 2768-1 class m (+-0.8 mm from 400 to 1000 mm).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
-
-_LINKS = (1, 2, 3)
-_PARAMETERS = ParameterSet(
-    tuple(
-        Parameter(f"dL{k}_leg{leg}", "mm", 0.0, -4.0, 4.0, "paper A, section 2.2; bounds assumed")
-        for leg in LEGS
-        for k in _LINKS
-    )
-)
-_COORDINATES = plain_coordinates(_PARAMETERS, 0.3)
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
 
-@dataclass(frozen=True)
-class LegAsymmetry:
-    """Link lengths of every leg by themselves; links: the numbers of those that a leg has."""
+def _effect(drive_unit, links, source):
+    """The law for robots whose legs have these links: name of the parameters to the place among R, L1, L2, L3, r."""
+    parameters = ParameterSet(leg_parameters(source, *((name, "mm", -4.0, 4.0) for name in links)))
+    places = tuple(links.values())
 
-    name: str = "leg_asymmetry"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
-    links: tuple = _LINKS
-
-    def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under dL of the links of leg 1, then of legs 2 and 3, (3 times the links,)
-        in mm.
-        """
+    def lengths(motion, values):
+        """Changes (n, 3, 5) of the lengths under dL of the links of leg 1, then 2 and 3, (3 times the links,) in mm."""
         length = np.zeros((len(motion), 3, 5))
-        length[..., self.links] = np.reshape(values, (3, len(self.links)))
+        length[..., places] = np.reshape(values, (3, len(places)))
         return Contribution(length_mm=length)
 
+    return Effect("leg_asymmetry", parameters, plain_coordinates(parameters, 0.3), lengths, drives=(drive_unit,))
 
-_ONE_LINK = ParameterSet(
-    tuple(Parameter(f"dL_leg{leg}", "mm", 0.0, -4.0, 4.0, "workshop tolerance, assumed") for leg in LEGS)
+
+EFFECTS = (
+    _effect("rad", {"dL1_leg": 1, "dL2_leg": 2, "dL3_leg": 3}, "paper A, section 2.2; bounds assumed"),
+    _effect("mm", {"dL_leg": 3}, "workshop tolerance, assumed"),
 )
-SLIDER = LegAsymmetry(parameters=_ONE_LINK, coordinates=plain_coordinates(_ONE_LINK, 0.3), links=(3,))

@@ -17,48 +17,38 @@ or a share between.
 Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads
 are those at the commanded pose.
 
-SLIDER is the law of a robot whose link has no joint of its own that could be held.
-
 Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain
 aluminium tube of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here
 are assumed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _FOREARM = 3
 _PARAMETERS = ParameterSet(
     (
-        *(
-            Parameter(f"flexure{k}", "mm/N", 0.0, 0.0, 0.1, "axial spring of forearm and its joints, size assumed")
-            for k in LEGS
-        ),
+        *leg_parameters("axial spring of forearm and its joints, size assumed", ("flexure", "mm/N", 0.0, 0.1)),
         Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
     )
 )
-_COORDINATES = plain_coordinates(_PARAMETERS, 2e-3, ({"held": 0.0}, {"held": 1.0}))
 
 
-@dataclass(frozen=True)
-class LinkFlexure:
-    """Forearms that shorten under compression, compliance per leg."""
-
-    name: str = "link_flexure"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("force_n",)
-
-    def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under compliances (3,) in mm/N and the share to which joint 3 is held."""
-        force = motion.force_n + values[3] * (motion.held_force_n - motion.force_n)
-        length = np.zeros((len(motion), 3, 5))
-        length[..., _FOREARM] = -np.asarray(values[:3], dtype=float) * force
-        return Contribution(length_mm=length)
+def _shortened(motion, values):
+    """Changes (n, 3, 5) of the lengths under compliances (3,) in mm/N and the share to which joint 3 is held."""
+    force = motion.force_n + values[3] * (motion.held_force_n - motion.force_n)
+    length = np.zeros((len(motion), 3, 5))
+    length[..., _FOREARM] = -values[:3] * force
+    return Contribution(length_mm=length)
 
 
-SLIDER = LinkFlexure(coordinates=plain_coordinates(_PARAMETERS, 2e-3, ({"held": 0.0},)))
+def _effect(drive_unit, *shares_held):
+    """The law for robots whose joint 3 may be held to these shares."""
+    coordinates = plain_coordinates(_PARAMETERS, 2e-3, tuple({"held": held} for held in shares_held))
+    return Effect("link_flexure", _PARAMETERS, coordinates, _shortened, ("force_n",), (drive_unit,))
+
+
+# a slider's link has no joint of its own that could be held
+EFFECTS = (_effect("rad", 0.0, 1.0), _effect("mm", 0.0))

@@ -17,34 +17,19 @@ Source: geometry; squareness and parallelism of guides as in Slocum, Precision M
 assumed: 0.3 mm over 300 mm.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, base_displacement, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
-_PARAMETERS = ParameterSet(
-    tuple(
-        Parameter(f"{kind}{k}", "rad", 0.0, -0.05, 0.05, "seat of the rail, size assumed")
-        for k in LEGS
-        for kind in ("lean", "rise", "swing")
-    )
-)
-_COORDINATES = plain_coordinates(_PARAMETERS, 1e-3)
+_TURNS = tuple((kind, "rad", -0.05, 0.05) for kind in ("lean", "rise", "swing"))
+_PARAMETERS = ParameterSet(leg_parameters("seat of the rail, size assumed", *_TURNS))
 
 
-@dataclass(frozen=True)
-class RailTilt:
-    """Rails turned about their zero marks: lean, rise and swing of every leg."""
+def _seats(_, values):
+    """Displacement of the rails' seats under lean, rise and swing of leg 1, then of legs 2 and 3, (9,) in rad."""
+    turn = np.reshape(values, (3, 3)) * [1.0, -1.0, 1.0]
+    return Contribution(displacement=base_displacement(np.zeros((3, 3)), turn))
 
-    name: str = "rail_tilt"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
 
-    def contribute(self, motion, values):
-        """Displacement of the rails' seats under lean, rise and swing of leg 1, then of legs 2 and 3, (9,) in rad."""
-        return Contribution(
-            displacement=base_displacement(np.zeros((3, 3)), np.reshape(values, (3, 3)) * [1.0, -1.0, 1.0])
-        )
+EFFECTS = (Effect("rail_tilt", _PARAMETERS, plain_coordinates(_PARAMETERS, 1e-3), _seats, drives=("mm",)),)

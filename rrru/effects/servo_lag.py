@@ -19,31 +19,19 @@ system type and steady-state error. Sizes assumed: position-loop gains of machin
 second.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
 
-_PARAMETERS = ParameterSet(
-    tuple(Parameter(f"lag{k}", "s", 0.0, 0.0, 0.1, "inverse of the position loop's gain, assumed") for k in LEGS)
-)
-_COORDINATES = plain_coordinates(_PARAMETERS, 0.003)
+_SOURCE = "inverse of the position loop's gain, assumed"
+_PARAMETERS = ParameterSet(leg_parameters(_SOURCE, ("lag", "s", 0.0, 0.1)))
 
 
-@dataclass(frozen=True)
-class ServoLag:
-    """Drives that are late, delay per leg."""
+def _late(motion, delay):
+    """Changes (n, 3) of the drive angles under delays (3,) in s."""
+    curvature, rate = np.nan_to_num(motion.drive_acceleration), np.nan_to_num(motion.drive_rate)
+    return Contribution(drive=0.5 * delay**2 * curvature - delay * rate)
 
-    name: str = "servo_lag"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("drive_rate",)
 
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the drive angles under delays (3,) in s."""
-        delay = np.asarray(values, dtype=float)
-        return Contribution(
-            drive=0.5 * delay**2 * np.nan_to_num(motion.drive_acceleration) - delay * np.nan_to_num(motion.drive_rate)
-        )
+EFFECTS = (Effect("servo_lag", _PARAMETERS, plain_coordinates(_PARAMETERS, 0.003), _late, ("drive_rate",)),)

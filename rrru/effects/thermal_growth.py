@@ -20,11 +20,9 @@ Source: Incropera and DeWitt, Fundamentals of Heat and Mass Transfer, lumped cap
 aluminium has 2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from half a minute to an hour assumed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(
@@ -34,22 +32,14 @@ _PARAMETERS = ParameterSet(
     )
 )
 _SHAPES = tuple({"time_constant": tau} for tau in (30.0, 60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0))
+
+
+def _grown(motion, values):
+    """Changes (n, 3, 5) of the lengths under final strain and time constant in s; none where the time is unknown."""
+    strain, time_constant = values
+    share = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
+    return Contribution(length_mm=np.broadcast_to(share[:, None, None] * motion.lengths_mm, (len(motion), 3, 5)))
+
+
 _COORDINATES = plain_coordinates(_PARAMETERS, 2e-4, _SHAPES)
-
-
-@dataclass(frozen=True)
-class ThermalGrowth:
-    """All lengths grow by a strain with a time constant."""
-
-    name: str = "thermal_growth"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ("time_s",)
-
-    def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths under the final strain and the time constant in s; none where the time is
-        unknown.
-        """
-        strain, time_constant = values
-        grown = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
-        return Contribution(length_mm=np.broadcast_to(grown[:, None, None] * motion.lengths_mm, (len(motion), 3, 5)))
+EFFECTS = (Effect("thermal_growth", _PARAMETERS, _COORDINATES, _grown, ("time_s",)),)

@@ -9,7 +9,7 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
 
     dtheta_i = s_i sin(N theta_i) + c_i cos(N theta_i)
 
-A screw of lead h (`ScrewError`) leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
+A screw of lead h leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
 of motion. The ratio is a number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2
@@ -19,58 +19,35 @@ Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions
 is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import Contribution, Coordinates
+from rrru.effects.effect import Contribution, Effect
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
 from rrru.parameters import Parameter, ParameterSet
 
-_PARAMETERS = ParameterSet(
-    (
-        *harmonic_parameters("assumed: up to some arc minutes"),
-        Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default"),
-    )
+
+def _effect(drive_unit, parameters, typical, law):
+    """The law for drives of one kind, with its parameters, the last of them known from a data sheet."""
+    known = parameters[-1]
+    parameters = ParameterSet(parameters)
+    coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
+    return Effect("transmission_error", parameters, coordinates, law, drives=(drive_unit,))
+
+
+def _gear(motion, values):
+    """Changes (n, 3) of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
+    return Contribution(drive=harmonic(motion.drive, values[6], values))
+
+
+def _screw(motion, values):
+    """Changes (n, 3) of the slider positions under amplitudes (3,) in mm, phases (3,) in rad and the lead in mm."""
+    return Contribution(drive=harmonic(motion.drive, 2.0 * np.pi / values[6], values))
+
+
+_RATIO = Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default")
+_LEAD = Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default")
+_OUT_OF_TRUE = harmonic_parameters("screw out of true, assumed: up to some hundredths of a millimetre", "mm", 1.0)
+EFFECTS = (
+    _effect("rad", (*harmonic_parameters("assumed: up to some arc minutes"), _RATIO), 3e-4, _gear),
+    _effect("mm", (*_OUT_OF_TRUE, _LEAD), 0.01, _screw),
 )
-_COORDINATES = harmonic_coordinates(_PARAMETERS, 3e-4, ({"ratio": 50.0},))
-
-
-@dataclass(frozen=True)
-class TransmissionError:
-    """Sine in the drive angle, amplitude and phase per leg; `ratio` periods per turn."""
-
-    name: str = "transmission_error"
-    parameters: ParameterSet = _PARAMETERS
-    coordinates: Coordinates = _COORDINATES
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
-        return Contribution(drive=harmonic(motion.drive, values[6], values))
-
-
-_SCREW = ParameterSet(
-    (
-        *harmonic_parameters("screw out of true, assumed: up to some hundredths of a millimetre", "mm", 1.0),
-        Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default"),
-    )
-)
-_SCREW_COORDINATES = harmonic_coordinates(_SCREW, 0.01, ({"lead": 10.0},))
-
-
-@dataclass(frozen=True)
-class ScrewError:
-    """Sine in the slider's position once per turn of its screw, amplitude and phase per leg."""
-
-    name: str = "transmission_error"
-    parameters: ParameterSet = _SCREW
-    coordinates: Coordinates = _SCREW_COORDINATES
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes (n, 3) of the slider positions under amplitudes (3,) in mm, phases (3,) in rad and the lead in mm."""
-        return Contribution(drive=harmonic(motion.drive, 2.0 * np.pi / values[6], values))
-
-
-SLIDER = ScrewError()

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from rrru.campaign import measurements as rows
-from rrru.effects.motion import make_motion
+from rrru.effects.motion import Course, make_motion
 
 # points of the path between two commanded ones, and along a transfer between runs
 _STEPS, _TRANSFER_STEPS = 8, 30
@@ -48,7 +48,8 @@ def motion_of(measurements, mechanism, masses):
     # the file's own values stand where it has them
     path_drive[index] = drive
     payload = measurements["payload_kg"].to_numpy(dtype=float)
-    return make_motion(mechanism, masses, position, drive, path_drive, index, time, velocity, acceleration, payload)
+    course = Course(position, drive, path_drive, index, time, velocity, acceleration, payload)
+    return make_motion(mechanism, masses, course)
 
 
 def at_turn_back(motion, drive_unit):

@@ -1,4 +1,4 @@
-"""Any robot's chains closed exactly, with errors of its numbers and under what effects contribute.
+"""Any robot's chains closed exactly, with deviations of its numbers and under what effects contribute.
 
 Virtual robots and the diagnosis' corrected sims stand on this. The 3-RRRU closes in space, with a platform that may
 turn (`rrru.plant.spatial`); the platform of a tripod only translates. Lengths in mm, angles in rad.
@@ -22,8 +22,9 @@ class TripodGeometry:
     legs: np.ndarray
 
     def solve_under(self, actuators, change):
-        """Platform centres (n, 3) in the tracker's frame at actuator values (n, 3) under a Contribution; NaN where the
-        links do not meet.
+        """Platform centres (n, 3) in the tracker's frame at actuator values (n, 3) under a Contribution.
+
+        NaN where the links do not meet.
         """
         robot, legs, actuators = self.mechanism, self.legs, np.asarray(actuators, dtype=float)
         shift = np.zeros((len(actuators), 3, 3)) + change.joint_mm
@@ -31,13 +32,13 @@ class TripodGeometry:
             shift = shift + base_shift(robot.leg_axes, robot.levers(actuators, legs), change.displacement)
         if np.ndim(change.length_mm):
             legs = robot.with_lengths(legs, change.length_mm)
-        position = robot.forward_of_legs(actuators + change.drive, legs, shift)
-        return position if not np.ndim(change.frame) else into_frame(position, change.frame)
+        return into_frame(robot.forward_of_legs(actuators + change.drive, legs, shift), change.frame)
 
 
 def corrected_sim(mechanism, deviations, actuators, command_mm, change):
-    """Positions (n, 3) in mm of a mechanism with deviations (p,) at actuator values (n, 3) near commands (n, 3), under a
-    Contribution.
+    """Positions (n, 3) in mm of a mechanism with deviations (p,) under a Contribution.
+
+    actuators (n, 3): near those of the commands (n, 3).
     """
     legs = mechanism.legs(deviations)
     if not isinstance(mechanism, Rrru3):

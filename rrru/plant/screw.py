@@ -1,22 +1,19 @@
-"""Bench of a screw: one slider turned forwards, back and forwards again, a linear encoder beside it (paper B, 3.1.1,
-Fig. 7). Lengths in mm.
-"""
+"""Bench of a screw: one slider turned forwards, back and forwards, an encoder beside it (paper B, Fig. 7). mm."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from rrru.effects.effect import Contribution
-from rrru.effects.motion import make_motion
+from rrru.effects.effect import together
+from rrru.effects.motion import Course, make_motion
 from rrru.errors import UnreachableError
-from rrru.robots.dynamics import Masses
 
 PASSES = ("forward_1", "reverse", "forward_2")
 
 
 @dataclass(frozen=True)
-class Bench:
+class ScrewBench:
     """turns of the motor per pass, lead of the screw in mm per turn, samples per turn, the encoder's noise (1 sigma)
     and resolution in mm.
     """
@@ -56,19 +53,13 @@ def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
             f"screw {leg}: {travel.max():g} mm of travel about {tuple(place_mm)} leave the reach; allowed: less"
         )
     still = np.zeros_like(position)
-    motion = make_motion(
-        mechanism,
-        Masses(robot.platform_mass_kg, robot.forearm_mass_kg, robot.arm_mass_kg),
-        position,
-        sliders,
-        sliders,
+    everywhere, unknown, payload = (
         np.arange(len(travel)),
         np.full(len(travel), np.nan),
-        still,
-        still,
-        np.full(len(travel), float(payload_kg)),
+        np.full(len(travel), payload_kg),
     )
-    change = np.zeros_like(sliders) + sum((effect.contribute(motion) for effect in robot.effects), Contribution()).drive
+    course = Course(position, sliders, sliders, everywhere, unknown, still, still, payload)
+    change = np.zeros_like(sliders) + together(robot.effects, make_motion(mechanism, robot.masses, course)).drive
     seen = (sliders + change)[:, leg - 1] + bench.noise_mm * generator.standard_normal(len(travel))
     return pd.DataFrame(
         {

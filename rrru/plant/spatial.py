@@ -25,8 +25,8 @@ _compiled = numba.njit(cache=True, error_model="numpy")
 
 
 def into_frame(position_mm, frame):
-    """Positions (n, 3) carried by a frame (6,): rotation vector in rad, then shift in mm."""
-    return position_mm @ Rotation.from_rotvec(frame[3:]).as_matrix().T + frame[:3]
+    """Positions (n, 3) carried by a frame (6,), shift in mm and rotation vector in rad, or by none, a number."""
+    return position_mm @ Rotation.from_rotvec(frame[3:]).as_matrix().T + frame[:3] if np.ndim(frame) else position_mm
 
 
 @dataclass(frozen=True)

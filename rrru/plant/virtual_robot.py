@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rrru.campaign.measurements import actuator_columns
-from rrru.effects.effect import PLACES, Contribution
+from rrru.campaign.measurements import actuator_columns, vector_columns
+from rrru.effects.effect import PLACES, together
 from rrru.effects.library import active_effects
-from rrru.effects.motion import make_motion
+from rrru.effects.motion import Course, make_motion
 from rrru.errors import ConfigError
 from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
@@ -18,8 +18,10 @@ from rrru.robots.rrru3 import Rrru3
 
 
 class DrivenRobot:
-    """What virtual robots share: they drive plans and are measured. They add mechanism, non_repeatability_mm, the three masses and
-    `positions`.
+    """What virtual robots share: they drive plans and are measured.
+
+    They add mechanism, deviations (names of the mechanism's parameters to true values), active effects, masses and
+    `positions`; non_repeatability_mm: radius of the ball in which the platform lies at random, see `non_repeatability`.
     """
 
     def run(self, plan, noise_mm, generator, controller=None):
@@ -30,52 +32,42 @@ class DrivenRobot:
         that the controller sent; `truth` holds the exact position in the tracker's frame and the platform's rotation.
         Noise is drawn for every row, solved or not, so that one lost point does not change the others.
         """
-        controller = controller or self.mechanism.inverse
-        commands = plan.commands(self.mechanism)
-        target = plan.targets()
-        motion = self.motion(plan, controller)
+        commands, target = plan.commands(self.mechanism), plan.targets()
+        motion = self.motion(plan, controller or self.mechanism.inverse)
         position, turned = self.positions(motion, target)
         solved = np.isfinite(position).all(axis=1)
         position = position + self.non_repeatability_mm * non_repeatability(generator, len(target))
-        measured = measure(position, noise_mm, generator)
         measurements = commands.assign(
             **dict(zip(actuator_columns(self.mechanism.drive_unit), motion.drive.T, strict=True)),
-            **{f"measured_{axis}_mm": measured[:, k] for k, axis in enumerate("xyz")},
+            **vector_columns("measured", measure(position, noise_mm, generator)),
             status=np.where(solved, "ok", "unsolved"),
         )
-        truth = commands[["run", "trajectory", "point"]].assign(
-            **{f"true_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")},
-            platform_rotation_rad=turned,
-        )
-        return measurements, truth
+        truth = commands[["run", "trajectory", "point"]]
+        return measurements, truth.assign(**vector_columns("true", position), platform_rotation_rad=turned)
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan driven through a controller; the loads are those of the nominal
-        mechanism.
-        """
+        """What the effects may know about a plan driven through a controller; the nominal mechanism's loads."""
         path, index = plan.path()
         along = controller(path)
-        return make_motion(
-            self.mechanism,
-            Masses(self.platform_mass_kg, self.forearm_mass_kg, self.arm_mass_kg),
-            plan.targets(),
-            along[index],
-            along,
-            index,
-            plan.time_s(),
-            np.concatenate([run.velocity_mm_s for run in plan.runs]),
-            np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
-            np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
+        course = Course(
+            position_mm=plan.targets(),
+            drive=along[index],
+            path_drive=along,
+            path_index=index,
+            time_s=plan.time_s(),
+            velocity_mm_s=np.concatenate([run.velocity_mm_s for run in plan.runs]),
+            acceleration_mm_s2=np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
+            payload_kg=np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
         )
+        return make_motion(self.mechanism, self.masses, course)
 
 
 @dataclass(frozen=True)
 class VirtualRobot(DrivenRobot):
     """A 3-RRRU whose truth is known.
 
-    deviations: published names of the 14 errors (or the tied ones) to values; axis_deviations (3 legs, 6 places, 6):
-    displacements of every axis; effects: active effects; non_repeatability_mm: radius of the ball in which the platform lies at
-    random, see `non_repeatability`; masses in kg; rotation_limit_rad: a larger platform rotation counts as unsolved.
+    deviations: of the published parameters or the tied ones; axis_deviations (3 legs, 6 places, 6): displacements of
+    every axis; rotation_limit_rad: a larger platform rotation counts as unsolved.
     """
 
     mechanism: Rrru3 = field(default_factory=Rrru3)
@@ -83,38 +75,26 @@ class VirtualRobot(DrivenRobot):
     axis_deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
     effects: tuple = ()
     non_repeatability_mm: float = 0.0
-    platform_mass_kg: float = 3.0
-    forearm_mass_kg: float = 1.2
-    arm_mass_kg: float = 2.0
+    masses: Masses = field(default_factory=Masses)
     rotation_limit_rad: float = 0.05
-
-    @property
-    def drive_errors_rad(self):
-        """Constant errors (3,) of the drive angles."""
-        return np.array([self.deviations.get(f"dtheta{k}", 0.0) for k in (1, 2, 3)])
 
     @property
     def geometry(self):
         """The chains' lengths and displacements."""
-        robot = self.mechanism
-        nominal = (robot.R_mm, robot.L1_mm, robot.L2_mm, robot.L3_mm, robot.r_mm)
-        lengths = np.tile(nominal, (3, 1))
-        for leg in range(3):
-            for link in (1, 2, 3):
-                lengths[leg, link] += self.deviations.get(f"dL{leg + 1}{link}", self.deviations.get(f"dL{link}", 0.0))
-            lengths[leg, 0] += self.deviations.get("dR", 0.0)
-            lengths[leg, 4] += self.deviations.get("dr", 0.0)
-        return SpatialGeometry(np.array(robot.azimuth_rad), lengths, self.axis_deviations)
+        lengths = np.tile(self.mechanism.lengths_mm, (3, 1))
+        lengths[:, 1:4] += self.mechanism.leg_changes(self.deviations)[:, 1:4]
+        lengths[:, [0, 4]] += [self.deviations.get("dR", 0.0), self.deviations.get("dr", 0.0)]
+        return SpatialGeometry(np.array(self.mechanism.azimuth_rad), lengths, self.axis_deviations)
 
     def positions(self, motion, target):
-        """Platform centres (n, 3) in the tracker's frame and the sizes (n,) of its rotation at the points of a motion
-        near `target` (n, 3).
+        """Platform centres (n, 3) in the tracker's frame and sizes (n,) of its rotation along a motion near targets.
 
         NaN where the chains do not close near the target or the platform would turn by more than the limit.
         """
-        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        change = together(self.effects, motion)
         passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
-        solution = self.geometry.solve_under(motion.drive + self.drive_errors_rad, passive, change)
+        drive = motion.drive + self.mechanism.leg_changes(self.deviations)[:, 0]
+        solution = self.geometry.solve_under(drive, passive, change)
         turned = np.linalg.norm(solution.rotation_rad, axis=1)
         solved = solution.converged & (turned <= self.rotation_limit_rad)
         return np.where(solved[:, None], solution.position_mm, np.nan), turned
@@ -136,19 +116,24 @@ def from_config(mechanism, section):
         if name not in known:
             raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")
     return VirtualRobot(
-        mechanism=mechanism,
-        deviations={name: float(value) for name, value in section["errors"].items()},
-        axis_deviations=_deviations(section["axis_errors"]),
-        effects=active_effects(section["effects"]),
-        non_repeatability_mm=section["wobble_mm"],
-        platform_mass_kg=section["platform_mass_kg"],
-        forearm_mass_kg=section["forearm_mass_kg"],
-        arm_mass_kg=section["arm_mass_kg"],
+        axis_deviations=_axis_deviations(section["axis_errors"]),
         rotation_limit_rad=section["rotation_limit_rad"],
+        **shared_parts(mechanism, section),
     )
 
 
-def _deviations(section):
+def shared_parts(mechanism, section):
+    """What an entry of `virtual_robots:` says of any robot, as the fields that all virtual robots have."""
+    return {
+        "mechanism": mechanism,
+        "deviations": {name: float(value) for name, value in section["errors"].items()},
+        "effects": active_effects(section["effects"], mechanism.drive_unit),
+        "non_repeatability_mm": section["wobble_mm"],
+        "masses": Masses(section["platform_mass_kg"], section["forearm_mass_kg"], section["arm_mass_kg"]),
+    }
+
+
+def _axis_deviations(section):
     """Displacements (3, 6 places, 6): normal draws of the stated sizes from the stated seed."""
     generator = np.random.default_rng(section["seed"])
     draw = generator.standard_normal((3, len(PLACES), 6))

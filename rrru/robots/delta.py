@@ -49,6 +49,7 @@ class Delta(Tripod):
 
     ARM, LINK, OFFSET = 1, 2, 3
     TRACKED = "tied"
+    RICHEST = "legs"
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
     DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
     PARAMETER_NAMES: ClassVar = {

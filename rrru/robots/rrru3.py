@@ -51,9 +51,10 @@ class Rrru3(ThreeLegs):
     length_limit_mm: float = 4.0
     name: str = field(default="rrru3", init=False)
 
-    # unit of an actuator value; the set of parameters that measured positions identify
+    # unit of an actuator value; sets of parameters that measured positions identify, that a truth is given in
     drive_unit = "rad"
     TRACKED = "identifiable"
+    RICHEST = "published"
     DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
     DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _GAUGED
     PARAMETER_NAMES: ClassVar = {

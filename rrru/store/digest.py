@@ -49,7 +49,9 @@ def _imported(file):
     for module, targets in _FROM.findall(text):
         names.update(f"{module}.{word}" for word in re.findall(r"(\w+)(?:[ \t]+as[ \t]+\w+)?", targets))
     parts = [name.split(".") for name in names]
-    return tuple(filter(None, {_file(".".join(p[:k])) for p in parts for k in range(1, len(p) + 1)}))
+    # what looks for modules finds those of its own folder
+    beside = file.parent.glob("*.py") if "import pkgutil\n" in text else ()
+    return tuple(filter(None, {*beside, *(_file(".".join(p[:k])) for p in parts for k in range(1, len(p) + 1))}))
 
 
 @cache

@@ -18,7 +18,7 @@ from rrru.parameters import Parameter, ParameterSet
 
 class Creep:
     name = "creep"
-    parameters = ParameterSet((Parameter("rate2", "rad/s", 0.0, 0.0, 1e-4, "seen once"),))
+    parameters = ParameterSet((Parameter("rate2", "rad/s", 0.0, 0.0, 1e-4, "seen once", leg=2),))
 
     def contribute(self, motion, values):
         return Contribution(drive=values[0] * motion.time_s[:, None] * np.array([0.0, 1.0, 0.0]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.effects.library import EFFECTS
-from rrru.effects.motion import make_motion
+from rrru.effects.motion import Course, make_motion
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
@@ -13,12 +13,10 @@ _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
 
 
 def _given(**changes):
-    """Arguments of make_motion for the plan's points, with changes."""
+    """The motion of the nominal robot along the plan's points, with changes."""
     target = _PLAN.targets()
     n = len(target)
     arguments = {
-        "mechanism": ROBOT,
-        "masses": Masses(),
         "position_mm": target,
         "drive": ROBOT.inverse(target),
         "path_drive": ROBOT.inverse(target),
@@ -28,7 +26,7 @@ def _given(**changes):
         "acceleration_mm_s2": np.zeros((n, 3)),
         "payload_kg": np.zeros(n),
     }
-    return make_motion(**(arguments | changes))
+    return make_motion(ROBOT, Masses(), Course(**(arguments | changes)))
 
 
 def test_the_virtual_robots_motion_is_the_plans():

@@ -12,6 +12,7 @@ from rrru.effects.library import LIBRARY, SLIDER_EFFECTS, active_effects, find
 from rrru.errors import ConfigError
 from rrru.plant.closure import corrected_sim
 from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.robots.dynamics import Masses
 from rrru.robots.first_order import first_order
 from rrru.robots.ptt3 import Ptt3
 
@@ -90,7 +91,7 @@ def test_the_loads_on_the_carriages_are_the_slopes_of_the_potential_energy(robot
     places.
     """
     mechanism, motion = ROBOTS[robot][0], MOTIONS[robot]
-    still = VirtualTripod(mechanism, platform_mass_kg=2.0, forearm_mass_kg=0.8, arm_mass_kg=1.5)
+    still = VirtualTripod(mechanism, masses=Masses(2.0, 0.8, 1.5))
     curve = Spiral(
         "curve", (5.0, -3.0), (60.0, 80.0), (motion.position_mm[0, 2], motion.position_mm[0, 2] + 30.0), 1.0, 30
     )

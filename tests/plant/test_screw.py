@@ -6,13 +6,13 @@ import pytest
 from rrru.compensate.backlash import measured_width
 from rrru.effects.library import active_effects
 from rrru.errors import UnreachableError
-from rrru.plant.screw import Bench, encoder_record
+from rrru.plant.screw import ScrewBench, encoder_record
 from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.robots.ptt3 import Ptt3
 
 PLACE = (0.0, 0.0, -250.0)
-EXACT = Bench(turns=10, lead_mm=5.0, samples_per_turn=8, noise_mm=0.0, resolution_mm=1e-9)
-REAL = Bench(turns=10, lead_mm=5.0, samples_per_turn=40, noise_mm=5e-4, resolution_mm=1e-3)
+EXACT = ScrewBench(turns=10, lead_mm=5.0, samples_per_turn=8, noise_mm=0.0, resolution_mm=1e-9)
+REAL = ScrewBench(turns=10, lead_mm=5.0, samples_per_turn=40, noise_mm=5e-4, resolution_mm=1e-3)
 
 
 def robot(widths=(0.06, 0.045, 0.075), compliance=0.0):
@@ -73,4 +73,4 @@ def test_a_load_shifts_the_reading_by_the_compliance():
 
 def test_a_travel_out_of_reach_is_refused():
     with pytest.raises(UnreachableError, match=r"screw 2: 1000 mm of travel"):
-        encoder_record(robot(), 2, 0.0, Bench(10, 100.0, 8, 0.0, 1e-3), PLACE, np.random.default_rng(0))
+        encoder_record(robot(), 2, 0.0, ScrewBench(10, 100.0, 8, 0.0, 1e-3), PLACE, np.random.default_rng(0))

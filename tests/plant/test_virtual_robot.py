@@ -59,7 +59,7 @@ def test_leg_forces_do_the_work_of_the_load():
     robot, plan = VirtualRobot(), _plan()
     target = plan.targets()
     motion = robot.motion(plan, robot.mechanism.inverse)
-    mass = robot.platform_mass_kg + 1.5 * robot.forearm_mass_kg
+    mass = robot.masses.platform_kg + 1.5 * robot.masses.forearm_kg
     acceleration = np.concatenate([run.acceleration_mm_s2 for run in plan.runs])
     load = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
     drive = robot.mechanism.actuator_jacobian(target, motion.drive)

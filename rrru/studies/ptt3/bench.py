@@ -8,7 +8,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.measurements import vector_columns
 from rrru.compensate.backlash import measured_width, repeatability
-from rrru.plant.screw import Bench, encoder_record
+from rrru.plant.screw import ScrewBench, encoder_record
 from rrru.robots import workspace
 from rrru.seeds import stream
 from rrru.studies import setup
@@ -81,7 +81,7 @@ def backlash(settings):
     """Rows of `ptt_encoder` and of `ptt_backlash`: every screw under every load, and its backlash by eq. (19)."""
     section, seed = settings["ptt"], settings["seed"]
     robot = experiment(settings, next(iter(section["experiments"]))).campaign.robot
-    bench = Bench(**{key: value for key, value in section["bench"].items() if key != "range_mm"})
+    bench = ScrewBench(**{key: value for key, value in section["bench"].items() if key != "range_mm"})
     truth = section["robot"]["effects"].get("backlash", {})
     place = (0.0, 0.0, float(np.mean(section["curve"]["z_mm"])))
     records, widths = [], []

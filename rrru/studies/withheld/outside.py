@@ -5,11 +5,9 @@ They are used by the plant alone. All are effects as the library's are, and ente
 are assumed.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rrru.effects.effect import LEGS, Contribution, Coordinates, plain_coordinates
+from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 # the truth in words: outside:<name>
@@ -20,22 +18,7 @@ _GRAVITY_M_S2 = 9.80665
 _PLATFORM_KG = 4.8
 _ANCHOR_MM = np.array([100.0, 900.0, 0.0])
 _SLACK_MM = 1080.0
-_PATTERNS = tuple({"pattern": float(k)} for k in range(1, 9))
-
-
-@dataclass(frozen=True)
-class Outside:
-    """A cause from outside the library; law: motion and values (p,) to a Contribution."""
-
-    name: str
-    parameters: ParameterSet
-    coordinates: Coordinates
-    law: object
-    needs: tuple = ()
-
-    def contribute(self, motion, values):
-        """Changes at the points of a motion under parameter values (p,)."""
-        return self.law(motion, np.asarray(values, dtype=float))
+_PERIODS_S = (7.3, 19.0, 41.0)
 
 
 def _shifted(shift_mm):
@@ -91,45 +74,33 @@ def _pulley_ripple(motion, values):
     return Contribution(drive=sine * np.sin(5.0 * motion.drive) + cosine * np.cos(5.0 * motion.drive))
 
 
-def _make(law, free, typical, fixed=(), shapes=({},)):
-    """The cause of a law: free parameters (name, unit, limit), positive ones with a limit below zero's opposite only,
-    and its shapes.
-    """
-    parameters = ParameterSet(
-        (*(Parameter(name, unit, 0.0, low, high, "assumed") for name, unit, low, high in free), *fixed)
-    )
-    return Outside(
-        law.__name__.strip("_"), parameters, plain_coordinates(parameters, typical, shapes), law, ("time_s",)
-    )
+def _make(law, parameters, typical, shapes=({},)):
+    """The cause of a law with its parameters, typical sizes of those that no shape fixes, and its shapes."""
+    parameters = ParameterSet(parameters)
+    coordinates = plain_coordinates(parameters, typical, shapes)
+    return Effect(law.__name__.strip("_"), parameters, coordinates, law, ("time_s",))
 
 
 def _axes(name, unit, limit):
-    """Free parameters along x, y and z."""
-    return tuple((f"{name}_{axis}", unit, -limit, limit) for axis in "xyz")
+    """Parameters along x, y and z."""
+    return tuple(Parameter(f"{name}_{axis}", unit, 0.0, -limit, limit, "assumed") for axis in "xyz")
 
+
+_REPEATABILITY = leg_parameters("assumed", ("repeatability", "rad", 0.0, 0.01))
+_PATTERN = Parameter("pattern", "1", 1.0, 1.0, 1e6, "draw")
+_PERIOD = Parameter("period", "s", 20.0, 1.0, 1e4, "assumed")
+_YIELDING = Parameter("yielding", "mm/mm", 0.0, 0.0, 0.1, "assumed")
+_SOFTNESS = tuple(Parameter(f"softness_{axis}", "rad/(N mm)", 0.0, 0.0, 1e-6, "assumed") for axis in "xy")
+_RIPPLES = leg_parameters("assumed", *((part, "rad", -0.01, 0.01) for part in ("sine", "cosine")))
 
 OUTSIDE = {
     cause.name: cause
     for cause in (
-        _make(
-            _rehoming,
-            tuple((f"repeatability{k}", "rad", 0.0, 0.01) for k in LEGS),
-            3e-4,
-            (Parameter("pattern", "1", 1.0, 1.0, 1e6, "draw"),),
-            _PATTERNS,
-        ),
-        _make(
-            _tripod_sway,
-            _axes("amplitude", "mm", 5.0),
-            0.1,
-            (Parameter("period", "s", 20.0, 1.0, 1e4, "assumed"),),
-            tuple({"period": period} for period in (7.3, 19.0, 41.0)),
-        ),
+        _make(_rehoming, (*_REPEATABILITY, _PATTERN), 3e-4, tuple({"pattern": float(k)} for k in range(1, 9))),
+        _make(_tripod_sway, (*_axes("amplitude", "mm", 5.0), _PERIOD), 0.1, tuple({"period": s} for s in _PERIODS_S)),
         _make(_tripod_creep, _axes("speed", "mm/s", 0.1), 1e-4),
-        _make(_cable_pull, (("yielding", "mm/mm", 0.0, 0.1),), 1e-3),
-        _make(_floor_tilt, tuple((f"softness_{axis}", "rad/(N mm)", 0.0, 1e-6) for axis in "xy"), 5e-9),
-        _make(
-            _pulley_ripple, tuple((f"{part}{k}", "rad", -0.01, 0.01) for k in LEGS for part in ("sine", "cosine")), 3e-4
-        ),
+        _make(_cable_pull, (_YIELDING,), 1e-3),
+        _make(_floor_tilt, _SOFTNESS, 5e-9),
+        _make(_pulley_ripple, _RIPPLES, 3e-4),
     )
 }
