@@ -1,10 +1,22 @@
 """Tables of the campaigns."""
 
-from rrru.store.schema import CAMPAIGN, NUMBER, STATUS, Column, Table, xyz
+from rrru.store.schema import CAMPAIGN, NUMBER, STATUS, Column, Table, numbers, xyz
+
+_POINT = (
+    Column("run", "int64", "as in measurements"),
+    Column("trajectory", "str", "as in measurements"),
+    Column("point", "int64", "as in measurements"),
+)
+_NOISE_FROM = "given: by the configuration; repeats: pooled over repeated points; residuals: from the fit of all points"
+_MEASURES = ("translational_measure", "constraint_measure", "constraint_determinant")
+_STATUS_MEANS = (
+    "every point is kept; outlier and unsolved are left out of fits, "
+    "near_singularity only with use_near_singularity: false"
+)
 
 
-def _measurements(name, robots, drives):
-    """Schema of the measurement table of robots with certain columns of actuator values."""
+def _measurements(name, robots, drive, meaning):
+    """Schema of the measurement table of robots whose actuator values stand in columns such as theta1_rad."""
     return Table(
         name,
         "campaigns/{campaign}/measurements.parquet",
@@ -13,68 +25,45 @@ def _measurements(name, robots, drives):
             Column("run", "int64", "number of the pass, from 1 in the order driven"),
             Column("trajectory", "str", "name of the trajectory"),
             Column("point", "int64", "number of the point in its run, from 1"),
-            Column("time_s", "float64", "time since the campaign's start; null where the file has none", True),
+            *numbers(True, time_s="time since the campaign's start; null where the file has none"),
             *xyz("command", "mm", "commanded position, robot frame"),
-            *drives,
+            *numbers(**{drive.format(leg): f"commanded {meaning} {leg}" for leg in (1, 2, 3)}),
             *xyz("measured", "mm", "measured position, robot frame; null where the point was not measured", True),
-            Column("speed_mm_s", "float64", "speed of the run; null where the file has none", True),
-            Column("payload_kg", "float64", "payload on the platform; null where the file has none", True),
-            Column(
-                "status",
-                "str",
-                "every point is kept; outlier and unsolved are left out of fits, near_singularity only with use_near_singularity: false",
-                allowed=STATUS,
-            ),
+            *numbers(True, speed_mm_s="speed of the run; null where the file has none"),
+            *numbers(True, payload_kg="payload on the platform; null where the file has none"),
+            Column("status", "str", _STATUS_MEANS, allowed=STATUS),
         ),
         ("run", "point"),
     )
 
 
 TABLES = (
-    _measurements(
-        "measurements",
-        "robots with drive arms",
-        [Column(f"theta{k}_rad", NUMBER, f"commanded drive angle of leg {k}") for k in (1, 2, 3)],
-    ),
-    _measurements(
-        "slider_measurements",
-        "robots with sliders",
-        [Column(f"slider{k}_mm", NUMBER, f"commanded position of slider {k}") for k in (1, 2, 3)],
-    ),
+    _measurements("measurements", "robots with drive arms", "theta{}_rad", "drive angle of leg"),
+    _measurements("slider_measurements", "robots with sliders", "slider{}_mm", "position of slider"),
     Table(
         "truth",
         "campaigns/{campaign}/truth.parquet",
         "What only the virtual robot knows, one row per commanded point.",
         (
-            Column("run", "int64", "as in measurements"),
-            Column("trajectory", "str", "as in measurements"),
-            Column("point", "int64", "as in measurements"),
-            *xyz("true", "mm", "true position, wobble included; null where the chains do not close", True),
-            Column(
-                "platform_rotation_rad",
-                NUMBER,
-                "angle by which the platform has turned; null where the chains do not close",
-                True,
-            ),
+            *_POINT,
+            *xyz("true", "mm", "true position, non-repeatability included; null where the chains do not close", True),
+            *numbers(True, platform_rotation_rad="the platform's turn; null where the chains do not close"),
         ),
         ("run", "point"),
     ),
     Table(
         "singularity",
         "tables/singularity.parquet",
-        "Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: 0 at it, 1 at best).",
+        "Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: "
+        "0 at it, 1 at best).",
         (
             CAMPAIGN,
-            Column("run", "int64", "as in measurements"),
-            Column("trajectory", "str", "as in measurements"),
-            Column("point", "int64", "as in measurements"),
-            Column("translational_measure", NUMBER, "0 where the platform can move with locked drives"),
-            Column(
-                "constraint_measure",
-                NUMBER,
-                "0 where the platform can turn with locked drives; eq. (8) does not see it",
+            *_POINT,
+            *numbers(
+                translational_measure="0 where the platform can move with locked drives",
+                constraint_measure="0 where the platform can turn with locked drives; eq. (8) does not see it",
+                constraint_determinant="changes its sign across a constraint singularity",
             ),
-            Column("constraint_determinant", NUMBER, "changes its sign across a constraint singularity"),
             Column("status", "str", "as in measurements", allowed=STATUS),
         ),
         ("campaign", "run", "point"),
@@ -82,15 +71,13 @@ TABLES = (
     Table(
         "workspace",
         "campaigns/{campaign}/workspace.parquet",
-        "Regular grid over two slices of the workspace: xz at y = 0, and xy through the middle of the commanded points.",
+        "Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.",
         (
             CAMPAIGN,
             Column("slice", "str", "plane", allowed=("xz", "xy")),
-            *(Column(f"{axis}_mm", NUMBER, f"grid point, {axis}, robot frame") for axis in "xyz"),
+            *numbers(**{f"{axis}_mm": f"grid point, {axis}, robot frame" for axis in "xyz"}),
             Column("reachable", "bool", "true where all three legs reach"),
-            Column("translational_measure", NUMBER, "as in singularity; null out of reach", True),
-            Column("constraint_measure", NUMBER, "as in singularity; null out of reach", True),
-            Column("constraint_determinant", NUMBER, "as in singularity; null out of reach", True),
+            *numbers(True, **dict.fromkeys(_MEASURES, "as in singularity; null out of reach")),
         ),
         ("slice", "x_mm", "y_mm", "z_mm"),
     ),
@@ -106,22 +93,17 @@ TABLES = (
             Column("runs", "int64", "passes"),
             *(Column(name, "int64", f"points with status {name}") for name in STATUS),
             Column("noise_mm", NUMBER, "measuring noise per axis, 1 sigma"),
-            Column(
-                "noise_from",
-                "str",
-                "given: by the configuration; repeats: pooled over repeated points; residuals: from the fit of all points",
-                allowed=("given", "repeats", "residuals"),
-            ),
-            Column("platform_mass_kg", NUMBER, "the real robot's platform, as given; null where it was not", True),
-            Column(
-                "registration_rms_mm",
-                NUMBER,
-                "residual of the frame registration; null where the frame was the robot's",
+            Column("noise_from", "str", _NOISE_FROM, allowed=("given", "repeats", "residuals")),
+            *numbers(
                 True,
+                platform_mass_kg="the real robot's platform, as given; null where it was not",
+                registration_rms_mm="residual of the frame registration; null where the frame was the robot's",
+                registration_max_mm="largest residual of the frame registration",
             ),
-            Column("registration_max_mm", NUMBER, "largest residual of the frame registration", True),
-            Column("min_translational_measure", NUMBER, "nearest approach to a translational singularity"),
-            Column("min_constraint_measure", NUMBER, "nearest approach to a constraint singularity"),
+            *numbers(
+                min_translational_measure="nearest approach to a translational singularity",
+                min_constraint_measure="nearest approach to a constraint singularity",
+            ),
             Column("notes", "str", "what was computed or missing on ingest; empty where nothing was"),
         ),
         ("campaign",),

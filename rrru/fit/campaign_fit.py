@@ -1,6 +1,7 @@
-"""Calibrations of one campaign, as frames: every set of trajectories by least squares and by least mean distance (the
-GA's objective).
-"""
+"""Calibrations of one campaign, as frames: every set of trajectories by least squares and by least mean distance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 import pandas as pd
@@ -12,10 +13,23 @@ from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
 
 
+@dataclass(frozen=True)
+class CalibrationSettings:
+    """Sets {name: patterns of trajectories}, loss and its scale as in `least_squares`, and which points may be used."""
+
+    sets: Mapping[str, tuple[str, ...]]
+    loss: str = "linear"
+    loss_scale_mm: float = 0.1
+    use_near_singularity: bool = True
+
+    @classmethod
+    def from_config(cls, section):
+        """From the configuration's `calibration` section."""
+        return cls(**{entry.name: section[entry.name] for entry in fields(cls) if entry.name in section})
+
+
 def select(measurements, mechanism, patterns, use_near_singularity=True):
-    """Residuals of the usable points on the trajectories of a set, or None where the campaign has too few of them to
-    fit.
-    """
+    """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit."""
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if 3 * chosen.sum() < len(mechanism.parameters):
         return None
@@ -24,19 +38,17 @@ def select(measurements, mechanism, patterns, use_near_singularity=True):
 
 
 def fit_sets(measurements, mechanism, settings, noise_mm=None):
-    """Fits {(set, method): Fit} of all sets of the configuration's `calibration` section that the campaign has points
-    for.
+    """Fits {(set, method): Fit} of all sets of the CalibrationSettings that the campaign has points for.
 
     Raises ConfigError where no set matches.
     """
     fits = {}
-    for name, patterns in settings["sets"].items():
-        residuals = select(measurements, mechanism, patterns, settings["use_near_singularity"])
-        if residuals is None:
-            continue
-        fit = least_squares(residuals, noise_mm, settings["loss"], settings["loss_scale_mm"])
-        fits[name, "least_squares"] = fit
-        fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
+    for name, patterns in settings.sets.items():
+        residuals = select(measurements, mechanism, patterns, settings.use_near_singularity)
+        if residuals is not None:
+            fit = least_squares(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
+            fits[name, "least_squares"] = fit
+            fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
         present = ", ".join(measurements["trajectory"].unique())
         raise ConfigError(
@@ -45,32 +57,28 @@ def fit_sets(measurements, mechanism, settings, noise_mm=None):
     return fits
 
 
-def tables(campaign, fits, true_errors=None):
+def tables(campaign, fits, truth=None):
     """Frames by table name: calibrations, parameters, correlations, observability.
 
-    true_errors: the virtual robot's true errors by the mechanism's names, or None where nobody knows them.
+    truth: the virtual robot's true deviations by the mechanism's names, or None where nobody knows them.
     """
-    truth = true_errors or {}
-    calibrations, parameters, correlations, observability = [], [], [], []
-    for (name, method), fit in fits.items():
-        label = {"campaign": campaign, "calibration": name, "method": method}
-        calibrations.append(label | _calibration_row(fit))
-        parameters.append(_parameter_rows(fit, method, truth).assign(**label))
+    frames = {name: [] for name in ("calibrations", "parameters", "correlations", "observability")}
+    for (calibration, method), fit in fits.items():
+        label = {"campaign": campaign, "calibration": calibration}
+        parts = {"calibrations": _calibration_row(fit), "parameters": _parameter_rows(fit, method, truth or {})}
+        parts = {name: part.assign(**label, method=method) for name, part in parts.items()}
         if method == "least_squares":
-            correlations.append(_correlation_rows(fit).assign(campaign=campaign, calibration=name))
-            observability.append(_observability_rows(fit).assign(campaign=campaign, calibration=name))
-    return {
-        "calibrations": pd.DataFrame(calibrations),
-        "parameters": pd.concat(parameters, ignore_index=True),
-        "correlations": pd.concat(correlations, ignore_index=True),
-        "observability": pd.concat(observability, ignore_index=True),
-    }
+            parts["correlations"] = _correlation_rows(fit).assign(**label)
+            parts["observability"] = _observability_rows(fit).assign(**label)
+        for name, part in parts.items():
+            frames[name].append(part)
+    return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
 def _calibration_row(fit):
     """One row of `calibrations`."""
     ident, distance = fit.identifiability, np.linalg.norm(fit.residual_mm, axis=1)
-    return {
+    row = {
         "points": len(distance),
         "mean_mm": distance.mean(),
         "rms_mm": fit.rms_mm,
@@ -79,64 +87,57 @@ def _calibration_row(fit):
         "noise_from": fit.noise_from,
         "rank": ident.rank,
         "condition": ident.condition,
-        **{f"{key}_observability": value for key, value in ident.indices().items()},
         "evaluations": fit.evaluations,
         "parameters_at_bound": int(fit.at_bound.sum()),
     }
+    return pd.DataFrame([row | {f"{key}_observability": value for key, value in ident.indices().items()}])
 
 
 def _parameter_rows(fit, method, truth):
     """Rows of `parameters`; standard errors belong to least squares only."""
-    names = fit.identifiability.names
-    errors = fit.standard_errors if method == "least_squares" else np.full(len(names), np.nan)
+    ident, parameters = fit.identifiability, fit.parameters
+    stated = np.isfinite(fit.standard_errors) & (method == "least_squares")
     return pd.DataFrame(
         {
-            "parameter": names,
-            "unit": ["rad" if name.startswith("dtheta") else "mm" for name in names],
+            "parameter": parameters.names,
+            "unit": parameters.units,
             "value": fit.deviations,
-            "standard_error": np.where(np.isfinite(errors), errors, np.nan),
-            "seen": [
-                bool((fit.identifiability.directions[fit.identifiability.rank :, k] ** 2).sum() < 1e-8)
-                for k in range(len(names))
-            ],
+            "standard_error": np.where(stated, fit.standard_errors, np.nan),
+            "seen": ~ident.unseen,
             "at_bound": fit.at_bound,
-            "true_value": [truth.get(name, np.nan) for name in names],
+            "true_value": [truth.get(name, np.nan) for name in parameters.names],
         }
     )
 
 
 def _correlation_rows(fit):
     """Rows of `correlations`: every pair of parameters once."""
-    names, matrix = fit.identifiability.names, fit.identifiability.correlations()
-    pairs = [(a, b) for a in range(len(names)) for b in range(a)]
+    names, matrix = np.array(fit.identifiability.names), fit.identifiability.correlations()
+    second, first = np.tril_indices(len(names), -1)
     return pd.DataFrame(
-        {
-            "parameter_a": [names[b] for a, b in pairs],
-            "parameter_b": [names[a] for a, b in pairs],
-            "correlation": [matrix[a, b] for a, b in pairs],
-        }
+        {"parameter_a": names[first], "parameter_b": names[second], "correlation": matrix[second, first]}
     )
 
 
 def _observability_rows(fit):
     """Rows of `observability`: how each direction of parameter space is seen, and what it is made of."""
     ident = fit.identifiability
-    count = len(ident.names)
+    count, values = len(ident.names), ident.singular_values
+    with np.errstate(divide="ignore"):
+        along = np.where(np.arange(count) < ident.rank, fit.noise_mm / values, np.nan)
     return pd.DataFrame(
         {
             "direction": np.repeat(np.arange(1, count + 1), count),
-            "singular_value": np.repeat(ident.singular_values, count),
-            "standard_error_mm": np.repeat(
-                [fit.noise_mm / s if k < ident.rank else np.nan for k, s in enumerate(ident.singular_values)], count
-            ),
+            "singular_value": np.repeat(values, count),
+            "standard_error_mm": np.repeat(along, count),
             "parameter": np.tile(ident.names, count),
             "weight": ident.directions.ravel(),
         }
     )
 
 
-def errors_vector(parameters, calibration, method, mechanism):
-    """Errors (p,) of one calibration out of a `parameters` frame; raises FitError where it is not there."""
+def deviation_vector(parameters, calibration, method, mechanism):
+    """Deviations (p,) of one calibration out of a `parameters` frame; raises FitError where it is not there."""
     chosen = parameters[(parameters["calibration"] == calibration) & (parameters["method"] == method)]
     if chosen.empty:
         raise FitError(f"no calibration {calibration!r} by {method!r}")

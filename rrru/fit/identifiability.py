@@ -1,5 +1,4 @@
-"""What a set of points can tell about the parameters: rank, condition, standard errors, correlations, observability
-indices.
+"""What points tell about the parameters: rank, condition, standard errors, correlations, observability indices.
 
 The Jacobian is scaled first: angle errors count as the distance they make at the end of the drive arm, so that all
 parameters are lengths and singular values compare. Indices O1 to O5 as in Joubair and Bonev, "Comparison of the
@@ -16,9 +15,7 @@ RANK_TOLERANCE = 1e-6
 
 
 def parameter_scale(mechanism):
-    """Size (p,) of each parameter that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm
-    for angles.
-    """
+    """Deviation (p,) that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm for angles."""
     return np.array([1.0 / mechanism.angle_arm_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
 
 
@@ -43,27 +40,28 @@ class Identifiability:
         smallest = self.singular_values[-1]
         return float(self.singular_values[0] / smallest) if smallest > 0.0 else np.inf
 
+    @property
+    def unseen(self):
+        """Flags (p,) of parameters that touch a direction which the points do not see."""
+        return (self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8
+
     def covariance(self, noise_mm):
-        """Covariance (p, p) of the parameters for noise of `noise_mm` per axis; inf variance for what touches an unseen
-        direction.
-        """
+        """Covariance (p, p) of the parameters for noise of `noise_mm` per axis; inf variance for unseen parameters."""
         seen = slice(0, self.rank)
         half = self.directions[seen].T * self.scale[:, None] / self.singular_values[seen]
         result = noise_mm**2 * half @ half.T
-        unseen = (self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8
-        result[unseen, unseen] = np.inf
+        result[self.unseen, self.unseen] = np.inf
         return result
 
     def standard_errors(self, noise_mm):
-        """Standard deviations (p,) for noise of `noise_mm` per axis; inf for parameters that touch an unseen direction."""
+        """Standard errors (p,) for noise of `noise_mm` per axis; inf for unseen parameters."""
         return np.sqrt(np.diag(self.covariance(noise_mm)))
 
     def robust_standard_errors(self, jacobian, influence, curvature):
-        """Standard deviations (p,) of an M-estimate: A^-1 B A^-1 with A = J' diag(curvature) J and B = J' diag(influence^2)
-        J.
+        """Standard errors (p,) of an M-estimate: A^-1 B A^-1, A = J' diag(curvature) J, B = J' diag(influence^2) J.
 
         jacobian: (n, 3, p); influence, curvature: (n, 3), first and second derivative of the loss by the residuals. Inf
-        for parameters that touch an unseen direction.
+        for unseen parameters.
         """
         seen = slice(0, self.rank)
         basis = self.directions[seen].T * self.scale[:, None]
@@ -71,11 +69,11 @@ class Identifiability:
         bread = np.linalg.inv(flat.T @ (curvature.reshape(-1, 1) * flat))
         half = basis @ bread @ (flat * influence.reshape(-1, 1)).T
         result = np.sqrt((half**2).sum(axis=1))
-        result[(self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8] = np.inf
+        result[self.unseen] = np.inf
         return result
 
     def correlations(self):
-        """Correlation matrix (p, p) of the estimates; NaN for parameters that touch an unseen direction."""
+        """Correlation matrix (p, p) of the estimates; NaN for unseen parameters."""
         covariance = self.covariance(1.0)
         deviation = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore"):
@@ -100,14 +98,11 @@ def analyse(mechanism, jacobian):
 
 
 def analyse_columns(names, scale, jacobian):
-    """Identifiability of named parameters with scales (p,) from the derivative (n, 3, p) of the positions with respect
-    to them.
-    """
+    """Identifiability of named parameters with scales (p,) from the positions' derivative (n, 3, p) by them."""
     flat = np.asarray(jacobian).reshape(-1, len(scale)) * scale
     # with at least as many rows as parameters the thin decomposition holds all directions
     _, singular_values, directions = np.linalg.svd(flat, full_matrices=len(flat) < len(scale))
-    padded = np.zeros(len(scale))
-    padded[: len(singular_values)] = singular_values
+    padded = np.pad(singular_values, (0, len(scale) - len(singular_values)))
     # the sign of a singular vector is free: its largest entry is made positive
     largest = np.take_along_axis(directions, np.abs(directions).argmax(axis=1)[:, None], axis=1)
     return Identifiability(tuple(names), np.asarray(scale), padded, directions * np.sign(largest), len(jacobian))

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
+from rrru.parameters import ParameterSet
 
 # first and second derivative of scipy's loss functions rho(z), z the squared residual in units of the loss scale
 _DERIVATIVES = {
@@ -23,12 +23,13 @@ LOSSES = tuple(_DERIVATIVES)
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted deviations (p,) and what belongs to them.
+    """Fitted deviations (p,) of the parameters and what belongs to them.
 
-    standard_deviations (p,): NaN for a parameter at a bound, inf for one that the points do not see. noise_mm: noise per
+    standard_errors (p,): NaN for a parameter at a bound, inf for one that the points do not see. noise_mm: noise per
     axis that they assume, from where `noise_from` says ("given", "residuals"). evaluations: of all residuals.
     """
 
+    parameters: ParameterSet
     deviations: np.ndarray
     residual_mm: np.ndarray
     noise_mm: float
@@ -50,8 +51,7 @@ class Fit:
 
 
 def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
-    """Errors within the parameters' bounds that minimise the sum of squares of the signed residuals (analytic
-    Jacobian).
+    """Fit within the parameters' bounds that minimises the sum of squares of the signed residuals.
 
     noise_mm: known noise per axis; None estimates it from the residuals, and so does a value that the residuals clearly
     exceed, since standard errors from the instrument alone would then promise too much. loss: one of LOSSES, with the
@@ -67,67 +67,59 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     start = analyse(residuals.mechanism, residuals.jacobian(parameters.nominal))
     seen = (start.directions[: start.rank] * start.scale).T
     linear = loss == "linear"
-    options = {"loss": loss, "f_scale": 1.0 if linear else loss_scale_mm, "xtol": 1e-12, "ftol": 1e-14, "gtol": 1e-12}
+    options = {"loss": loss, "f_scale": 1.0 if linear else loss_scale_mm}
     # in the directions' own coordinates the problem is well scaled; the box of the bounds holds only where every
     # direction is seen
-    solution = optimize.least_squares(
-        lambda q: residuals.residual(parameters.nominal + seen @ q).ravel(),
-        np.zeros(start.rank),
-        jac=lambda q: residuals.jacobian(parameters.nominal + seen @ q).reshape(-1, len(parameters)) @ seen,
-        method="lm" if linear else "trf",
-        x_scale=start.singular_values[0] / start.singular_values[: start.rank],
-        **options,
+    scale = start.singular_values[0] / start.singular_values[: start.rank]
+    solution = _search(
+        residuals, parameters.nominal, seen, np.zeros(start.rank), scale, method="lm" if linear else "trf", **options
     )
     deviations, evaluations = parameters.nominal + seen @ solution.x, int(solution.nfev)
     if start.rank == len(parameters) and not parameters.hold(deviations):
-        solution = optimize.least_squares(
-            lambda e: residuals.residual(e).ravel(),
-            parameters.inside(deviations),
-            jac=lambda e: residuals.jacobian(e).reshape(-1, len(parameters)),
-            bounds=(parameters.low, parameters.high),
-            x_scale=start.scale,
-            **options,
-        )
+        inside, bounds = parameters.inside(deviations), (parameters.low, parameters.high)
+        solution = _search(residuals, 0.0, np.eye(len(parameters)), inside, start.scale, bounds=bounds, **options)
         deviations, evaluations = solution.x, evaluations + int(solution.nfev)
     if not (solution.success and np.isfinite(deviations).all()):
         raise FitError(f"least squares did not converge: {solution.message}", solution)
     return make_fit(residuals, deviations, evaluations, noise_mm, loss, loss_scale_mm)
 
 
+def _search(residuals, origin, directions, start, scale, **options):
+    """Scipy's result q (k,) of the least squares over deviations origin + directions (p, k) q, from a start (k,)."""
+    from scipy import optimize
+
+    return optimize.least_squares(
+        lambda q: residuals.residual(origin + directions @ q).ravel(),
+        start,
+        jac=lambda q: residuals.jacobian(origin + directions @ q).reshape(-1, len(directions)) @ directions,
+        x_scale=scale,
+        xtol=1e-12,
+        ftol=1e-14,
+        gtol=1e-12,
+        **options,
+    )
+
+
 def make_fit(residuals, deviations, evaluations, noise_mm=None, loss="linear", loss_scale_mm=0.1):
-    """Fit of deviations (p,) that a search has found; see `least_squares` for the other arguments."""
-    mechanism = residuals.mechanism
+    """Fit of deviations (p,) that a search has come to; see `least_squares` for the other arguments."""
+    mechanism, parameters = residuals.mechanism, residuals.mechanism.parameters
     residual, jacobian = residuals.residual(deviations), residuals.jacobian(deviations)
-    identifiability = analyse(mechanism, jacobian)
-    at_bound = mechanism.parameters.at_bound(deviations)
+    ident, at_bound = analyse(mechanism, jacobian), parameters.at_bound(deviations)
     free = np.flatnonzero(~at_bound)
-    freedom = max(residual.size - min(identifiability.rank, len(free)), 1)
-    estimated = float(np.sqrt((residual**2).sum() / freedom))
-    if loss != "linear":
-        # the median absolute value of a standard normal number is 0.6745
-        estimated = float(np.median(np.abs(residual)) / 0.6745)
+    freedom = max(residual.size - min(ident.rank, len(free)), 1)
+    # the median absolute value of a standard normal number is 0.6745
+    robust = loss != "linear"
+    estimated = float(np.median(np.abs(residual)) / 0.6745 if robust else np.sqrt((residual**2).sum() / freedom))
     # three standard deviations of an estimated standard deviation
     given = noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom))
-    noise = noise_mm if given else estimated
+    noise, noise_from = (noise_mm, "given") if given else (estimated, "residuals")
     standard_errors = np.full(len(deviations), np.nan)
-    reduced = analyse_columns(
-        [mechanism.parameters.names[k] for k in free], parameter_scale(mechanism)[free], jacobian[..., free]
-    )
-    if loss == "linear":
-        standard_errors[free] = reduced.standard_errors(noise)
-    else:
+    names, scale, jacobian = np.array(parameters.names)[free], parameter_scale(mechanism)[free], jacobian[..., free]
+    reduced = analyse_columns(names, scale, jacobian)
+    if robust:
         z = (residual / loss_scale_mm) ** 2
         first, second = _DERIVATIVES[loss](z)
-        standard_errors[free] = reduced.robust_standard_errors(
-            jacobian[..., free], first * residual, first + 2.0 * z * second
-        )
-    return Fit(
-        deviations,
-        residual,
-        noise,
-        "given" if given else "residuals",
-        at_bound,
-        standard_errors,
-        identifiability,
-        evaluations,
-    )
+        standard_errors[free] = reduced.robust_standard_errors(jacobian, first * residual, first + 2.0 * z * second)
+    else:
+        standard_errors[free] = reduced.standard_errors(noise)
+    return Fit(parameters, deviations, residual, noise, noise_from, at_bound, standard_errors, ident, evaluations)

@@ -3,7 +3,6 @@
 from functools import lru_cache
 
 import numpy as np
-from scipy import optimize
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import analyse, parameter_scale
@@ -11,6 +10,7 @@ from rrru.fit.least_squares import make_fit
 
 _OUT_OF_REACH_MM = 1e6
 _GRADIENT = 1e-9
+_SIMPLEX = {"maxfev": 20_000, "maxiter": 20_000, "xatol": 1e-8, "fatol": 1e-12, "adaptive": True}
 
 
 def least_mean_distance(residuals, start, noise_mm=None):
@@ -22,31 +22,23 @@ def least_mean_distance(residuals, start, noise_mm=None):
     only where every direction is seen, as in `least_squares`. Raises FitError, carrying scipy's result, where the
     search fails.
     """
+    from scipy import optimize
+
     mechanism, parameters = residuals.mechanism, residuals.mechanism.parameters
     start = np.asarray(start, dtype=float)
     ident = analyse(mechanism, residuals.jacobian(start))
     # whitened coordinates: one unit along each seen direction moves the points by 1 mm on average
-    seen = (
-        (ident.directions[: ident.rank] * ident.scale).T / ident.singular_values[: ident.rank] * np.sqrt(len(residuals))
-    )
+    by_direction = (ident.directions[: ident.rank] * ident.scale).T
+    seen = by_direction / ident.singular_values[: ident.rank] * np.sqrt(len(residuals))
     value, gradient, hessian = _objective(residuals, start, seen)
     solution = optimize.minimize(
         value, np.zeros(ident.rank), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": _GRADIENT}
     )
     evaluations, best = int(solution.nfev), solution.x
     if not solution.success:
+        options = _SIMPLEX | {"initial_simplex": _simplex(best)}
         simplex = optimize.minimize(
-            lambda q: residuals.mean_distance((start + seen @ q)[None])[0],
-            best,
-            method="Nelder-Mead",
-            options={
-                "maxfev": 20_000,
-                "maxiter": 20_000,
-                "xatol": 1e-8,
-                "fatol": 1e-12,
-                "adaptive": True,
-                "initial_simplex": _simplex(best),
-            },
+            lambda q: residuals.mean_distance((start + seen @ q)[None])[0], best, method="Nelder-Mead", options=options
         )
         evaluations, best = evaluations + int(simplex.nfev), simplex.x
     deviations = start + seen @ best
@@ -95,14 +87,11 @@ def _simplex(centre):
 
 def _bounded(residuals, start):
     """Errors (p,) of least mean distance inside the bounds from a start (p,) inside them, and the evaluations."""
+    from scipy import optimize
+
     parameters, scale = residuals.mechanism.parameters, parameter_scale(residuals.mechanism)
     value, gradient, _ = _objective(residuals, np.zeros(len(parameters)), np.diag(scale))
-    solution = optimize.minimize(
-        value,
-        start / scale,
-        jac=gradient,
-        method="SLSQP",
-        bounds=list(zip(parameters.low / scale, parameters.high / scale, strict=True)),
-        options={"ftol": 1e-14, "maxiter": 1000},
-    )
+    bounds = optimize.Bounds(parameters.low / scale, parameters.high / scale)
+    options = {"ftol": 1e-14, "maxiter": 1000}
+    solution = optimize.minimize(value, start / scale, jac=gradient, method="SLSQP", bounds=bounds, options=options)
     return np.clip(solution.x * scale, parameters.low, parameters.high), int(solution.nfev)

@@ -1,6 +1,4 @@
-"""What every calibration method minimises: signed differences between measured and model positions of one set of
-points.
-"""
+"""What every calibration method minimises: signed differences between measured and model positions of its points."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -27,42 +25,27 @@ class Residuals:
 
     def __post_init__(self):
         for name in ("actuators", "measured_mm", "start_mm"):
-            bad = np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))
-            if bad.size:
-                raise FitError(
-                    f"{name} is not finite at {bad.size} of {len(self)} points, the first is point {bad[0] + 1}"
-                )
-        lost = np.flatnonzero(np.isnan(self.nominal_mm).any(axis=1))
-        if lost.size:
-            raise FitError(
-                f"the nominal robot cannot take {lost.size} of {len(self)} poses, the first is point {lost[0] + 1}"
-            )
+            if (bad := np.flatnonzero(~np.isfinite(getattr(self, name)).all(axis=1))).size:
+                where = f"{bad.size} of {len(self)} points, the first is point {bad[0] + 1}"
+                raise FitError(f"{name} is not finite at {where}")
+        if (lost := np.flatnonzero(np.isnan(self.nominal_mm).any(axis=1))).size:
+            where = f"{lost.size} of {len(self)} poses, the first is point {lost[0] + 1}"
+            raise FitError(f"the nominal robot cannot take {where}")
 
     def __len__(self):
         return len(self.actuators)
 
     @cached_property
     def nominal_mm(self):
-        """Model positions (n, 3) without errors."""
+        """Model positions (n, 3) without deviations."""
         return self.mechanism.forward(self.actuators, guess_mm=self.start_mm)
 
     @cached_property
     def _kernel_arguments(self):
-        """Arrays of the compiled objective that do not change with the errors."""
+        """Arrays of the 3-RRRU's compiled objective that do not change with the deviations, component first."""
         slope = self.mechanism.parameter_jacobian(self.nominal_mm, self.actuators)
-        return (
-            self.mechanism.azimuth_cos_sin,
-            np.ascontiguousarray(np.cos(self.actuators).T),
-            np.ascontiguousarray(np.sin(self.actuators).T),
-            np.ascontiguousarray(self.nominal_mm.T),
-            np.ascontiguousarray(slope.transpose(2, 1, 0)),
-            np.ascontiguousarray(self.measured_mm.T),
-        )
-
-    @cached_property
-    def _measured(self):
-        """Measured positions (n, 3) as the compiled objective needs them."""
-        return np.ascontiguousarray(self.measured_mm, dtype=float)
+        arrays = (np.cos(self.actuators), np.sin(self.actuators), self.nominal_mm, slope, self.measured_mm)
+        return (self.mechanism.azimuth_cos_sin, *(np.ascontiguousarray(array.T) for array in arrays))
 
     def model(self, deviations):
         """Model positions (n, 3) in mm under deviations (p,)."""
@@ -73,18 +56,14 @@ class Residuals:
         return self.measured_mm - self.model(deviations)
 
     def jacobian(self, deviations):
-        """Derivative (n, 3, p) of the residual with respect to the errors."""
+        """Derivative (n, 3, p) of the residual by the deviations."""
         return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
 
     def mean_distance(self, deviations):
-        """Objective of paper A, eq. (11): mean distance (m,) in mm for deviations (m, p); inf where the model leaves the
-        reach.
-        """
+        """Paper A, eq. (11): mean distance (m,) in mm for deviations (m, p); inf where the model leaves the reach."""
         deviations = np.ascontiguousarray(deviations, dtype=float)
-        if not isinstance(self.mechanism, Rrru3):
-            legs = self.mechanism.legs(deviations)
-            ends = np.ascontiguousarray(self.mechanism.ends(self.actuators, legs[:, None]))
-            return kernels.tripod_mean_distance(
-                ends, np.ascontiguousarray(legs[..., self.mechanism.LINK]), self._measured
-            )
-        return kernels.mean_distance(deviations, self.mechanism.legs(deviations), *self._kernel_arguments)
+        legs = self.mechanism.legs(deviations)
+        if isinstance(self.mechanism, Rrru3):
+            return kernels.mean_distance(deviations, legs, *self._kernel_arguments)
+        ends, links = self.mechanism.ends(self.actuators, legs[:, None]), legs[..., self.mechanism.LINK]
+        return kernels.tripod_mean_distance(*map(np.ascontiguousarray, (ends, links, self.measured_mm)))

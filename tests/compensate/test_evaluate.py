@@ -9,17 +9,12 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.compensate import evaluate
 from rrru.errors import ConfigError, FitError
-from rrru.fit.campaign_fit import errors_vector, fit_sets, tables
+from rrru.fit.campaign_fit import CalibrationSettings, deviation_vector, fit_sets, tables
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.protocol import identifiable_truth
 
 _ERRORS = {"dtheta1": 0.002, "dtheta2": -0.001, "dL1": 0.4, "dL3": -0.2, "dR": -1.2, "dr": 0.9}
-_SETTINGS = {
-    "sets": {"lines": ["line_*"], "spiral": ["spiral"], "absent": ["circle"]},
-    "loss": "linear",
-    "loss_scale_mm": 0.1,
-    "use_near_singularity": True,
-}
+_SETTINGS = CalibrationSettings({"lines": ["line_*"], "spiral": ["spiral"], "absent": ["circle"]})
 
 
 @pytest.fixture(scope="module")
@@ -39,16 +34,25 @@ def test_calibrated_commands_land_on_target(campaign):
     assert {name for name, _ in fits} == {"lines", "spiral"}
     before = evaluate.before(measurements)["error_mm"]
     frame = tables("c", fits, identifiable_truth(robot.mechanism, _ERRORS))["parameters"]
-    vector = errors_vector(frame, "lines", "least_squares", robot.mechanism)
-    after = evaluate.closed_loop(robot, plan, vector, 0.0, np.random.default_rng(1), "lines", "least_squares")[
-        "error_mm"
+    frame = frame[frame["calibration"] == "lines"]
+
+    def drive(controller):
+        return robot.run(plan, 0.0, np.random.default_rng(1), controller)[0]
+
+    errors = evaluate.under_calibrations(measurements, robot.mechanism, frame, drive)
+    sizes = errors.groupby(["calibration", "method", "mode"], sort=False)["error_mm"]
+    assert [key[1:] for key, _ in sizes] == [
+        ("none", "before"),
+        *((method, mode) for method in ("least_squares", "least_mean_distance") for mode in ("model", "closed_loop")),
     ]
-    model = evaluate.model_residual(measurements, robot.mechanism, vector, "lines", "least_squares")["error_mm"]
+    model, after = (sizes.get_group(("lines", "least_squares", mode)) for mode in ("model", "closed_loop"))
+    only_model = evaluate.under_calibrations(measurements, robot.mechanism, frame)
+    pd.testing.assert_frame_equal(only_model, errors[errors["mode"] != "closed_loop"].reset_index(drop=True))
     assert before.min() > 1.0 and after.max() < 0.05 and model.max() < 0.06
     truth = frame.set_index(["calibration", "method", "parameter"])["true_value"]["lines", "least_squares", "da"]
     assert truth == pytest.approx(2.1)
     with pytest.raises(FitError, match="no calibration 'both' by 'least_squares'"):
-        errors_vector(frame, "both", "least_squares", robot.mechanism)
+        deviation_vector(frame, "both", "least_squares", robot.mechanism)
 
 
 def test_a_campaign_without_any_set_is_refused(campaign):
@@ -56,7 +60,7 @@ def test_a_campaign_without_any_set_is_refused(campaign):
     with pytest.raises(
         ConfigError, match=r"no set matches the campaign's trajectories \(line_1, line_2, line_3, spiral\)"
     ):
-        fit_sets(measurements, robot.mechanism, _SETTINGS | {"sets": {"x": ["circle"]}})
+        fit_sets(measurements, robot.mechanism, CalibrationSettings({"x": ["circle"]}))
 
 
 def test_summary_equals_the_plain_statistics(campaign):

@@ -13,7 +13,8 @@ def main(settings, inputs, outputs):
     # noise known only from residuals is estimated anew by each fit
     noise_mm = None if info["noise_from"] == "residuals" else info["noise_mm"]
     measurements = tables.read(inputs["measurements"])
-    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), settings["calibration"], noise_mm)
+    calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
+    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), calibration, noise_mm)
     truth = setup.true_deviations(nominal, settings["virtual"])
     tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
