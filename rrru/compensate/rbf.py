@@ -38,9 +38,7 @@ class Network:
 
 @dataclass(frozen=True)
 class Growth:
-    """Neurons in the order taken (k,), rows of the training points, and mean squared errors (k + 1,), without a neuron
-    first.
-    """
+    """Rows (k,) of the training points in the order taken, and mean squared errors (k + 1,), without a neuron first."""
 
     order: np.ndarray
     train_mse: np.ndarray
@@ -48,55 +46,55 @@ class Growth:
 
 
 def answers(points_mm, centres_mm, spread_mm):
-    """Answers (n, k) of Gaussian neurons with centres (k, 3) at points (n, 3): one half at the distance of the
-    spread.
-    """
+    """Answers (n, k) of Gaussian neurons with centres (k, 3) at points (n, 3): one half at the spread's distance."""
     return np.exp(-np.log(2.0) * cdist(points_mm, centres_mm, "sqeuclidean") / spread_mm**2)
 
 
 def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=None, check_targets=None):
-    """Growth on training points (n, 3) and targets (n, q), up to a number of neurons; stops early where no neuron adds
-    anything.
+    """Growth on training points (n, 3) and targets (n, q) up to a number of neurons, or until none adds anything.
 
     new_share: share of a neuron's squared answers that the neurons before it must not give as well. What is hardly new
     gets a huge weight, which others cancel at the training points and nowhere else. check_mm (m, 3), check_targets (m,
     q): points that are not trained on, whose error is followed as well; NaN without them.
     """
-    check_mm = np.empty((0, 3)) if check_mm is None else check_mm
+    if check_mm is None:
+        check_mm, check_targets = points_mm[:0], targets[:0]
     every = answers(np.concatenate([points_mm, check_mm]), points_mm, spread_mm)
-    train = len(points_mm)
-    basis, size = every - every[:train].mean(axis=0), (every[:train] ** 2).sum(axis=0)
-    rest = np.concatenate(
-        [targets, np.empty((0, targets.shape[1])) if check_targets is None else check_targets]
-    ) - targets.mean(axis=0)
+    return _grow(every, np.concatenate([targets, check_targets]), neurons, new_share)
+
+
+def _grow(every, targets, neurons, new_share):
+    """Growth from the answers (n + m, n) of a neuron at each of the n training points, there and at points to check."""
+    train = every.shape[1]
+    least = new_share * (every[:train] ** 2).sum(axis=0)
+    every = every - every[:train].mean(axis=0)
+    rest = targets - targets[:train].mean(axis=0)
+    basis = every[:train]
     # what of every neuron's answers is new beside those taken, squared
-    new, taken = (basis[:train] ** 2).sum(axis=0), np.empty((neurons, len(every)))
+    new, taken = (basis**2).sum(axis=0), np.empty((neurons, len(every)))
     order, errors = [], [_split_mse(rest, train)]
     while len(order) < neurons:
-        allowed = new > new_share * size
-        allowed[order] = False
-        if not allowed.any():
+        left = rest[:train].T @ basis
+        gain = np.divide((left * left).sum(axis=0), new, out=np.full(train, -1.0), where=new > least)
+        chosen = int(gain.argmax())
+        if gain[chosen] < 0.0:
             break
-        gain = ((rest[:train].T @ basis[:train]) ** 2).sum(axis=0) / np.where(allowed, new, 1.0)
-        chosen = int(np.where(allowed, gain, -1.0).argmax())
-        direction, before = basis[:, chosen], taken[: len(order)]
+        direction, before = every[:, chosen], taken[: len(order)]
         # twice, since rounding leaves a part behind
         for _ in range(2):
             direction = direction - (before[:, :train] @ direction[:train]) @ before
-        direction = direction / np.linalg.norm(direction[:train])
+        direction /= np.sqrt(direction[:train] @ direction[:train])
         taken[len(order)] = direction
-        new = new - (direction[:train] @ basis[:train]) ** 2
-        rest = rest - np.outer(direction, direction[:train] @ rest[:train])
+        new -= (direction[:train] @ basis) ** 2
+        rest -= direction[:, None] * (direction[:train] @ rest[:train])
+        least[chosen] = np.inf
         order.append(chosen)
         errors.append(_split_mse(rest, train))
-    train_mse, check_mse = np.array(errors).T
-    return Growth(np.array(order, dtype=int), train_mse, check_mse)
+    return Growth(np.array(order, dtype=int), *np.array(errors).T)
 
 
 def fit(points_mm, targets, spread_mm, order):
-    """Network whose centres are the rows `order` of the points (n, 3), with the weights that fit the targets (n, q)
-    best.
-    """
+    """Network with the rows `order` of points (n, 3) as centres and the weights that fit the targets (n, q) best."""
     centres = points_mm[order]
     design = answers(points_mm, centres, spread_mm)
     mean, level = design.mean(axis=0), targets.mean(axis=0)
@@ -105,18 +103,16 @@ def fit(points_mm, targets, spread_mm, order):
 
 
 def validation_mse(points_mm, targets, spread_mm, neurons, folds, new_share=ROUNDING):
-    """Cross-validated mean squared error (neurons + 1,) after every neuron; folds (n,): the fold that holds each point
-    back.
+    """Cross-validated mean squared error (neurons + 1,) after every neuron.
 
-    A fold that runs out of neurons keeps its last error.
+    folds (n,): the fold that holds each point back; one that runs out of neurons keeps its last error.
     """
-    result = np.zeros(neurons + 1)
+    every, result = answers(points_mm, points_mm, spread_mm), np.zeros(neurons + 1)
     for fold in np.unique(folds):
-        out = folds == fold
-        curve = grow(
-            points_mm[~out], targets[~out], spread_mm, neurons, new_share, points_mm[out], targets[out]
-        ).check_mse
-        result += out.mean() * np.pad(curve, (0, neurons + 1 - len(curve)), mode="edge")
+        known, out = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+        rows = np.concatenate([known, out])
+        curve = _grow(every[rows[:, None], known], targets[rows], neurons, new_share).check_mse
+        result += len(out) / len(folds) * np.pad(curve, (0, neurons + 1 - len(curve)), mode="edge")
     return result
 
 
@@ -127,4 +123,4 @@ def make_folds(count, folds, generator):
 
 def _split_mse(rest, train):
     """Mean squared rest of the first `train` rows and of the others, NaN without others."""
-    return tuple(np.vdot(part, part) / part.size if part.size else np.nan for part in (rest[:train], rest[train:]))
+    return [np.vdot(part, part) / part.size if part.size else np.nan for part in (rest[:train], rest[train:])]

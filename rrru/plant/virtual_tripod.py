@@ -1,6 +1,7 @@
 """The virtual 3-PTT or Delta: nominal controller in front, exact closure with its effects behind, a tracker beside."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +22,7 @@ class VirtualTripod(DrivenRobot):
     non_repeatability_mm: float = 0.0
     masses: Masses = field(default_factory=Masses)
 
-    @property
+    @cached_property
     def geometry(self):
         """The real legs; raises ConfigError for an unknown deviation."""
         rich = replace(self.mechanism, parameter_set=self.mechanism.RICHEST)

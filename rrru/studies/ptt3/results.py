@@ -27,13 +27,15 @@ def mean_errors(before_mm, after_mm, sets):
         for error in (before_mm, *after_mm.values())
     ]
     before, after = np.array(means[:1]), np.array(means[1:])
-    index = pd.MultiIndex.from_product([after_mm, sets, AXES], names=["method", "set", "axis"])
     columns = {
+        "method": np.repeat(list(after_mm), len(sets) * len(AXES)),
+        "set": np.tile(np.repeat(list(sets), len(AXES)), len(after_mm)),
+        "axis": np.tile(AXES, len(sets) * len(after_mm)),
         "before_mm": np.broadcast_to(before, after.shape).ravel(),
         "after_mm": after.ravel(),
         "benefit_percent": (100.0 * (1.0 - after / before)).ravel(),
     }
-    return pd.DataFrame(columns, index).reset_index()
+    return pd.DataFrame(columns)
 
 
 def benefits(learned, after_mm):
