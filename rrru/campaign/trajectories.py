@@ -80,7 +80,7 @@ def from_config(section):
         result += line_groups(count=lines.pop("points"), **lines)
     if "spiral" in section:
         spiral = {key: tuple(value) if isinstance(value, list) else value for key, value in section["spiral"].items()}
-        result += (Spiral("spiral", count=spiral.pop("points"), **spiral),)
+        result += (Spiral(**{"name": "spiral", "count": spiral.pop("points")} | spiral),)
     return result
 
 
