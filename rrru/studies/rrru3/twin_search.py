@@ -81,7 +81,7 @@ class Task:
 
 
 def draw(generator, count):
-    """Unit non-repeatability and unit noise, both (count, 3), of one drive, in the order in which a robot draws them."""
+    """Unit non-repeatability and unit noise of one drive, (count, 3) each, in the order in which a robot draws them."""
     return non_repeatability(generator, count), generator.standard_normal((count, 3))
 
 

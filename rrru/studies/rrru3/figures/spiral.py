@@ -4,7 +4,14 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from rrru.figures import choose, style
-from rrru.studies.rrru3.figures import lines
+from rrru.studies.rrru3.figures.along import (
+    both_calibrations,
+    draw_along,
+    finish,
+    pass_note,
+    shade_near_singular,
+    tolerance,
+)
 
 _AXES = "xyz"
 _COLUMNS = [f"error_{axis}_mm" for axis in _AXES]
@@ -16,15 +23,9 @@ def fig11(tables, options):
     as stated. (b) to (d) Errors along the axes, with the tolerance of the task. Grey: points near a constraint
     singularity. Where a trajectory was passed more than once, curves are means over the passes, bands their range.
     """
-    name = _spiral(tables["measurements"])
+    name = choose.trajectories(tables["measurements"], "*spiral*", "fig11")[0]
     places = choose.stations(tables["measurements"], name)
-    curves = []
-    for calibration, look in (
-        (options["calibration_lines"], style.LINES),
-        (options["calibration_spiral"], style.SPIRAL),
-    ):
-        errors, mode = choose.after(tables, options, calibration, "fig11")
-        curves.append((choose.after_label(calibration, mode), look, errors))
+    curves = both_calibrations(tables, options, "fig11")
     figure = style.new(style.DOUBLE_MM, 100.0)
     # a panel in space does not take part in the arrangement: it has its own place at the left
     figure.get_layout_engine().set(rect=(0.5, 0.0, 0.5, 1.0))
@@ -32,26 +33,19 @@ def fig11(tables, options):
     grid = figure.add_gridspec(3, 1)
     _path(path, places, [("before calibration", style.BEFORE, choose.before(tables, options, "fig11")), *curves])
     first = None
-    tags = (options["calibration_lines"], options["calibration_spiral"])
+    tags = [choose.trajectory_label(options[key]) for key in ("calibration_lines", "calibration_spiral")]
     for row, axis in enumerate(_AXES):
         axes = first = figure.add_subplot(grid[row], sharex=first, sharey=first)
         _component(axes, places, curves, tags, axis)
-        axes.set_title(f"({'bcd'[row]}) {axis}{lines.pass_note(places)}")
+        axes.set_title(f"({'bcd'[row]}) {axis}{pass_note(places)}")
         axes.tick_params(labelbottom=row == len(_AXES) - 1)
     axes.set_xlabel("point")
     style.legend_above(figure, figure.axes)
     return figure
 
 
-def _spiral(paths):
-    """Name of the spiral; raises ConfigError where the campaign has none."""
-    return choose.trajectories(paths, "*spiral*", "fig11")[0]
-
-
 def _path(axes, places, curves):
-    """Commanded path in space and the attained ones with magnified deviations; z points down, as in the robot's
-    frame.
-    """
+    """Commanded path in space and the attained ones with magnified deviations; z points down, as the robot's."""
     ground = places.drop_duplicates("station").set_index("station").sort_index()
     command = ground[[f"{axis}_mm" for axis in _AXES]].to_numpy()
     deviations = [choose.along(errors, places, _COLUMNS)[0].to_numpy() for _, _, errors in curves]
@@ -79,14 +73,13 @@ def _path(axes, places, curves):
 
 def _component(axes, places, curves, tags, axis):
     """Error along one axis under each calibration, the ranges as numbers above the panel."""
-    ranges = [lines.draw_along(axes, errors, places, look, label, f"error_{axis}_mm") for label, look, errors in curves]
+    ranges = [draw_along(axes, curve, places, f"error_{axis}_mm") for curve in curves]
     texts = [
-        f"{choose.trajectory_label(tag)} {style.number(low)} to {style.number(high)}"
-        for tag, (low, high) in zip(tags, ranges, strict=True)
+        f"{tag} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)
     ]
     axes.set_title("; ".join(texts) + " mm", loc="right", fontsize=7.0)
     axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
-    lines.tolerance(axes, (1.0, -1.0))
-    lines.shade_near_singular(axes, places)
+    tolerance(axes, (1.0, -1.0))
+    shade_near_singular(axes, places)
     axes.set_ylabel(f"{axis} error (mm)")
-    lines.finish(axes, places)
+    finish(axes, places)
