@@ -128,7 +128,7 @@ def shared_parts(mechanism, section):
         "mechanism": mechanism,
         "deviations": {name: float(value) for name, value in section["errors"].items()},
         "effects": active_effects(section["effects"], mechanism.drive_unit),
-        "non_repeatability_mm": section["wobble_mm"],
+        "non_repeatability_mm": section.get("wobble_mm", 0.0),
         "masses": Masses(section["platform_mass_kg"], section["forearm_mass_kg"], section["arm_mass_kg"]),
     }
 

@@ -38,7 +38,8 @@ class VirtualTripod(DrivenRobot):
 
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError for axis errors, which it does not have."""
-    if section["axis_errors"]["position_mm"] or section["axis_errors"]["angle_rad"]:
+    axes = section.get("axis_errors", {})
+    if axes.get("position_mm") or axes.get("angle_rad"):
         allowed = "none, its platform does not turn; see errors and effects"
         raise ConfigError(f"virtual robot: axis_errors on a {mechanism.name}; allowed: {allowed}")
     return VirtualTripod(**shared_parts(mechanism, section))
