@@ -1,12 +1,12 @@
 """No rule of the diagnosis is given an answer, and no code of it knows where answers are made."""
 
-import ast
 import re
 from pathlib import Path
 
 import pytest
 
-from tests.places import ROOT
+from rrru.store.digest import closure
+from tests.schemas import TABLES
 from tests.workflow.folder import MINIMAL, dry_run
 
 
@@ -25,18 +25,23 @@ def jobs(tmp_path_factory):
     return result
 
 
+def _of(jobs, table):
+    """Files of all jobs that hold a part of one table."""
+    return {path for _, _, outputs in jobs for path in outputs if Path(path).parent.name == table}
+
+
 def test_the_plan_holds_the_check(jobs):
     rules = [rule for rule, _, _ in jobs]
     chunks = rules.count("withheld_diagnose")
-    assert chunks >= 3 and rules.count("withheld_answers") == rules.count("withheld_score") == chunks
+    assert chunks >= 3 and rules.count("withheld_robots") == rules.count("withheld_score") == chunks
     assert rules.count("withheld_summary") == 1
 
 
 def test_no_diagnosis_is_given_an_answer(jobs):
-    answers = {path for rule, _, outputs in jobs for path in outputs if rule == "withheld_answers"}
+    answers = _of(jobs, "answers")
     assert len(answers) >= 3
-    readers = {rule for rule, inputs, _ in jobs if inputs & answers}
-    assert readers == {"withheld_measure", "withheld_score"}
+    assert {rule for rule, _, outputs in jobs if outputs & answers} == {"withheld_robots"}
+    assert {rule for rule, inputs, _ in jobs if inputs & answers} == {"withheld_score"}
     for rule, inputs, outputs in jobs:
         if rule == "withheld_diagnose":
             assert {Path(path).parent.name for path in inputs} == {"measurements"}
@@ -45,48 +50,26 @@ def test_no_diagnosis_is_given_an_answer(jobs):
             assert {Path(path).name for path in inputs} == {"measurements.parquet"}
     # what is measured reaches the diagnosis, and nothing that was scored does
     scored = {path for rule, _, outputs in jobs for path in outputs if rule in ("withheld_score", "withheld_summary")}
-    assert {rule for rule, inputs, _ in jobs if inputs & scored} <= {"withheld_summary", "withheld", "figure"}
+    readers = {rule for rule, inputs, _ in jobs if inputs & scored}
+    assert readers == {"withheld_summary", "withheld", "withheld_figures"}
     assert {"diagnose", "withheld_diagnose"} <= {rule for rule, _, _ in jobs}
 
 
 def test_the_measurements_hold_no_answer():
-    from tests.schemas import TABLES
-
     given = {column.name for column in TABLES["withheld_measurements"].columns}
     assert given - {column.name for column in TABLES["measurements"].columns} == {"robot", "kind"}
 
 
-def _imports(path):
-    """Modules of rrru that a file imports, names that may be modules included."""
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
-
-
-def _reached(path, seen):
-    """Every file of the package that a file imports, by itself or through others."""
-    for name in _imports(path):
-        parts = name.split(".")
-        file = ROOT.joinpath(*parts).with_suffix(".py")
-        if parts[0] == "rrru" and file.is_file() and file not in seen:
-            seen.add(file)
-            _reached(file, seen)
-    return seen
+def _modules(script):
+    """(package, module) of every file of the package that a script reaches."""
+    return {(file.parent.name, file.stem) for file in closure(f"workflow/scripts/{script}.py")}
 
 
 @pytest.mark.parametrize("script", ["withheld_diagnose", "diagnose"])
 def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
-    reached = _reached(ROOT / f"workflow/scripts/{script}.py", set())
-    assert {"diagnose", "case"} <= {file.stem for file in reached if file.parent.name == "gap"}
-    # of the room that draws the robots only how a corrected sim is written down
-    assert {file.stem for file in reached if file.parent.name == "withheld"} <= {"states"}
+    modules = _modules(script)
+    assert {("gap", "diagnose"), ("gap", "case")} <= modules
+    # of the study that draws the robots only how verdicts and corrected sims are written down
+    assert {name for package, name in modules if package == "withheld"} <= {"__init__", "schemas", "states"}
     # and the walk would see them
-    seen = {
-        file.stem
-        for file in _reached(ROOT / "workflow/scripts/withheld_score.py", set())
-        if file.parent.name == "withheld"
-    }
-    assert seen >= {"draw", "robots", "outside"}
+    assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")

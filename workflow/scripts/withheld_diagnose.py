@@ -5,30 +5,26 @@ import pandas as pd
 from rrru.gap.diagnose import diagnose
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
-from rrru.robots.protocol import make_mechanism
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies import setup
+from rrru.studies.withheld.schemas import TABLES, VERDICT
 from rrru.studies.withheld.states import state_row
-
-# the tracker's noise is known, as it is for the campaigns
-_NOISE_MM = 0.02
-_COLUMNS = ["effects", "probability", "leg", "gap_rms_mm", "noise_rms_mm", "share_closed"]
 
 
 def main(settings, inputs, outputs):
     """Write verdicts and states of a chunk."""
-    library, without = GapSettings.from_config(settings["gap"], settings["seed"]), settings["effect"]
-    if without:
-        library = library.without(without)
-    mechanism = make_mechanism("rrru3", settings["robots"].get("rrru3", {}))
+    library, taken_out = GapSettings.from_config(settings["gap"], settings["seed"]), settings["taken_out"]
+    robot, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
+    noise_mm = settings["withheld"]["noise_mm"]
     verdicts, states = [], []
-    for (robot, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=True):
+    for (name, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=False):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
-        result = diagnose(points, mechanism, Masses(), library, noise_mm=_NOISE_MM, details=False, name=robot)
-        told = {key: result.verdict[key] for key in _COLUMNS}
-        verdicts.append(told | {"check": "effect" if without else "label", "robot": robot, "kind": kind})
-        states.append(state_row(robot, result.calibrated_errors, result.state))
+        known = library.without(taken_out[name]) if taken_out[name] else library
+        result = diagnose(points, robot, masses, known, noise_mm, details=False, name=name)
+        label = {"check": "effect" if taken_out[name] else "label", "robot": name, "kind": kind}
+        verdicts.append(label | {key: result.verdict[key] for key in VERDICT})
+        states.append(state_row(name, result.calibrated_errors, result.state))
     frames = {"withheld_verdicts": pd.DataFrame(verdicts), "withheld_states": pd.DataFrame(states)}
     tables.write_all(TABLES, frames, outputs)
 

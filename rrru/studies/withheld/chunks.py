@@ -1,33 +1,29 @@
-"""The robots of the check on withheld effects in chunks: jobs that need little memory, however many robots there
-are.
-"""
+"""The robots of the check on withheld effects in chunks: jobs of little memory, however many they are."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rrru.errors import ConfigError
 
 
-@dataclass(frozen=True)
-class Chunk:
-    """Robots `first` to before `end` of a check; effect: the one taken out of the library, empty for none."""
+class Member(NamedTuple):
+    """One robot: check (label or effect), the effect that the diagnosis has to do without (empty for none), number."""
 
     check: str
     effect: str
-    first: int
-    end: int
+    number: int
 
     @property
-    def numbers(self):
-        """Numbers of the robots."""
-        return range(self.first, self.end)
+    def name(self):
+        """The robot's name in every table."""
+        return "_".join(filter(None, (self.check, self.effect, f"{self.number:04d}")))
 
 
 def chunks(section):
-    """Chunks by name of the configuration's `withheld` section."""
-    result = _split("label", "", section["robots"], section["chunk"])
-    for effect in section["effects"]:
-        result |= _split("effect", effect, section["per_effect"], section["chunk"])
-    return result
+    """Members of every chunk by the chunk's name, from the configuration's `withheld` section."""
+    members = [Member("label", "", k) for k in range(section["robots"])]
+    members += [Member("effect", e, k) for e in section["effects"] for k in range(section["per_effect"])]
+    size = section["chunk"]
+    return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
 
 
 def check(config):
@@ -39,12 +35,3 @@ def check(config):
         for name in section[key]:
             if name not in known:
                 raise ConfigError(f"withheld.{key} has {name!r}; known: {', '.join(known)}")
-
-
-def _split(check, effect, count, size):
-    """Chunks of a check by name."""
-    label = f"{check}_{effect}" if effect else check
-    return {
-        f"{label}_{k:03d}": Chunk(check, effect, start, min(start + size, count))
-        for k, start in enumerate(range(0, count, size))
-    }

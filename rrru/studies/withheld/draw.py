@@ -12,12 +12,11 @@ import numpy as np
 from rrru.campaign.trajectories import from_config
 from rrru.effects.library import EFFECTS
 from rrru.errors import UnreachableError
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.robots.first_order import FirstOrder
 from rrru.seeds import stream
 from rrru.studies.withheld.outside import OUTSIDE
-from rrru.studies.withheld.robots import NOISE_RMS_MM, PASSES, Acting, Robot, true_gap_mm
+from rrru.studies.withheld.robots import PASSES, Acting, Robot, true_gap_mm
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
 WEAKEST, STRONGEST, CLEAR = 0.1, 10.0, 2.0
@@ -26,43 +25,51 @@ _SAFE = 0.1
 _DRAWS = 20
 
 
-def draw_labelled(seed, number, mechanism):
-    """Robot `number` of the label-withheld check: nothing, one effect, two, or a cause from outside."""
-    generator = stream(seed, "withheld", number)
-    robot = _bare(f"label_{number:04d}", generator, mechanism)
+def draw(member, conditions):
+    """The robot of a member of the check, see `rrru.studies.withheld.chunks`."""
+    if member.check == "effect":
+        return _draw_single(member, conditions)
+    return _draw_labelled(member, conditions)
+
+
+def fresh(robot, conditions):
+    """The same robot on other lines and another spiral of the same region."""
+    generator = stream(conditions.seed, "withheld", "fresh", robot.name)
+    return replace(robot, trajectories=_trajectories(generator, conditions.mechanism))
+
+
+def _draw_labelled(member, conditions):
+    """A robot with nothing, one effect, two, or a cause from outside."""
+    generator = stream(conditions.seed, "withheld", member.number)
+    robot = bare(member.name, generator, conditions.mechanism)
     truth = generator.choice(list(TRUTHS), p=list(TRUTHS.values()))
     if truth == "none":
         return robot
-    names = generator.choice(
-        list(OUTSIDE if truth == "outside" else EFFECTS), 2 if truth == "two" else 1, replace=False
-    )
+    causes = list(OUTSIDE if truth == "outside" else EFFECTS)
+    names = generator.choice(causes, 2 if truth == "two" else 1, replace=False).tolist()
+    span = (WEAKEST, STRONGEST)
     for _ in range(_DRAWS):
-        acting = tuple(
-            _draw_acting(robot, str(name), truth == "one", (WEAKEST, STRONGEST), generator, mechanism) for name in names
-        )
+        acting = tuple(draw_acting(robot, name, truth == "one", span, generator, conditions) for name in names)
         drawn = replace(robot, acting=acting)
         # two causes may lose a pose together that neither loses alone
-        if true_gap_mm(drawn, mechanism) is not None:
+        if true_gap_mm(drawn, conditions) is not None:
             return drawn
     raise UnreachableError(f"{robot.name}: {' and '.join(names)} lose a pose in {_DRAWS} draws")
 
 
-def draw_single(seed, effect, number, mechanism):
-    """Robot `number` of the effect-withheld check: that effect alone, strong enough to be seen."""
-    generator = stream(seed, "withheld", effect, number)
-    robot = _bare(f"effect_{effect}_{number:04d}", generator, mechanism)
-    return replace(robot, acting=(_draw_acting(robot, effect, True, (CLEAR, STRONGEST), generator, mechanism),))
+def _draw_single(member, conditions):
+    """A robot with one effect alone, strong enough to be seen."""
+    generator = stream(conditions.seed, "withheld", member.effect, member.number)
+    robot = bare(member.name, generator, conditions.mechanism)
+    acting = draw_acting(robot, member.effect, True, (CLEAR, STRONGEST), generator, conditions)
+    return replace(robot, acting=(acting,))
 
 
-def fresh(robot, seed, mechanism):
-    """The same robot on other lines and another spiral of the same region."""
-    return replace(robot, trajectories=_trajectories(stream(seed, "withheld", "fresh", robot.name), mechanism))
-
-
-def _bare(name, generator, mechanism):
-    """A robot with its campaign and errors drawn, and nothing acting."""
-    deviations = np.repeat([_ANGLE_SD_RAD, _LENGTH_SD_MM], [3, 4]) * generator.standard_normal(7)
-    inside = mechanism.parameters.inside(deviations)
+def bare(name, generator, mechanism):
+    """A robot with its campaign and deviations drawn, and nothing acting."""
+    parameters = mechanism.parameters
+    size = [_ANGLE_SD_RAD if unit == "rad" else _LENGTH_SD_MM for unit in parameters.units]
+    inside = parameters.inside(size * generator.standard_normal(len(size)))
     return Robot(name, str(generator.choice(list(PASSES))), _trajectories(generator, mechanism), tuple(inside.tolist()))
 
 
@@ -71,7 +78,7 @@ def _trajectories(generator, mechanism):
     while True:
         step, height = generator.uniform(28.0, 45.0), generator.uniform(620.0, 680.0)
         start, end, x, y = generator.uniform([-640.0, -60.0, -40.0, -40.0], [-560.0, 40.0, 40.0, 40.0])
-        inner, outer, top, bottom, turn = generator.uniform(
+        inner, outer, top, bottom, begin = generator.uniform(
             [30.0, 240.0, 550.0, 730.0, 0.0], [70.0, 300.0, 590.0, 780.0, 360.0]
         )
         section = {
@@ -87,7 +94,7 @@ def _trajectories(generator, mechanism):
                 "z_mm": [top, bottom],
                 "turns": generator.uniform(4.0, 5.5),
                 "points": 40,
-                "start_deg": turn,
+                "start_deg": begin,
             },
         }
         if _safe(section, mechanism):
@@ -98,83 +105,71 @@ def _safe(section, mechanism):
     """Whether the trajectories stay clear of both singularities."""
     points = np.concatenate([trajectory.curve(np.linspace(0.0, 1.0, 100)) for trajectory in from_config(section)])
     theta = mechanism.inverse(points)
-    measures = (
-        singularity.translational_measure(mechanism, points, theta),
-        singularity.constraint_measure(mechanism, points, theta),
-    )
+    measures = [
+        measure(mechanism, points, theta)
+        for measure in (singularity.translational_measure, singularity.constraint_measure)
+    ]
     return bool(np.isfinite(theta).all() and np.min(measures) > _SAFE)
 
 
-def _draw_acting(robot, name, single, strengths, generator, mechanism):
-    """A cause of that name at a strength drawn log-uniform between two; single: it may sit on one leg alone, as a third
-    of them do.
+def draw_acting(robot, name, single, span, generator, conditions):
+    """A cause of a strength drawn log-uniform from a span; single: it may sit on one leg alone, as a third of them do.
 
     Draws that would break a parameter's bounds or lose a pose are made again, the strength only where no draw can have
     it.
     """
     coordinates = (EFFECTS[name] if name in EFFECTS else OUTSIDE[name]).coordinates
     for _ in range(_DRAWS):
-        strength = float(np.exp(generator.uniform(*np.log(strengths))))
+        strength = float(np.exp(generator.uniform(*np.log(span))))
         for _ in range(_DRAWS):
-            acting = _to_strength(robot, _draw_direction(name, coordinates, single, strength, generator), mechanism)
+            acting = _draw_direction(name, coordinates, single, strength, generator)
+            acting = _to_strength(robot, acting, conditions)
             if acting is not None:
                 return acting
-    raise UnreachableError(
-        f"{robot.name}: no {name} of strength {strengths[0]:g} to {strengths[1]:g} within its bounds"
-    )
+    raise UnreachableError(f"{robot.name}: no {name} of strength {span[0]:g} to {span[1]:g} within its bounds")
 
 
 def _draw_direction(name, coordinates, single, strength, generator):
     """A cause with its shape, legs and the ratios of its coordinates drawn, not yet of that strength."""
-    draw = coordinates.typical * generator.standard_normal(len(coordinates))
-    draw = np.where(coordinates.positive, np.abs(draw), draw)
-    shape = _draw_shape(coordinates.shapes, generator)
+    sizes = coordinates.typical * generator.standard_normal(len(coordinates))
+    sizes = np.where(coordinates.positive, np.abs(sizes), sizes)
+    shape = {key: _draw_value([shape[key] for shape in coordinates.shapes], generator) for key in coordinates.shapes[0]}
     per_leg = set(coordinates.legs.tolist()) == {1, 2, 3}
     leg = int(generator.integers(1, 4)) if single and per_leg and generator.random() < 1.0 / 3.0 else 0
     if leg:
-        draw = np.where(coordinates.legs == leg, draw, 0.0)
-    return Acting(name, shape, tuple(draw.tolist()), leg, strength)
+        sizes = np.where(coordinates.legs == leg, sizes, 0.0)
+    return Acting(name, shape, tuple(sizes.tolist()), leg, strength)
 
 
-def _draw_shape(shapes, generator):
-    """Values of what is no coordinate: one of two that the library tries, else between the least and the largest that
-    it tries.
-    """
-    result = {}
-    for key in shapes[0]:
-        known = sorted({float(shape[key]) for shape in shapes})
-        if len(known) <= 2:
-            result[key] = float(generator.choice(known))
-        elif known[0] > 0.0:
-            result[key] = float(np.exp(generator.uniform(*np.log([known[0], known[-1]]))))
-        else:
-            result[key] = float(generator.uniform(known[0], known[-1]))
-    return result
+def _draw_value(tried, generator):
+    """A value of a shape: one of two that the library tries, else between the least and the largest that it tries."""
+    known = sorted({float(value) for value in tried})
+    low, high = known[0], known[-1]
+    if len(known) <= 2:
+        return float(generator.choice(known))
+    if low > 0.0:
+        return float(np.exp(generator.uniform(*np.log([low, high]))))
+    return float(generator.uniform(low, high))
 
 
-def _to_strength(robot, acting, mechanism):
+def _to_strength(robot, acting, conditions):
     """The cause scaled to its strength, or None where that breaks its bounds or loses a pose."""
-    first = _first_order_gap_mm(robot, acting, mechanism)
-    if not first > 0.0:
-        return None
-    acting = acting.scaled(acting.strength * NOISE_RMS_MM / first)
-    for _ in range(2):
-        gap = true_gap_mm(replace(robot, acting=(acting,)), mechanism)
-        if gap is None or gap == 0.0:
+    gap, asked = _first_order_gap_mm(robot, acting, conditions), acting.strength * conditions.noise_rms_mm
+    for _ in range(3):
+        if gap is None or not gap > 0.0:
             return None
-        acting = acting.scaled(acting.strength * NOISE_RMS_MM / gap)
-    gap = true_gap_mm(replace(robot, acting=(acting,)), mechanism)
-    return None if gap is None else replace(acting, strength=float(gap / NOISE_RMS_MM))
+        acting = acting.scaled(asked / gap)
+        gap = true_gap_mm(replace(robot, acting=(acting,)), conditions)
+    return None if gap is None else replace(acting, strength=float(gap / conditions.noise_rms_mm))
 
 
-def _first_order_gap_mm(robot, acting, mechanism):
+def _first_order_gap_mm(robot, acting, conditions):
     """Rms distance that the calibration would leave of a cause, to first order."""
-    motion = VirtualRobot(mechanism=mechanism).motion(robot.plan, mechanism.inverse)
-    moved = (
-        FirstOrder(mechanism, motion.position_mm, motion.drive)
-        .move(acting.law.contribute(motion, acting.values))
-        .ravel()
-    )
+    mechanism = conditions.mechanism
+    campaign = robot.campaign(conditions)
+    motion = campaign.robot.motion(campaign.plan, mechanism.inverse)
+    legs = FirstOrder(mechanism, motion.position_mm, motion.drive)
+    moved = legs.move(acting.law.contribute(motion, acting.values)).ravel()
     base = mechanism.parameter_jacobian(motion.position_mm, motion.drive).reshape(moved.size, -1)
     basis, _ = np.linalg.qr(base)
     return float(np.sqrt(((moved - basis @ (basis.T @ moved)) ** 2).sum() / len(motion)))

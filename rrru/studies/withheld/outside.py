@@ -10,8 +10,6 @@ import numpy as np
 from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-# the truth in words: outside:<name>
-PREFIX = "outside"
 # a rest this long ends a run
 _REST_S = 10.0
 _GRAVITY_M_S2 = 9.80665

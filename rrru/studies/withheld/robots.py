@@ -1,29 +1,26 @@
-"""The virtual robots of the check on withheld effects: what acts in them, what they are told to do, what is measured.
-Lengths mm, angles rad.
-"""
+"""Virtual robots of the check on withheld effects: what acts in each, and its campaign. Lengths mm, angles rad."""
 
 import json
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.effects.effect import ActiveEffect
 from rrru.effects.library import EFFECTS
 from rrru.errors import FitError
+from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots.protocol import make_mechanism
+from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
-from rrru.studies.withheld.outside import OUTSIDE, PREFIX
+from rrru.studies import setup
+from rrru.studies.withheld.outside import OUTSIDE
+from rrru.studies.withheld.verdicts import PREFIX
 
-NOISE_MM = 0.02
-NOISE_RMS_MM = NOISE_MM * np.sqrt(3.0)
-_SPEED_MM_S, _ACCELERATION_MM_S2, _DWELL_S = 80.0, 40.0, 60.0
-_WIDE_RAD, _WIDE_MM = 0.5, 400.0
+# no calibration shall hit a bound
+_WIDE = {"angle_rad": 0.5, "length_mm": 400.0}
 
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
 _SOME = {"trajectories": ["line_1", "line_2", "line_3", "spiral"]}
@@ -40,6 +37,36 @@ PASSES = {
         _AGAIN,
     ),
 }
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What all robots share: nominal mechanism, motion as in the configuration, masses, noise per axis, seed."""
+
+    mechanism: object
+    motion: dict
+    masses: Masses
+    noise_mm: float
+    seed: int
+
+    @classmethod
+    def from_config(cls, settings):
+        """The conditions from what a rule is told: robot, masses, motion, withheld.noise_mm, seed."""
+        mechanism, masses = setup.mechanism(settings["robot"] | {"bounds": _WIDE}), Masses(**settings["masses"])
+        return cls(mechanism, settings["motion"], masses, settings["withheld"]["noise_mm"], settings["seed"])
+
+    @property
+    def noise_rms_mm(self):
+        """Rms distance of the noise."""
+        return self.noise_mm * np.sqrt(3.0)
+
+
+class WithheldCampaign(setup.VirtualCampaign):
+    """The campaign of one robot of the check."""
+
+    def generator(self, *labels):
+        """The robot's own stream for its noise."""
+        return stream(self.seed, "withheld", "noise", self.name)
 
 
 @dataclass(frozen=True)
@@ -67,12 +94,6 @@ class Acting:
         """Parameter values (p,)."""
         return self.law.coordinates.to_values(np.array(self.coordinates), self.shape)
 
-    @property
-    def active(self):
-        """The cause with its parameter values, or None where these break their bounds."""
-        law, values = self.law, self.values
-        return ActiveEffect(law, law.parameters.mapping(values)) if law.parameters.hold(values) else None
-
     def scaled(self, factor):
         """The same cause, so many times as large."""
         return replace(self, coordinates=tuple((factor * np.array(self.coordinates)).tolist()))
@@ -80,90 +101,76 @@ class Acting:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot of the check: its campaign's kind and trajectories (as in the configuration), its seven errors, and what
-    acts.
-    """
+    """A robot of the check: kind of campaign, trajectories as in the configuration, deviations (7,), what acts."""
 
     name: str
     kind: str
     trajectories: dict
-    errors: tuple
+    deviations: tuple
     acting: tuple = ()
 
-    @property
-    def plan(self):
+    def plan(self, conditions):
         """What it is told to do."""
-        return make_plan(from_config(self.trajectories), PASSES[self.kind], _SPEED_MM_S, _ACCELERATION_MM_S2, _DWELL_S)
+        return make_plan(from_config(self.trajectories), PASSES[self.kind], **conditions.motion)
 
-    def virtual(self, mechanism):
-        """The virtual robot, or None where a parameter breaks its bounds."""
-        active = tuple(acting.active for acting in self.acting)
-        if None in active:
+    def campaign(self, conditions):
+        """The virtual robot and its plan, or None where a parameter of what acts breaks its bounds."""
+        if not all(acting.law.parameters.hold(acting.values) for acting in self.acting):
             return None
-        errors = dict(zip(("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dr"), self.errors, strict=True))
-        return VirtualRobot(mechanism=mechanism, deviations=errors, effects=active)
+        deviations = conditions.mechanism.parameters.mapping(self.deviations)
+        # of r - R, which alone is identifiable, r has the whole
+        deviations["dr"] = deviations.pop("da")
+        robot = VirtualRobot(
+            conditions.mechanism,
+            deviations,
+            effects=tuple(ActiveEffect(one.law, one.law.parameters.mapping(one.values)) for one in self.acting),
+            platform_mass_kg=conditions.masses.platform_kg,
+            forearm_mass_kg=conditions.masses.forearm_kg,
+            arm_mass_kg=conditions.masses.arm_kg,
+        )
+        return WithheldCampaign(robot, self.plan(conditions), conditions.noise_mm, conditions.seed, self.name)
 
-    def to_json(self):
-        """The robot as text."""
-        return json.dumps(asdict(self), sort_keys=True)
+    @property
+    def truth(self):
+        """The truth in words: names joined by +, none, or outside:<name>."""
+        names = sorted(acting.effect for acting in self.acting)
+        return "+".join(f"{PREFIX}:{name}" if name in OUTSIDE else name for name in names) or "none"
+
+    def answer(self, conditions):
+        """The robot's row of `withheld_answers`."""
+        return {
+            "robot": self.name,
+            "kind": self.kind,
+            "truth": self.truth,
+            "truth_leg": max((acting.leg for acting in self.acting), default=0),
+            "strength": true_gap_mm(self, conditions) / conditions.noise_rms_mm if self.acting else 0.0,
+            "weakest": min((acting.strength for acting in self.acting), default=0.0),
+            "drawn": json.dumps(asdict(self), sort_keys=True),
+        }
 
     @classmethod
     def from_json(cls, text):
-        """The robot of a text of `to_json`."""
+        """The robot of the column `drawn` of its answer."""
         section = json.loads(text)
         acting = tuple(Acting(**(one | {"coordinates": tuple(one["coordinates"])})) for one in section.pop("acting"))
-        return cls(**(section | {"errors": tuple(section["errors"]), "acting": acting}))
+        return cls(**(section | {"deviations": tuple(section["deviations"]), "acting": acting}))
 
 
-def nominal(robots):
-    """The nominal robot of the configuration's `robots`, its errors free of bounds that a calibration could hit."""
-    return make_mechanism("rrru3", robots.get("rrru3", {}), angle_limit_rad=_WIDE_RAD, length_limit_mm=_WIDE_MM)
-
-
-def truth_of(robot):
-    """The truth in words: names joined by +, none, or outside:<name>."""
-    names = sorted(acting.effect for acting in robot.acting)
-    return "+".join(f"{PREFIX}:{name}" if name in OUTSIDE else name for name in names) or "none"
-
-
-def answer(robot, mechanism):
-    """The robot's row of `withheld_answers`."""
-    return {
-        "robot": robot.name,
-        "kind": robot.kind,
-        "truth": truth_of(robot),
-        "leg": max((acting.leg for acting in robot.acting), default=0),
-        "strength": true_gap_mm(robot, mechanism) / NOISE_RMS_MM if robot.acting else 0.0,
-        "weakest": min((acting.strength for acting in robot.acting), default=0.0),
-        "drawn": robot.to_json(),
-    }
-
-
-def simulate(robot, mechanism, noise_mm, generator):
-    """Measurements and truth of a robot as frames, or None where a parameter breaks its bounds or a pose is lost."""
-    virtual = robot.virtual(mechanism)
-    if virtual is None:
+def noise_free(robot, conditions):
+    """Measurements of a robot without noise, or None where a parameter breaks its bounds or a pose is lost."""
+    campaign = robot.campaign(conditions)
+    if campaign is None:
         return None
-    measurements, truth = virtual.run(robot.plan, noise_mm, generator)
-    return (measurements, truth) if (measurements["status"] == "ok").all() else None
+    measurements, _ = replace(campaign, noise_mm=0.0).run()
+    return measurements if (measurements["status"] == "ok").all() else None
 
 
-def measure(robot, seed, mechanism):
-    """Measurements of a robot as a frame, with noise from its own stream."""
-    measurements, _ = simulate(robot, mechanism, NOISE_MM, stream(seed, "withheld", "noise", robot.name))
-    return measurements
-
-
-def true_gap_mm(robot, mechanism):
+def true_gap_mm(robot, conditions):
     """Rms distance that the calibration leaves without noise, or None where the robot cannot drive its campaign."""
-    driven = simulate(robot, mechanism, 0.0, np.random.default_rng(0))
-    if driven is None:
+    measurements = noise_free(robot, conditions)
+    if measurements is None:
         return None
-    measurements, _ = driven
-    residuals = Residuals(
-        mechanism, rows.actuators(measurements), rows.measured(measurements), rows.command(measurements)
-    )
     try:
-        return least_squares(residuals).rms_mm
+        return least_squares(select(measurements, conditions.mechanism, ["*"])).rms_mm
     except FitError:
         return None

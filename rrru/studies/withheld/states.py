@@ -13,7 +13,7 @@ def state_row(robot, calibrated, state):
     return {
         "robot": robot,
         "calibrated": json.dumps(np.asarray(calibrated).tolist()),
-        "errors": json.dumps(np.asarray(state.deviations).tolist()),
+        "deviations": json.dumps(np.asarray(state.deviations).tolist()),
         "effects": json.dumps(effects),
         "shapes": json.dumps(state.shapes, sort_keys=True),
     }
@@ -21,7 +21,6 @@ def state_row(robot, calibrated, state):
 
 def state_of(row):
     """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`."""
-    effects = {(name, shape): np.array(value) for name, shape, value in json.loads(row["effects"])}
-    return np.array(json.loads(row["calibrated"])), State(
-        np.array(json.loads(row["errors"])), effects, json.loads(row["shapes"])
-    )
+    told = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "effects", "shapes")}
+    effects = {(name, shape): np.array(value) for name, shape, value in told["effects"]}
+    return np.array(told["calibrated"]), State(np.array(told["deviations"]), effects, told["shapes"])

@@ -1,6 +1,7 @@
 from rrru.studies.withheld.chunks import chunks
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
+# the robots of every job
 WITHHELD = chunks(config["withheld"])
 WITHHELD_TABLES = [
     "withheld_verdicts",
@@ -21,44 +22,25 @@ def withheld_part(name, chunk="{chunk}"):
     return f"{RESULTS}/withheld/{name.removeprefix('withheld_')}/{chunk}.parquet"
 
 
-def withheld_settings(*keys):
-    """What a rule about a chunk of robots reads: which robots, and the configuration under dotted keys."""
-
-    def settings(wildcards):
-        chunk = WITHHELD[wildcards.chunk]
-        robots = {"check": chunk.check, "effect": chunk.effect, "first": chunk.first, "end": chunk.end}
-        return {**robots, **reads(*keys)}
-
-    return settings
+def withheld_robot(*keys):
+    """What is known of every robot, and the configuration under dotted keys."""
+    known = {"robot": parts.robot(config, {"robot": "rrru3"}), "masses": parts.masses(config, {})}
+    return {**known, **reads("seed", "withheld.noise_mm", *keys)}
 
 
-rule withheld_answers:
+rule withheld_robots:
     output:
-        **named(["withheld_answers"], withheld_part),
+        **named(["withheld_answers", "withheld_measurements"], withheld_part),
     log:
-        f"{RESULTS}/logs/withheld_answers/{{chunk}}.log",
+        f"{RESULTS}/logs/withheld_robots/{{chunk}}.log",
     params:
-        settings=withheld_settings("seed", "robots"),
-        code=code("withheld_answers"),
+        settings=lambda wildcards: {"members": WITHHELD[wildcards.chunk], **withheld_robot("motion")},
+        code=code("withheld_robots"),
     script:
-        "../../scripts/withheld_answers.py"
+        "../../scripts/withheld_robots.py"
 
 
-rule withheld_measure:
-    input:
-        **named(["withheld_answers"], withheld_part),
-    output:
-        **named(["withheld_measurements"], withheld_part),
-    log:
-        f"{RESULTS}/logs/withheld_measure/{{chunk}}.log",
-    params:
-        settings=reads("seed", "robots"),
-        code=code("withheld_measure"),
-    script:
-        "../../scripts/withheld_measure.py"
-
-
-# it sees the measurements and which effect its library lacks, never an answer
+# it sees the measurements and which effects its library lacks, never an answer
 rule withheld_diagnose:
     input:
         **named(["withheld_measurements"], withheld_part),
@@ -67,7 +49,11 @@ rule withheld_diagnose:
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {"effect": WITHHELD[wildcards.chunk].effect, **reads("seed", "robots", "gap")},
+        settings=lambda wildcards: {
+            "taken_out": {member.name: member.effect for member in WITHHELD[wildcards.chunk]},
+            **withheld_robot("gap"),
+        },
+        own_effects=own_effects(),
         code=code("withheld_diagnose"),
     script:
         "../../scripts/withheld_diagnose.py"
@@ -81,7 +67,8 @@ rule withheld_score:
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {"check": WITHHELD[wildcards.chunk].check, **reads("seed", "robots", "gap")},
+        settings=withheld_robot("motion", "gap"),
+        own_effects=own_effects(),
         code=code("withheld_score"),
     script:
         "../../scripts/withheld_score.py"
