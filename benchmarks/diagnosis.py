@@ -12,23 +12,28 @@ import numpy as np
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import make_case
 from rrru.gap.diagnose import GapSettings, diagnose, sim
-from rrru.robots.dynamics import Masses
-from rrru.studies.withheld.draw import draw_labelled
-from rrru.studies.withheld.robots import NOISE_MM, measure, nominal, truth_of
+from rrru.studies.withheld.chunks import Member
+from rrru.studies.withheld.draw import draw
+from rrru.studies.withheld.robots import Conditions
 
-_SEED = 2021
+_SETTINGS = {
+    "seed": 2021,
+    "robot": {"name": "rrru3", "dimensions": {}},
+    "masses": {},
+    "motion": {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0},
+    "withheld": {"noise_mm": 0.02},
+}
 
 
-def plain(measurements, mechanism, settings):
-    """Name of the effect of lowest BIC, none or unexplained: each effect's linear columns beside the calibration's,
-    noise known.
-    """
-    case = make_case(measurements, sim(mechanism), Masses(), NOISE_MM, settings.library())
+def plain(measurements, conditions, settings):
+    """Name of the effect of lowest BIC, none or unexplained: linear columns of single effects beside the calibration."""
+    noise_mm = conditions.noise_mm
+    case = make_case(measurements, sim(conditions.mechanism), conditions.masses, noise_mm, settings.library())
     linear = case.linearise(calibrate(case))
-    data, base = linear.data.ravel() / NOISE_MM, linear.base.reshape(-1, 7) / NOISE_MM
+    data, base = linear.data.ravel() / noise_mm, linear.base.reshape(-1, 7) / noise_mm
     found = {}
     for (name, _), columns in {("none", 0): np.zeros((*base.shape[:1], 0)), **linear.columns}.items():
-        design = np.concatenate([base, columns.reshape(len(data), -1) / NOISE_MM], axis=1)
+        design = np.concatenate([base, columns.reshape(len(data), -1) / noise_mm], axis=1)
         misfit = float(((data - design @ np.linalg.lstsq(design, data, rcond=None)[0]) ** 2).sum())
         found[name] = min(found.get(name, (np.inf, 0.0)), (misfit + design.shape[1] * np.log(len(data)), misfit))
     best = min(found, key=found.get)
@@ -38,15 +43,16 @@ def plain(measurements, mechanism, settings):
 
 def main(count=40):
     """Print a line per robot and the sums."""
-    mechanism, settings = nominal({}), GapSettings()
+    conditions, settings = Conditions.from_config(_SETTINGS), GapSettings()
+    known = (conditions.mechanism, conditions.masses, settings, conditions.noise_mm)
     seconds, right = {"here": [], "plain": []}, {"here": 0, "plain": 0}
     for number in range(count):
-        robot = draw_labelled(_SEED, number, mechanism)
-        measurements, truth = measure(robot, _SEED, mechanism), truth_of(robot)
+        robot = draw(Member("label", "", number), conditions)
+        (measurements, _), truth = robot.campaign(conditions).run(), robot.truth
         answers = {}
         for name, method in (
-            ("here", lambda m: diagnose(m, mechanism, Masses(), settings, NOISE_MM).verdict["effects"]),
-            ("plain", lambda m: plain(m, mechanism, settings)),
+            ("here", lambda m: diagnose(m, *known).verdict["effects"]),
+            ("plain", lambda m: plain(m, conditions, settings)),
         ):
             start = perf_counter()
             answers[name] = method(measurements)

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
-from scipy.stats import binomtest
 
 from rrru.errors import ConfigError
 from rrru.figures import style
@@ -178,13 +177,6 @@ def test_shares_are_of_the_scores():
     oracle = next(one for one in panel(figure, "strength").lines if one.get_label().startswith("detected"))
     weak = scores.query("check == 'label' and 0.3 <= strength < 0.6")
     assert oracle.get_ydata()[0] == pytest.approx(weak["oracle_detects"].mean())
-
-
-@pytest.mark.parametrize(("hits", "count"), [(48, 48), (0, 10), (52, 60), (1, 1)])
-def test_intervals_are_wilson_s(hits, count):
-    share, *ends = withheld._wilson(np.arange(count) < hits)
-    assert share == hits / count
-    np.testing.assert_allclose(ends, binomtest(hits, count).proportion_ci(method="wilson"), atol=1e-12)
 
 
 def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():

@@ -7,8 +7,10 @@ from matplotlib.ticker import LogLocator, MultipleLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import style
+from rrru.studies.withheld.summary import wilson
+from rrru.studies.withheld.verdicts import UNEXPLAINED
 
-NONE, UNEXPLAINED, OUTSIDE, SEVERAL = "none", "unexplained", "outside the library", "two or more"
+NONE, OUTSIDE, SEVERAL = "none", "outside the library", "two or more"
 _OUTSIDE_MARK = "outside:"
 _CHECKS = {
     "label": ("label withheld", style.LINES),
@@ -19,7 +21,6 @@ _PROBABILITY_EDGES = np.array([0.0, 0.5, 0.7, 0.8, 0.9, 0.97, 1.0])
 _STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
 # shares closed below this are drawn on the edge
 _LOWEST_CLOSED = -0.2
-_WILSON_Z = 1.959963984540054
 _EVEN = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1}
 _FRAME = {"facecolor": "none", "edgecolor": style.ORANGE, "linewidth": 0.9}
 _ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "linestyle": (0, (1, 1))}
@@ -164,17 +165,10 @@ def _shares(axes, value, hit, edges, look, label):
     if not bins:
         return
     x = np.array([value[inside].mean() for inside in bins])
-    share, low, high = np.array([_wilson(hit[inside]) for inside in bins]).T
+    share = np.array([hit[inside].mean() for inside in bins])
+    low, high = np.transpose([wilson(hit[inside].sum(), inside.sum()) for inside in bins])
     axes.vlines(x, low, high, color=look["color"], linewidth=0.7)
     axes.plot(x, share, label=label, **(look | {"markersize": 3.6}))
-
-
-def _wilson(hit):
-    """Share of hits (n,) with the ends of its 95 % Wilson interval."""
-    count, share = len(hit), hit.mean()
-    spread = _WILSON_Z * np.sqrt(share * (1.0 - share) / count + _WILSON_Z**2 / (4.0 * count**2))
-    low, high = (share + _WILSON_Z**2 / (2.0 * count) + sign * spread for sign in (-1.0, 1.0))
-    return share, *(np.array([low, high]) / (1.0 + _WILSON_Z**2 / count))
 
 
 def _named(name):

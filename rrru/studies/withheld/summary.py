@@ -17,7 +17,7 @@ def wilson(hits, count):
         return np.nan, np.nan
     from scipy.stats import binomtest
 
-    return tuple(binomtest(int(hits), count).proportion_ci(method="wilson"))
+    return tuple(binomtest(int(hits), int(count)).proportion_ci(method="wilson"))
 
 
 def calibration_error(probability, right):

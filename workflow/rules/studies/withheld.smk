@@ -53,7 +53,7 @@ rule withheld_diagnose:
             "taken_out": {member.name: member.effect for member in WITHHELD[wildcards.chunk]},
             **withheld_robot("gap"),
         },
-        own_effects=own_effects(),
+        own_effects=lambda wildcards: own_effects(),
         code=code("withheld_diagnose"),
     script:
         "../../scripts/withheld_diagnose.py"
@@ -68,7 +68,7 @@ rule withheld_score:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
         settings=withheld_robot("motion", "gap"),
-        own_effects=own_effects(),
+        own_effects=lambda wildcards: own_effects(),
         code=code("withheld_score"),
     script:
         "../../scripts/withheld_score.py"
