@@ -26,7 +26,7 @@ _SETTINGS = {
 
 
 def plain(measurements, conditions, settings):
-    """Name of the effect of lowest BIC, none or unexplained: linear columns of single effects beside the calibration."""
+    """Name of the effect of lowest BIC, none or unexplained: columns of single effects beside the calibration."""
     noise_mm = conditions.noise_mm
     case = make_case(measurements, sim(conditions.mechanism), conditions.masses, noise_mm, settings.library())
     linear = case.linearise(calibrate(case))

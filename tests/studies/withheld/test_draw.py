@@ -168,7 +168,8 @@ def test_the_laws_from_outside_do_as_they_say():
 
 
 def test_chunks_hold_every_robot_once():
-    parts = list(chunks({"robots": 7, "per_effect": 3, "chunk": 4}).values())
+    section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
+    parts = list(chunks(section).values())
     assert [len(part) for part in parts] == [4] * 10 + [3]
     names = [member.name for part in parts for member in part]
     assert names[:8] == [*(f"label_{k:04d}" for k in range(7)), "effect_backlash_0000"]
@@ -178,4 +179,4 @@ def test_chunks_hold_every_robot_once():
 @pytest.mark.parametrize(("key", "value"), [("field", ["nosuch"]), ("effects", ["nosuch"])])
 def test_unknown_names_are_refused(key, value):
     with pytest.raises(ConfigError, match=f"withheld.{key} has 'nosuch'"):
-        check({"campaigns": {"paper": {}}, "withheld": {key: value}})
+        check({"campaigns": {"paper": {}}, "withheld": {"field": ["paper"], "effects": ["backlash"]} | {key: value}})
