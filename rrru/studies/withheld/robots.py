@@ -124,9 +124,7 @@ class Robot:
             conditions.mechanism,
             deviations,
             effects=tuple(ActiveEffect(one.law, one.law.parameters.mapping(one.values)) for one in self.acting),
-            platform_mass_kg=conditions.masses.platform_kg,
-            forearm_mass_kg=conditions.masses.forearm_kg,
-            arm_mass_kg=conditions.masses.arm_kg,
+            masses=conditions.masses,
         )
         return WithheldCampaign(robot, self.plan(conditions), conditions.noise_mm, conditions.seed, self.name)
 
