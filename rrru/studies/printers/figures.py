@@ -63,13 +63,13 @@ def _residuals(axes, frame, rows):
     """Rms residuals of heights and distances, ours filled, the saved answer's open."""
     for kind, look in (("height", _HEIGHT), ("distance", _DISTANCE)):
         axes.plot(
-            frame[f"{kind}_rms_there_mm"],
+            frame[f"{kind}_rms_saved_mm"],
             rows,
             linestyle="none",
             label=f"{kind}s, saved",
             **look | {"markerfacecolor": "white", "markersize": 4.5},
         )
-        axes.plot(frame[f"{kind}_rms_here_mm"], rows, linestyle="none", label=f"{kind}s, ours", **look)
+        axes.plot(frame[f"{kind}_rms_fitted_mm"], rows, linestyle="none", label=f"{kind}s, ours", **look)
     axes.set(xlabel="rms residual (mm)")
     axes.set_title("(b) what is left")
 

@@ -1,8 +1,7 @@
-"""Heights and distances as measurements of a calibration: what a probe and calipers see of a robot, one number per
-reading.
-"""
+"""Heights and distances as measurements of a calibration: what a probe and calipers see, one number per reading."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -27,73 +26,67 @@ class HeightResiduals:
     height_weight: float = 1.0
 
     def __post_init__(self):
-        if not np.isfinite(np.concatenate([self.height_mm, self.distance_mm])).all():
+        if not np.isfinite(self.measured_mm).all():
             raise FitError("a height or a distance is not finite")
         lost = np.flatnonzero(~np.isfinite(self.predicted_mm(self.mechanism.parameters.nominal)))
         if lost.size:
             raise FitError(
-                f"the nominal robot cannot take {lost.size} of {len(self)} readings' places, the first is reading {lost[0] + 1}"
+                f"the nominal robot cannot take {lost.size} of {len(self)} readings' places, "
+                f"the first is reading {lost[0] + 1}"
             )
 
     def __len__(self):
         return len(self.height_mm) + len(self.distance_mm)
 
-    @property
+    @cached_property
     def measured_mm(self):
         """Readings (n + m,): the heights, then the distances."""
         return np.concatenate([self.height_mm, self.distance_mm])
 
-    @property
+    @cached_property
     def root_weight(self):
         """Factor (n + m,) of every reading's residual."""
-        return np.concatenate(
-            [np.full(len(self.height_mm), np.sqrt(self.height_weight)), np.ones(len(self.distance_mm))]
-        )
+        return np.where(np.arange(len(self)) < len(self.height_mm), np.sqrt(self.height_weight), 1.0)
 
-    @property
+    @cached_property
     def actuators(self):
         """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
         return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
 
     def predicted_mm(self, deviations):
         """Readings (n + m,) of the robot under deviations (p,)."""
-        return self._of_places(self.mechanism.forward(self.actuators, deviations))[0]
+        n, m = len(self.height_mm), len(self.distance_mm)
+        places = self.mechanism.forward(self.actuators, deviations)
+        return np.concatenate([places[:n, 2], np.linalg.norm(places[n : n + m] - places[n + m :], axis=1)])
 
-    def gradient(self, deviations):
-        """Derivative (n + m, n + 2 m, 3) of the readings by the places at which the robot stands under deviations (p,)."""
-        return self._of_places(self.mechanism.forward(self.actuators, deviations))[1]
+    def gradient(self, places):
+        """Derivative (n + m, n + 2 m, 3) of the readings by the places (n + 2 m, 3) at which the robot stands."""
+        n, m = len(self.height_mm), len(self.distance_mm)
+        between = places[n : n + m] - places[n + m :]
+        slope = np.zeros((n + m, n + 2 * m, 3))
+        slope[np.arange(n), np.arange(n), 2] = 1.0
+        pairs = np.arange(n, n + m)
+        slope[pairs, pairs] = between / np.linalg.norm(between, axis=1, keepdims=True)
+        slope[pairs, pairs + m] = -slope[pairs, pairs]
+        return slope
 
     def residual(self, deviations):
         """Measured less predicted readings times the roots of their weights, (n + m, 1), under deviations (p,)."""
         return (self.root_weight * (self.measured_mm - self.predicted_mm(deviations)))[:, None]
 
     def jacobian(self, deviations):
-        """Derivative (n + m, 1, p) of the residual by the errors."""
+        """Derivative (n + m, 1, p) of the residual by the deviations."""
         places = self.mechanism.forward(self.actuators, deviations)
         moved = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
-        return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self._of_places(places)[1], moved)[:, None]
+        return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self.gradient(places), moved)[:, None]
 
     def without(self, reading):
         """The same residuals less one reading, counted from 0 over the heights and then the distances."""
-        heights = np.delete(np.arange(len(self.height_mm)), [reading] if reading < len(self.height_mm) else [])
-        left = reading - len(self.height_mm)
-        distances = np.delete(np.arange(len(self.distance_mm)), [left] if left >= 0 else [])
-        return HeightResiduals(
-            self.mechanism,
-            self.height_actuators[heights],
-            self.height_mm[heights],
-            self.distance_actuators[distances],
-            self.distance_mm[distances],
-            self.height_weight,
+        heights, distances = np.split(np.arange(len(self)) != reading, [len(self.height_mm)])
+        return replace(
+            self,
+            height_actuators=self.height_actuators[heights],
+            height_mm=self.height_mm[heights],
+            distance_actuators=self.distance_actuators[distances],
+            distance_mm=self.distance_mm[distances],
         )
-
-    def _of_places(self, places):
-        """Readings (n + m,) of places (n + 2 m, 3), and their derivative (n + m, n + 2 m, 3)."""
-        n, m = len(self.height_mm), len(self.distance_mm)
-        between = places[n : n + m] - places[n + m :]
-        length = np.linalg.norm(between, axis=1)
-        slope = np.zeros((n + m, n + 2 * m, 3))
-        slope[np.arange(n), np.arange(n), 2] = 1.0
-        pairs = np.arange(n, n + m)
-        slope[pairs, pairs], slope[pairs, pairs + m] = between / length[:, None], -between / length[:, None]
-        return np.concatenate([places[:n, 2], length]), slope

@@ -1,10 +1,9 @@
-"""What the calibration of a printer leaves: which reading is suspicious, which causes could be behind it, and whether
-that is decidable at all.
+"""What the calibration of a printer leaves: which reading is suspicious, which causes could be behind it.
 
 Left-out readings: the printer is fitted without one reading, and this reading's distance from what the others foretell,
 over its standard error, follows Student's t with the others' freedom if all is well (Cook and Weisberg, Residuals and
-Influence in Regression, 1982, 2.2). Causes: `printer_evidence` gives p. A cause that passes is found only if no other
-cause could explain what it explains, and if it passes without any single reading too.
+Influence in Regression, 1982, 2.2). Causes: `cause_tests` gives p. A cause that passes is found only if no other cause
+could explain what it explains, and if it passes without any single reading too; else it is not decidable.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rrru.fit.least_squares import least_squares
-from rrru.studies.printers.printer_evidence import BAD_READING, Evidence
+from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
 
 FOUND, NOT_FOUND, NOT_DECIDABLE = "found", "not found", "not decidable"
 ONE_READING = "not decidable (rests on one reading)"
@@ -48,7 +47,7 @@ def left_out(result):
             row = residuals.jacobian(fit.deviations)[reading, 0]
             variance = 1.0 + row @ fit.identifiability.covariance(1.0) @ row
             ratio[reading] = weight * difference[reading] / (fit.noise_mm * np.sqrt(variance))
-    return LeftOut(difference, ratio, Evidence(result).reading_p())
+    return LeftOut(difference, ratio, CauseTests(result).p(BAD_READING))
 
 
 def without(result, reading):
@@ -77,38 +76,45 @@ class Cause:
     verdict: str
 
 
-def limit_of(result, level, pieces, name):
-    """P below which a cause of a PrinterFit passes: the level over the number of its causes (Bonferroni).
+@dataclass(frozen=True)
+class Level:
+    """How surely a cause has to show.
 
-    A cause of the machine is asked for over all pieces of evidence together, so that the level is divided by their
-    number too; a bad reading is a matter of its own file.
+    level: probability of a false alarm over the causes of all `pieces` of evidence; imitated_from: share of what a
+    cause explains, from which on another that holds it imitates it.
     """
-    return level / (1 + len(Evidence(result).columns)) / (1 if name == BAD_READING else pieces)
+
+    level: float
+    imitated_from: float
+    pieces: int = 1
+
+    def limit(self, tests, name):
+        """P below which a cause passes: the level over the number of causes (Bonferroni).
+
+        A cause of the machine is asked for over all pieces of evidence together, so that the level is divided by their
+        number too; a bad reading is a matter of its own file.
+        """
+        return self.level / (1 + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
 
 
-def causes(result, left, level, imitated_from, pieces=1):
+def causes(result, left, level):
     """Possible causes of what a PrinterFit leaves, a tuple: a bad reading, and those that act on all of them.
 
-    left: its LeftOut. level: probability of a false alarm, over `pieces` of evidence, see `limit_of`. imitated_from:
-    share of what a cause explains, from which on another that holds it imitates it. A bad reading that is more striking
-    than every other cause is left out before these are looked at; one that is less striking has to stand out beside the
-    most striking of them.
+    left: its LeftOut; level: `Level`. A bad reading that is more striking than every other cause is left out before
+    these are looked at; one that is less striking has to stand out beside the most striking of them.
     """
-    judge = _Judge(
-        Evidence(result), *(limit_of(result, level, pieces, name) for name in (BAD_READING, "")), imitated_from
-    )
-    first, others = judge.bad_reading(left), judge.acting_on_all()
+    tests = CauseTests(result)
+    limit = level.limit(tests, BAD_READING)
+    first, others = _bad_reading(tests, left, level), _acting_on_all(tests, level)
     leader = min(others, key=lambda one: np.nan_to_num(one.p, nan=1.0))
-    if first.p < judge.reading_limit and leader.p < first.p:
-        p = judge.evidence.reading_p(beside=judge.evidence.columns[leader.name][0])
-        p = np.nan if np.isnan(p).all() else float(np.nanmin(p))
-        first = replace(first, p=p, verdict=judge.verdict(p, first.imitated_by, judge.reading_limit))
-    elif first.p < judge.reading_limit:
-        others = replace(judge, evidence=Evidence(without(result, left.suspect))).acting_on_all()
+    if first.p < limit and leader.p < first.p:
+        p = float(np.min(tests.p(BAD_READING, beside=tests.columns[leader.name][0])))
+        first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, limit))
+    elif first.p < limit:
+        others = _acting_on_all(CauseTests(without(result, left.suspect)), level)
     # what imitates a cause that is seen cannot be ruled out either
-    rivals = {
-        name for one in (first, *others) if one.verdict in (NOT_DECIDABLE, ONE_READING) for name in one.imitated_by
-    }
+    seen = [one for one in (first, *others) if one.verdict in (NOT_DECIDABLE, ONE_READING)]
+    rivals = {name for one in seen for name in one.imitated_by}
     return tuple(replace(one, verdict=NOT_DECIDABLE) if one.name in rivals else one for one in (first, *others))
 
 
@@ -123,52 +129,40 @@ def diagnosis(answers):
     return "; ".join([*bad, *([names if certain else f"{NOT_DECIDABLE}: {names}"] if rest else [])]) or "none found"
 
 
-@dataclass(frozen=True)
-class _Judge:
-    """Evidence and the bars for it; see `causes`."""
+def _verdict(p, imitators, limit, p_without_any=lambda: 0.0):
+    """Verdict on a cause from its p and the limit for it; p_without_any(): the largest with a single reading left out."""
+    if np.isnan(p) or (p < limit and imitators):
+        return NOT_DECIDABLE
+    if p >= limit:
+        return NOT_FOUND
+    return FOUND if p_without_any() < limit else ONE_READING
 
-    evidence: Evidence
-    reading_limit: float
-    limit: float
-    imitated_from: float
 
-    def verdict(self, p, imitators, limit, p_without_any=lambda: 0.0):
-        """Verdict on a cause from its p and the limit for it; p_without_any: gives its largest p with a single reading
-        left out.
-        """
-        if np.isnan(p) or (p < limit and imitators):
-            return NOT_DECIDABLE
-        if p >= limit:
-            return NOT_FOUND
-        return FOUND if p_without_any() < limit else ONE_READING
+def _bad_reading(tests, left, level):
+    """The cause that one reading is wrong: the most suspicious one."""
+    suspect = left.suspect
+    imitators = tests.imitators(BAD_READING, level.imitated_from, suspect or 0)
+    share = p = estimate = error = np.nan
+    if suspect is not None:
+        share = _share(tests, tests.bases[BAD_READING][0][suspect])
+        p, estimate = left.p[suspect], left.difference_mm[suspect]
+        error = estimate / left.ratio[suspect]
+    verdict = _verdict(p, imitators, level.limit(tests, BAD_READING))
+    return Cause(BAD_READING, 1, share, p, estimate, error, "mm", imitators, verdict)
 
-    def bad_reading(self, left):
-        """The cause that one reading is wrong: the most suspicious one."""
-        suspect = left.suspect
-        imitators = self.evidence.imitators(BAD_READING, self.imitated_from, suspect or 0)
-        share = p = estimate = error = np.nan
-        if suspect is not None:
-            share = self._share(self.evidence.bases[BAD_READING][0][suspect])
-            p, estimate = left.p[suspect], left.difference_mm[suspect]
-            error = estimate / left.ratio[suspect]
-        return Cause(
-            BAD_READING, 1, share, p, estimate, error, "mm", imitators, self.verdict(p, imitators, self.reading_limit)
-        )
 
-    def acting_on_all(self):
-        """The causes that act on all readings."""
-        return [self._acting_on_all(name, unit) for name, (_, unit) in self.evidence.columns.items()]
+def _acting_on_all(tests, level):
+    """The causes that act on all readings, a list."""
+    answers = []
+    for name, (_, unit) in tests.columns.items():
+        basis, p, imitators = tests.bases[name][0][0], float(tests.p(name)), tests.imitators(name, level.imitated_from)
+        verdict = _verdict(p, imitators, level.limit(tests, name), lambda name=name: tests.p_without_any(name))
+        rank, share = basis.shape[1], _share(tests, basis)
+        answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict))
+    return answers
 
-    def _acting_on_all(self, name, unit):
-        """One of them."""
-        basis, p = self.evidence.bases[name][0][0], float(self.evidence.p(name))
-        imitators = self.evidence.imitators(name, self.imitated_from)
-        verdict = self.verdict(p, imitators, self.limit, lambda: self.evidence.p_without_any(name))
-        return Cause(
-            name, basis.shape[1], self._share(basis), p, *self.evidence.estimate(name), unit, imitators, verdict
-        )
 
-    def _share(self, basis):
-        """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
-        left = self.evidence.weighings[0].left(self.evidence.readings_mm)
-        return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)
+def _share(tests, basis):
+    """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
+    left = tests.weighings[0].left(tests.readings_mm)
+    return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)

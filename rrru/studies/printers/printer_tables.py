@@ -5,18 +5,17 @@ import pandas as pd
 from scipy.sparse import csgraph
 
 from rrru.errors import FitError
-from rrru.studies.printers.printer_causes import FOUND, causes, diagnosis, left_out, limit_of
-from rrru.studies.printers.printer_evidence import Evidence
-from rrru.studies.printers.printer_fit import NAMES, UNITS, common_arm_error, dense_arm_error, fit_printer, reason
+from rrru.studies.printers.cause_tests import CauseTests
+from rrru.studies.printers.firmware import NAMES, UNITS
+from rrru.studies.printers.printer_causes import FOUND, Level, causes, diagnosis, left_out
+from rrru.studies.printers.printer_fit import common_arm_error, dense_arm_error, fit_printer
+from rrru.studies.printers.saved_answers import reason
 
 REPRODUCED, FOREIGN, FAILED = "reproduced", "does not belong", "not fitted"
 # below this freedom the standard errors are themselves hardly known
 _LITTLE_FREEDOM = 3
-_NUMBERS = (
-    *("condition", "radius_here_mm", "radius_there_mm", "largest_difference", "largest_over_stop", "noise_mm"),
-    *("height_rms_here_mm", "height_rms_there_mm", "distance_rms_here_mm", "distance_rms_there_mm"),
-    *("arm_standard_error_mm", "common_arm_standard_error_mm", "dense_common_arm_standard_error_mm", "suspect_p"),
-)
+_NOT_FITTED = {"numbers": 0, "freedom": 0, "rank": 0, "largest_difference_in": "", "verdict": FAILED}
+_NOT_FITTED |= {"suspect": "", "cause": "not decidable", "notes": ""}
 
 
 def tables(printers, settings):
@@ -28,68 +27,44 @@ def tables(printers, settings):
     """
     rows = {name: [] for name in ("printers", "printer_parameters", "printer_readings", "printer_causes")}
     twins, groups = _shared_readings(printers), _groups(printers)
-    level, pieces = settings["level"], max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
+    pieces = max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
+    level = Level(settings["level"], settings["imitated_from"], pieces)
     for printer in printers:
+        labels = {"printer": printer.name, "source": printer.source, "evidence": groups[printer.name]}
+        labels |= {"heights": len(printer.height_mm), "distances": len(printer.distance_mm)}
         try:
             result = fit_printer(printer, settings["stopping_step"])
             left = left_out(result)
         except FitError as error:
-            rows["printers"].append(_failed_row(printer, str(error)) | {"evidence": groups[printer.name]})
+            rows["printers"].append(labels | _NOT_FITTED | {"reason": str(error)})
             continue
-        answers = causes(result, left, level, settings["imitated_from"], pieces)
-        rows["printers"].append(
-            _printer_row(result, left, answers, twins[printer.name]) | {"evidence": groups[printer.name]}
-        )
-        rows["printer_parameters"] += _parameter_rows(result)
-        rows["printer_readings"] += _reading_rows(result, left, answers[0].verdict == FOUND)
-        rows["printer_causes"] += _cause_rows(result, answers, level, pieces, settings["imitated_from"])
-    return {name: pd.DataFrame(entries) for name, entries in rows.items()}
-
-
-def _labels(printer):
-    """What identifies a printer and its readings."""
-    return {
-        "printer": printer.name,
-        "source": printer.source,
-        "heights": len(printer.height_mm),
-        "distances": len(printer.distance_mm),
-    }
-
-
-def _failed_row(printer, message):
-    """Row of `printers` for one that cannot be fitted."""
-    texts = {
-        "largest_difference_in": "",
-        "verdict": FAILED,
-        "reason": message,
-        "suspect": "",
-        "cause": "not decidable",
-        "notes": "",
-    }
-    counts = {"numbers": 0, "freedom": 0, "rank": 0}
-    return _labels(printer) | counts | dict.fromkeys(_NUMBERS, np.nan) | texts
+        answers = causes(result, left, level)
+        rows["printers"].append(labels | _printer_row(result, left, answers, twins[printer.name]))
+        rows["printer_parameters"].append(_parameter_rows(result))
+        rows["printer_readings"].append(_reading_rows(result, left, answers[0].verdict == FOUND))
+        rows["printer_causes"].append(_cause_rows(result, answers, level))
+    frames = {name: pd.concat(parts, ignore_index=True) for name, parts in rows.items() if name != "printers" and parts}
+    return {name: pd.DataFrame() for name in rows} | frames | {"printers": pd.DataFrame(rows["printers"])}
 
 
 def _printer_row(result, left, answers, twins):
-    """Row of `printers`."""
-    difference = np.abs(result.there - result.here)
-    worst = int(difference.argmax())
+    """Row of `printers`, but for what identifies it."""
+    difference = np.abs(result.saved - result.fitted)
+    worst, suspect, why = int(difference.argmax()), left.suspect, reason(result)
     common, dense = common_arm_error(result), dense_arm_error(result)
-    suspect = left.suspect
-    why = reason(result)
-    return _labels(result.printer) | {
+    return {
         "numbers": len(result.names),
         "freedom": result.freedom,
         "rank": result.fit.identifiability.rank,
         "condition": result.fit.identifiability.condition,
-        "radius_here_mm": result.here[0],
-        "radius_there_mm": result.there[0],
+        "radius_fitted_mm": result.fitted[0],
+        "radius_saved_mm": result.saved[0],
         "largest_difference": difference[worst],
         "largest_difference_in": result.names[worst],
         "largest_over_stop": (difference / result.tolerance).max(),
         **_rms(result),
         "noise_mm": result.fit.noise_mm,
-        "arm_standard_error_mm": result.standard_errors[6:].max(initial=-np.inf) if len(result.names) > 6 else np.nan,
+        "arm_standard_error_mm": max(result.standard_errors[6:], default=np.nan),
         "common_arm_standard_error_mm": common,
         "dense_common_arm_standard_error_mm": dense,
         "verdict": FOREIGN if why else REPRODUCED,
@@ -97,66 +72,63 @@ def _printer_row(result, left, answers, twins):
         "suspect": "" if suspect is None else result.reading_name(suspect),
         "suspect_p": np.nan if suspect is None else left.p[suspect],
         "cause": diagnosis(answers),
-        "notes": "; ".join(_notes(result, answers, common, dense, twins)),
+        "notes": "; ".join([*_notes(result, answers, common, dense), *twins]),
     }
 
 
 def _residuals(result):
     """Readings less the fitted and less the saved printer's, in mm, each (n,)."""
-    residuals, start = result.residuals, result.residuals.mechanism.parameters.nominal
-    return [residuals.measured_mm - residuals.predicted_mm(deviations) for deviations in (result.fit.deviations, start)]
+    residuals = result.residuals
+    answers = {"fitted": result.fit.deviations, "saved": residuals.mechanism.parameters.nominal}
+    return {name: residuals.measured_mm - residuals.predicted_mm(answer) for name, answer in answers.items()}
 
 
 def _rms(result):
-    """Rms residuals of heights and distances here and there in mm; NaN where there are no distances."""
-    heights, values = len(result.printer.height_mm), {}
-    for place, residual in zip(("here", "there"), _residuals(result), strict=True):
-        values[f"height_rms_{place}_mm"] = np.sqrt((residual[:heights] ** 2).mean())
-        values[f"distance_rms_{place}_mm"] = (
-            np.sqrt((residual[heights:] ** 2).mean()) if residual[heights:].size else np.nan
-        )
+    """Rms residuals of heights and distances under the fitted and the saved numbers in mm; absent ones are left out."""
+    values = {}
+    for answer, residual in _residuals(result).items():
+        for kind, part in zip(("height", "distance"), np.split(residual, [len(result.printer.height_mm)]), strict=True):
+            values |= {f"{kind}_rms_{answer}_mm": np.sqrt((part**2).mean())} if part.size else {}
     return values
 
 
-def _notes(result, answers, common, dense, twins):
+def _notes(result, answers, common, dense):
     """What a reader of the row should know."""
     if result.freedom < _LITTLE_FREEDOM:
         widths = (result.half_widths / result.standard_errors)[0]
-        yield f"readings exceed numbers by {result.freedom} only: 95 % intervals are {widths:.1f} standard errors wide to each side"
+        wide = f"95 % intervals are {widths:.1f} standard errors wide to each side"
+        yield f"readings exceed numbers by {result.freedom} only: {wide}"
     if result.printer.parameter_set == "heights":
-        yield f"arms as saved: heights alone would give their common length with a standard error of {common:.1f} mm, 100 of them {dense:.2f} mm"
+        alone = f"a standard error of {common:.1f} mm, 100 of them {dense:.2f} mm"
+        yield f"arms as saved: heights alone would give their common length with {alone}"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"
-    scale = next((one for one in answers if one.name == "caliper_scale"), None)
-    if scale and "caliper_offset" in scale.imitated_by:
+    if any(one.name == "caliper_scale" and "caliper_offset" in one.imitated_by for one in answers):
         low, high = result.printer.distance_mm.min(), result.printer.distance_mm.max()
-        yield f"a scale error of the calipers cannot be told from an offset: all distances are {low:.1f} to {high:.1f} mm"
-    yield from twins
+        alike = f"all distances are {low:.1f} to {high:.1f} mm"
+        yield f"a scale error of the calipers cannot be told from an offset: {alike}"
 
 
 def _shared_readings(printers):
     """Notes by printer on readings that an earlier printer of the file has too."""
     seen, notes = {}, {}
     for printer in printers:
-        notes[printer.name] = []
-        for kind, size in (("heights", printer.height_drop_mm), ("distances", printer.distance_drop_mm)):
-            first = seen.setdefault((kind, size.tobytes()), printer.name)
-            if size.size and first != printer.name:
-                notes[printer.name].append(f"the same {kind} as {first}")
+        sizes = {"heights": printer.height_drop_mm, "distances": printer.distance_drop_mm}
+        first = {kind: seen.setdefault((kind, size.tobytes()), printer.name) for kind, size in sizes.items()}
+        notes[printer.name] = [
+            f"the same {kind} as {first[kind]}" for kind in sizes if sizes[kind].size and first[kind] != printer.name
+        ]
     return notes
 
 
 def _groups(printers):
     """Name by printer of the first one that it shares readings with, also by way of others."""
-    sizes = [
-        {size.tobytes() for size in (p.height_drop_mm, p.distance_drop_mm, p.distance_mm) if size.size}
-        for p in printers
-    ]
+    readings = ("height_drop_mm", "distance_drop_mm", "distance_mm")
+    sizes = [{getattr(one, name).tobytes() for name in readings if getattr(one, name).size} for one in printers]
     shared = np.array([[not one.isdisjoint(other) for other in sizes] for one in sizes])
     _, piece = csgraph.connected_components(shared, directed=False)
-    return {
-        printer.name: printers[int(np.argmax(piece == own))].name for printer, own in zip(printers, piece, strict=True)
-    }
+    _, first = np.unique(piece, return_index=True)
+    return {printer.name: printers[first[own]].name for printer, own in zip(printers, piece, strict=True)}
 
 
 def _decides(printer):
@@ -165,76 +137,65 @@ def _decides(printer):
 
 
 def _parameter_rows(result):
-    """Rows of `printer_parameters`, all nine numbers; what was not calibrated has no value here."""
-    missing = np.full(len(NAMES) - len(result.names), np.nan)
-    columns = {
-        "here": result.here,
-        "difference": result.there - result.here,
-        "stop": result.tolerance,
-        "standard_error": result.standard_errors,
-        "half_width_95": result.half_widths,
-    }
-    there = np.concatenate([result.there, result.printer.arm_mm[: len(missing)]])
-    columns = {name: np.concatenate([values, missing]) for name, values in columns.items()}
-    return [
+    """Rows of `printer_parameters`, all nine numbers; what was not calibrated is NaN but for what was saved."""
+    saved = np.concatenate([result.saved, result.printer.arm_mm])[: len(NAMES)]
+    calibrated = pd.DataFrame(
         {
-            "printer": result.printer.name,
-            "parameter": name,
-            "unit": unit,
-            "there": there[k],
-            **{column: values[k] for column, values in columns.items()},
-            "calibrated": k < len(result.names),
-            "agrees": k >= len(result.names) or bool(result.agrees[k]),
-        }
-        for k, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True))
-    ]
+            "fitted": result.fitted,
+            "difference": result.saved - result.fitted,
+            "stop": result.tolerance,
+            "standard_error": result.standard_errors,
+            "half_width_95": result.half_widths,
+            "agrees": result.agrees,
+        },
+        index=list(result.names),
+    )
+    rows = pd.DataFrame({"parameter": NAMES, "unit": UNITS, "saved": saved}, index=list(NAMES)).join(calibrated)
+    rows["calibrated"] = rows["fitted"].notna()
+    rows["agrees"] = rows["agrees"].ne(False)
+    return rows.assign(printer=result.printer.name)
 
 
 def _reading_rows(result, left, bad):
     """Rows of `printer_readings`; bad: whether the suspect is a bad reading."""
-    here, there = _residuals(result)
-    rows = []
-    for reading, value in enumerate(result.residuals.measured_mm):
-        kind, number = result.reading_name(reading).split()
+    residuals, count = _residuals(result), len(result.residuals)
+    names = [result.reading_name(reading).split() for reading in range(count)]
+    return pd.DataFrame(
+        {
+            "printer": result.printer.name,
+            "kind": [kind for kind, _ in names],
+            "number": [int(number) for _, number in names],
+            "value_mm": result.residuals.measured_mm,
+            "residual_fitted_mm": residuals["fitted"],
+            "residual_saved_mm": residuals["saved"],
+            "left_out_mm": left.difference_mm,
+            "studentised": left.ratio,
+            "p": left.p,
+            "flagged": bad & (np.arange(count) == left.suspect),
+        }
+    )
+
+
+def _cause_rows(result, answers, level):
+    """Rows of `printer_causes`."""
+    tests, rows = CauseTests(result), []
+    for one in answers:
+        limit = level.limit(tests, one.name)
+        hopeless = not _decides(result.printer) or tests.always_imitated(one.name, level.imitated_from)
         rows.append(
             {
                 "printer": result.printer.name,
-                "kind": kind,
-                "number": int(number),
-                "value_mm": value,
-                "residual_here_mm": here[reading],
-                "residual_there_mm": there[reading],
-                "left_out_mm": left.difference_mm[reading],
-                "studentised": left.ratio[reading],
-                "p": left.p[reading],
-                "flagged": bad and reading == left.suspect,
+                "cause": one.name,
+                "freedom_used": one.freedom,
+                "explained_share": one.share,
+                "p": one.p,
+                "estimate": one.estimate,
+                "standard_error": one.standard_error,
+                "unit": one.unit,
+                "limit": limit,
+                "detectable_mm": np.nan if hopeless else tests.detectable_mm(one.name, limit),
+                "imitated_by": ", ".join(one.imitated_by),
+                "verdict": one.verdict,
             }
         )
-    return rows
-
-
-def _cause_rows(result, answers, level, pieces, imitated_from):
-    """Rows of `printer_causes`."""
-    evidence = Evidence(result)
-    limits = {one.name: limit_of(result, level, pieces, one.name) for one in answers}
-
-    def hopeless(name):
-        return not _decides(result.printer) or evidence.always_imitated(name, imitated_from)
-
-    return [
-        {
-            "printer": result.printer.name,
-            "cause": one.name,
-            "freedom_used": one.freedom,
-            "explained_share": one.share,
-            "p": one.p,
-            "estimate": one.estimate,
-            "standard_error": one.standard_error,
-            "unit": one.unit,
-            "limit": limits[one.name],
-            "detectable_mm": np.nan if hopeless(one.name) else evidence.detectable_mm(one.name, limits[one.name]),
-            "imitated_by": ", ".join(one.imitated_by),
-            "verdict": one.verdict,
-        }
-        for one in answers
-    ]
+    return pd.DataFrame(rows)

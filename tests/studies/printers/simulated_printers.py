@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.studies.printers import printer_causes, printer_fit
+from rrru.studies.printers import firmware, printer_causes, printer_fit
 from rrru.studies.printers.readings import read
 from tests.places import DATA
 
@@ -38,7 +38,7 @@ def simulated(
     scale, offset_mm: of the calipers. lean (3, 2): of the towers, outwards and sideways. steps (3,): relative error of
     the steps' lengths. shape: stretch along x, which shrinks y, and skew of the measured object.
     """
-    own = printer_fit.residuals_of(printer, "distances")
+    own = firmware.residuals_of(printer, "distances")
     robot, sliders = own.mechanism, own.actuators * (1.0 + np.asarray(steps))
     legs = robot.legs(deviations)
     height = (sliders + legs[:, 0])[..., None]
@@ -51,7 +51,7 @@ def simulated(
     )
     heights, lengths = places[:n, 2], np.linalg.norm(between, axis=1) * scale + offset_mm
     if noise_mm:
-        ratio = ratio or 1.0 / np.sqrt(printer_fit.residuals_of(printer).height_weight)
+        ratio = ratio or 1.0 / np.sqrt(firmware.residuals_of(printer).height_weight)
         heights = heights + generator.normal(0.0, noise_mm * ratio, n)
         lengths = lengths + generator.normal(0.0, noise_mm, m)
     return replace(printer, height_mm=heights, distance_mm=lengths)
@@ -68,5 +68,5 @@ def diagnosed(printer):
     """Fit, left-out readings, causes by name and the diagnosis of a printer."""
     result = printer_fit.fit_printer(printer, STEP)
     left = printer_causes.left_out(result)
-    answers = printer_causes.causes(result, left, SETTINGS["level"], SETTINGS["imitated_from"])
+    answers = printer_causes.causes(result, left, printer_causes.Level(SETTINGS["level"], SETTINGS["imitated_from"]))
     return result, left, {one.name: one for one in answers}, printer_causes.diagnosis(answers)

@@ -14,8 +14,8 @@ def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "
         size = 1e-5 if verdict == "reproduced" else 0.5
         numbers = {
             "condition": 20.0,
-            "radius_here_mm": 150.0,
-            "radius_there_mm": 150.0 + size,
+            "radius_fitted_mm": 150.0,
+            "radius_saved_mm": 150.0 + size,
             "noise_mm": 0.03,
             "suspect_p": np.nan,
         }
@@ -25,8 +25,8 @@ def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "
             "common_arm_standard_error_mm": 3.0 + k,
             "dense_common_arm_standard_error_mm": 0.8,
         }
-        numbers |= {"height_rms_here_mm": 0.02 + 0.01 * k, "height_rms_there_mm": 0.03 + 0.01 * k + size}
-        caliper = {"distance_rms_here_mm": 0.08, "distance_rms_there_mm": 0.08 + size, "arm_standard_error_mm": 0.9}
+        numbers |= {"height_rms_fitted_mm": 0.02 + 0.01 * k, "height_rms_saved_mm": 0.03 + 0.01 * k + size}
+        caliper = {"distance_rms_fitted_mm": 0.08, "distance_rms_saved_mm": 0.08 + size, "arm_standard_error_mm": 0.9}
         numbers |= caliper if distances else dict.fromkeys(caliper, np.nan)
         if verdict == "not fitted":
             numbers = dict.fromkeys(numbers, np.nan)

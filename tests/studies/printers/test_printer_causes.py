@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from rrru.studies.printers import printer_causes, printer_evidence, printer_fit
+from rrru.studies.printers import cause_tests, printer_causes, printer_fit
 from tests.studies.printers.simulated_printers import (
     DISTANCES,
     HEIGHTS,
@@ -27,7 +27,7 @@ LEAN = np.array([[0.02, 0.0], [0.0, -0.016], [0.008, 0.012]])
 
 def evidence_of(printer):
     """Evidence of a printer of the file."""
-    return printer_evidence.Evidence(printer_fit.fit_printer(printer, STEP))
+    return cause_tests.CauseTests(printer_fit.fit_printer(printer, STEP))
 
 
 def slow_p(result, columns, ratio, without=None):
@@ -74,7 +74,7 @@ def test_a_wrong_reading_is_found_and_nothing_else(number):
     assert bad.verdict == "found" and abs(bad.estimate - off) < 4.0 * bad.standard_error
     # it moved the numbers, which the fit without it undoes
     whole, clean = printer_fit.fit_printer(printer, STEP), printer_causes.without(result, left.suspect)
-    assert np.abs(clean.here - whole.here).max() < 0.3 * np.abs(result.here - whole.here).max()
+    assert np.abs(clean.fitted - whole.fitted).max() < 0.3 * np.abs(result.fitted - whole.fitted).max()
 
 
 def test_p_is_the_largest_of_slow_ones_over_the_ratios_of_noises():
@@ -84,7 +84,7 @@ def test_p_is_the_largest_of_slow_ones_over_the_ratios_of_noises():
         assert evidence.p(name) == pytest.approx(
             max(slow_p(evidence.result, columns, ratio) for ratio in ratios), rel=1e-6
         )
-    for reading, p in enumerate(evidence.reading_p()):
+    for reading, p in enumerate(evidence.p("bad_reading")):
         slow = max(slow_p(evidence.result, np.eye(19)[:, [reading]], ratio) for ratio in ratios)
         assert p == pytest.approx(min(19.0 * slow, 1.0), rel=1e-6)
     without = [
@@ -101,11 +101,11 @@ def test_noise_of_any_ratio_is_rarely_taken_for_a_cause(ratio):
     evidence, limit, draws = evidence_of(DISTANCES), 0.05 / 6.0, 3000
     readings = np.random.default_rng(2).normal(size=(draws, 19)) * np.where(np.arange(19) < 7, ratio, 1.0)
     alarms = [(evidence.p(name, readings) < limit).mean() for name in evidence.columns]
-    alarms.append((evidence.reading_p(readings).min(axis=1) < limit).mean())
+    alarms.append((evidence.p("bad_reading", readings).min(axis=1) < limit).mean())
     assert max(alarms) < limit + 4.0 * np.sqrt(limit / draws)
     # the firmware's ratio alone would not do
     first = evidence.weighings[0]
-    naive = np.min([first.p(basis, readings) for basis in evidence.bases["bad_reading"][0]], axis=0) * 19 < limit
+    naive = first.p(evidence.bases["bad_reading"][0], readings).min(axis=-1) * 19 < limit
     assert ratio < 1.0 or naive.mean() > 2.0 * limit
 
 
@@ -179,7 +179,7 @@ def test_what_leaning_towers_could_explain_is_never_said_to_be_leaning_towers(ca
 def test_a_cause_that_passes_by_one_reading_is_not_found(name):
     """Leaning towers pass in these real readings; without one of them they do not, by two slow fits."""
     result, _, answers, diagnosis = diagnosed(PRINTERS[name])
-    limit, columns = 0.05 / 6.0, printer_evidence.cause_columns(result)["tower_lean"][0]
+    limit, columns = 0.05 / 6.0, cause_tests.cause_columns(result)["tower_lean"][0]
     ratio = np.sqrt(7.0 / 24.0)
     assert answers["tower_lean"].p < limit < max(slow_p(result, columns, ratio, k) for k in range(19))
     assert answers["tower_lean"].verdict == "not decidable (rests on one reading)"
@@ -190,7 +190,7 @@ def test_a_cause_that_passes_by_one_reading_is_not_found(name):
 def test_columns_of_causes_are_finite_differences(printer):
     result = printer_fit.fit_printer(printer, STEP)
     saved = replace(result, fit=replace(result.fit, deviations=np.zeros_like(result.fit.deviations)))
-    found, step = printer_evidence.cause_columns(saved), 1e-5
+    found, step = cause_tests.cause_columns(saved), 1e-5
     # a tower that leans outwards rises less
     leans = [step * np.eye(6)[k].reshape(2, 3).T * (-1.0 if k < 3 else 1.0) for k in range(6)]
     planted = {
@@ -238,7 +238,7 @@ def test_what_is_said_to_be_detectable_passes_nine_times_of_ten(name):
             distance_mm=noise.distance_mm + size_mm * effect[7:],
         )
         seen = evidence_of(planted)
-        passed.append((seen.reading_p().min() if name == "bad_reading" else seen.p(name)) < limit)
+        passed.append((seen.p("bad_reading").min() if name == "bad_reading" else seen.p(name)) < limit)
     assert abs(np.mean(passed) - 0.9) < 4.0 * np.sqrt(0.9 * 0.1 / 200.0)
 
 

@@ -31,8 +31,8 @@ def test_every_fitted_printer_has_a_row_with_its_numbers():
         np.testing.assert_array_equal(values, chosen["largest_difference"])
         np.testing.assert_array_equal(rows, chosen.index)
     for axes, label, column in (
-        (panels[1], "heights, ours", "height_rms_here_mm"),
-        (panels[1], "distances, saved", "distance_rms_there_mm"),
+        (panels[1], "heights, ours", "height_rms_fitted_mm"),
+        (panels[1], "distances, saved", "distance_rms_saved_mm"),
         (panels[2], "an arm, with distances", "arm_standard_error_mm"),
         (panels[2], "all arms, heights alone", "common_arm_standard_error_mm"),
         (panels[2], "all arms, 100 heights", "dense_common_arm_standard_error_mm"),

@@ -7,7 +7,7 @@ import pytest
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
-from rrru.studies.printers import printer_fit, printer_tables
+from rrru.studies.printers import firmware, printer_fit, printer_tables, saved_answers
 from tests.schemas import check
 from tests.studies.printers.simulated_printers import (
     DISTANCES,
@@ -29,13 +29,13 @@ def test_the_answer_is_that_of_another_refit_and_belongs_where_the_file_is_consi
     """
     result = printer_fit.fit_printer(PRINTERS[name], STEP)
     other = ENTRIES[name]["refit_max_difference"]
-    assert np.abs(result.there - result.here).max() == pytest.approx(other, rel=0.01, abs=3e-6)
-    assert (printer_fit.reason(result) == "") == (other < 5e-4)
+    assert np.abs(result.saved - result.fitted).max() == pytest.approx(other, rel=0.01, abs=3e-6)
+    assert (saved_answers.reason(result) == "") == (other < 5e-4)
     assert result.fit.identifiability.rank == len(result.names) == (9 if ENTRIES[name]["distances"] else 6)
 
 
 def test_why_an_answer_does_not_belong():
-    reasons = {name: printer_fit.reason(printer_fit.fit_printer(printer, STEP)) for name, printer in PRINTERS.items()}
+    reasons = {name: saved_answers.reason(printer_fit.fit_printer(printer, STEP)) for name, printer in PRINTERS.items()}
     foreign = {name: text for name, text in reasons.items() if text}
     words = {
         "printer_04": "overwritten after the calibration: endstop_a, endstop_b, endstop_c;",
@@ -65,7 +65,7 @@ def test_why_an_answer_does_not_belong():
 )
 def test_what_an_owner_changed_afterwards_is_named(change, words):
     try:
-        found = printer_fit.reason(printer_fit.fit_printer(change(HEIGHTS), STEP))
+        found = saved_answers.reason(printer_fit.fit_printer(change(HEIGHTS), STEP))
     except FitError as error:
         # with wrong steps there may be no answer at all
         found = str(error)
@@ -77,7 +77,7 @@ def test_a_reading_that_was_changed_afterwards_is_named_with_what_it_was(printer
     heights, distances = printer.height_mm.copy(), printer.distance_mm.copy()
     kind, at = (heights, number) if number < 7 else (distances, number - 7)
     before, kind[at] = kind[at], kind[at] + 0.4
-    found = printer_fit.reason(
+    found = saved_answers.reason(
         printer_fit.fit_printer(replace(printer, height_mm=heights, distance_mm=distances), STEP)
     )
     assert f"{'height' if number < 7 else 'distance'} {at + 1} being {before:.3f} mm" in found
@@ -98,7 +98,7 @@ def test_a_known_truth_is_recovered(printer):
         *(zeros - np.sqrt(arms**2 - radius**2)),
         *arms,
     ]
-    np.testing.assert_allclose(result.here, expected[: len(result.names)], atol=1e-6)
+    np.testing.assert_allclose(result.fitted, expected[: len(result.names)], atol=1e-6)
 
 
 @pytest.mark.parametrize("printer", [HEIGHTS, DISTANCES], ids=["heights", "distances"])
@@ -110,9 +110,9 @@ def test_standard_errors_and_intervals_are_those_of_repeated_measurements(printe
     truth = printer_fit.fit_printer(simulated(printer, np.zeros(9)), STEP)
     for _ in range(300):
         result = printer_fit.fit_printer(simulated(printer, np.zeros(9), NOISE_MM, generator), STEP)
-        draws.append(result.here)
-        inside.append(np.abs(result.here - truth.here) < result.half_widths)
-    slope = printer_fit.own_numbers(truth.residuals.mechanism, truth.fit.deviations)[1]
+        draws.append(result.fitted)
+        inside.append(np.abs(result.fitted - truth.fitted) < result.half_widths)
+    slope = firmware.own_numbers(truth.residuals.mechanism, truth.fit.deviations)[1]
     expected = np.sqrt(np.diag(slope @ truth.fit.identifiability.covariance(NOISE_MM) @ slope.T))
     # four standard deviations of a standard deviation, and of a share, from 300 draws
     np.testing.assert_allclose(np.std(draws, axis=0), expected, rtol=4.0 / np.sqrt(600.0))
@@ -125,7 +125,7 @@ def test_heights_alone_hardly_see_the_scale():
     """
     result = printer_fit.fit_printer(simulated(HEIGHTS, np.zeros(9), NOISE_MM, np.random.default_rng(3)), STEP)
     exact = simulated(HEIGHTS, np.zeros(9))
-    longer = least_squares(printer_fit.residuals_of(replace(exact, arm_mm=exact.arm_mm + 1.0)))
+    longer = least_squares(firmware.residuals_of(replace(exact, arm_mm=exact.arm_mm + 1.0)))
     left_mm = np.linalg.norm(longer.residual_mm)
     assert left_mm < NOISE_MM
     assert printer_fit.common_arm_error(result) == pytest.approx(result.fit.noise_mm / left_mm, rel=0.02)
@@ -142,9 +142,7 @@ def test_heights_in_great_number_hardly_see_the_scale_either():
     inside = square[np.linalg.norm(square, axis=1) < reach][:count]
     places = np.column_stack([inside, np.full(count, HEIGHTS.height_mm.mean())])
     disc = replace(HEIGHTS, height_mm=places[:, 2], height_drop_mm=-robot.inverse(places))
-    left_mm = np.linalg.norm(
-        least_squares(printer_fit.residuals_of(replace(disc, arm_mm=disc.arm_mm + 1.0))).residual_mm
-    )
+    left_mm = np.linalg.norm(least_squares(firmware.residuals_of(replace(disc, arm_mm=disc.arm_mm + 1.0))).residual_mm)
     error = printer_fit.dense_arm_error(result)
     assert error == pytest.approx(result.fit.noise_mm / left_mm * np.sqrt(count / 100.0), rel=0.1)
     assert 10.0 * result.fit.noise_mm < error < printer_fit.common_arm_error(result)
@@ -182,8 +180,8 @@ def test_tables_fit_their_schemas_and_a_printer_without_an_answer_keeps_its_row(
         and (causes.loc["tower_lean", "detectable_mm"] > 0.0).all()
     )
     entry = ENTRIES["printer_22"]
-    assert printers.loc["printer_22", "height_rms_there_mm"] == pytest.approx(entry["program_height_rms_mm"])
-    assert printers.loc["printer_22", "distance_rms_there_mm"] == pytest.approx(entry["program_distance_rms_mm"])
+    assert printers.loc["printer_22", "height_rms_saved_mm"] == pytest.approx(entry["program_height_rms_mm"])
+    assert printers.loc["printer_22", "distance_rms_saved_mm"] == pytest.approx(entry["program_distance_rms_mm"])
 
 
 def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():

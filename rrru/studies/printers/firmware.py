@@ -1,0 +1,50 @@
+"""The numbers that a printer's firmware calibrates: radius, angles of towers a and b, endstops, with distances the arms.
+
+The angle of tower c is the gauge: the base turns freely. The firmware minimises the sum of squares over these numbers
+and stops where steps of a size that it states no longer help any of them. Where that stop can lie is known without
+knowing its path: with the Hessian H of the cost in these numbers, each of which is within the step s of its best value,
+
+    |saved - best|_i <= s sum_j |H^-1|_ij H_jj
+
+A saved number beyond this was not found from these readings.
+"""
+
+import numpy as np
+
+from rrru.studies.printers.heights import HeightResiduals
+
+NAMES = ("radius", "angle_a", "angle_b", "endstop_a", "endstop_b", "endstop_c", "arm_a", "arm_b", "arm_c")
+UNITS = ("mm", "deg", "deg", *("mm",) * 6)
+# the firmware's weights: all squared heights together count twice as much as all squared distances
+_HEIGHTS_COUNT = 2.0
+
+
+def residuals_of(printer, parameter_set=None):
+    """Residuals of a printer's readings with the firmware's weights; by default of the parameters they calibrate."""
+    heights, distances = len(printer.height_mm), len(printer.distance_mm)
+    weight = _HEIGHTS_COUNT * distances / heights if distances else 1.0
+    ways = -printer.height_drop_mm, printer.height_mm, -printer.distance_drop_mm, printer.distance_mm
+    return HeightResiduals(printer.mechanism(parameter_set), *ways, weight)
+
+
+def own_numbers(mechanism, deviations):
+    """A printer's own numbers (p,), NAMES in UNITS, under deviations (p,), and their derivative (p, p) by these."""
+    legs = mechanism.legs(deviations)
+    arm, radius = legs[:, 1], legs[0, 2]
+    root = np.sqrt(arm**2 - radius**2)
+    angle = np.degrees(np.asarray(mechanism.azimuth_rad) + legs[:, 3])
+    slope = np.diag([1.0, *np.degrees([1.0, 1.0]), *np.ones(6)])
+    slope[3:6, 0], slope[3:6, 6:] = radius / root, -np.diag(arm / root)
+    count = len(deviations)
+    return np.array([radius, *angle[:2], *(legs[:, 0] - root), *arm])[:count], slope[:count, :count]
+
+
+def own_jacobian(residuals, deviations):
+    """Derivative (n, p) of the residual by the printer's own numbers."""
+    return residuals.jacobian(deviations)[:, 0] @ np.linalg.inv(own_numbers(residuals.mechanism, deviations)[1])
+
+
+def stop(jacobian, step):
+    """How far (p,) from the best numbers a program can stop whose steps no longer help; jacobian (n, p)."""
+    hessian = jacobian.T @ jacobian
+    return step * np.abs(np.linalg.inv(hessian)) @ np.diag(hessian)
