@@ -165,8 +165,9 @@ def save(figure, pdf, png, caption=""):
     try:
         with print_style():
             # arrange once, so that both files, and every later one, have the panels at the same places
-            figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            if engine := figure.get_layout_engine():
+                engine.execute(figure)
+                figure.set_layout_engine(None)
             for kind, (path, metadata) in formats.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 figure.savefig(partial[kind], format=kind, dpi=_DPI, metadata=metadata)
