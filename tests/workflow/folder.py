@@ -1,11 +1,13 @@
 """A folder of its own to run snakemake in, which sees the project's files through links."""
 
 import contextlib
+import gc
 import hashlib
 import io
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 from tests.places import ROOT
@@ -57,12 +59,20 @@ def dry_run(folder, *targets, overlays=()):
     link(folder)
     output = io.StringIO()
     chosen = ["--configfile", *overlays] if overlays else []
-    with contextlib.chdir(folder), contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
+    code = 0
+    with contextlib.ExitStack() as stack:
+        # snakemake leaves the removal of its temporary folder to the garbage collector
+        stack.enter_context(warnings.catch_warnings())
+        warnings.simplefilter("ignore", ResourceWarning)
+        stack.enter_context(contextlib.chdir(folder))
+        stack.enter_context(contextlib.redirect_stdout(output))
+        stack.enter_context(contextlib.redirect_stderr(output))
         try:
             main(["-n", "--cores", "1", *targets, *chosen])
         except SystemExit as stopped:
-            return stopped.code, output.getvalue()
-    return 0, output.getvalue()
+            code = stopped.code
+        gc.collect()
+    return code, output.getvalue()
 
 
 def digests(folder):
