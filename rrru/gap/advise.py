@@ -12,69 +12,67 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.gap.case import make_case
-from rrru.gap.terms import spread
+from rrru.gap.terms import signatures, spread
+from rrru.gap.verdict import label
 
-_FAST_MM_S, _LOAD_KG, _MOST_TRAJECTORIES, _MOST_RIVALS = 300.0, 5.0, 4, 2
+_FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS = 300.0, 5.0, 60.0, 4, 2
 # less than this is not worth a run
 _WORTH_NATS = 1.0
 _COLUMNS = ("run", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "now_nats", "gain_nats")
+# kinds of further passes: in reverse, fast, loaded
+_KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
 
 
 def advise(attribution, verdict, masses, most=3):
-    """Rows of `gap_next_runs` without campaign and rank, best first; none where no rival answer is left that the
-    library can predict.
+    """Rows of `gap_next_runs` without campaign and rank, best first.
+
+    None where no rival answer is left that the library can predict.
     """
-    beliefs = attribution.posterior
-    favoured = beliefs.best_of(frozenset(verdict.effects))
-    rivals = [
-        frozenset(names)
-        for names, flag, _ in verdict.rivals
-        if not flag and frozenset(names) != frozenset(verdict.effects)
-    ]
+    nothing, effects = pd.DataFrame(columns=_COLUMNS), frozenset(verdict.effects)
+    favoured = attribution.posterior.best_of(effects)
+    rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
     if favoured is None or verdict.unexplained or not rivals:
-        return pd.DataFrame(columns=_COLUMNS)
-    candidates, table = _candidates(attribution.case)
+        return nothing
+    candidates, table = _candidates(attribution.case.measurements)
     if not candidates:
-        return pd.DataFrame(columns=_COLUMNS)
-    found = []
+        return nothing
+    case, result = attribution.case, []
+    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects)
     for names in rivals[:_MOST_RIVALS]:
-        other = beliefs.best_of(names)
+        other = attribution.posterior.best_of(names)
         # the answer with more effects makes the data: the smaller one could not make the larger one's
         truth, imitator = (favoured, other) if len(favoured[0].terms) >= len(other[0].terms) else (other, favoured)
-        now, gains = _worth(attribution, truth, imitator, candidates, table, masses)
-        separates = f"{'+'.join(sorted(verdict.effects)) or 'none'} / {'+'.join(sorted(names)) or 'none'}"
-        found.extend(
+        now, gains = _worth(attribution, truth, imitator, planned)
+        separates = " / ".join(label(sorted(answer), False) for answer in (effects, names))
+        result.extend(
             candidate | {"separates": separates, "now_nats": now, "gain_nats": gain}
             for candidate, gain in zip(candidates, gains, strict=True)
         )
-    result = pd.DataFrame(found).drop(columns="rows")
-    result = result[result["gain_nats"] > _WORTH_NATS].sort_values(
-        ["gain_nats", "run"], ascending=[False, True], kind="stable"
-    )
-    return result.drop_duplicates("run").head(most).reset_index(drop=True)[list(_COLUMNS)]
+    result = pd.DataFrame(result, columns=_COLUMNS)
+    result = result[result["gain_nats"] > _WORTH_NATS]
+    result = result.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
+    return result.drop_duplicates("run").head(most).reset_index(drop=True)
 
 
-def _worth(attribution, truth, imitator, candidates, table, masses):
-    """Nats between two (hypothesis, level) now and what each candidate adds."""
+def _worth(attribution, truth, imitator, planned):
+    """Nats between two (hypothesis, level) now, and what each run of the planned case adds."""
+    (hypothesis, level), (rival, rival_level) = truth, imitator
     case, evidence = attribution.case, attribution.evidence
-    keys = list(dict.fromkeys((t.effect, t.shape) for h, _ in (truth, imitator) for t in h.terms))
-    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects)
-    there = planned.linearise(attribution.calibrated, keys)
-    here = evidence.linear
-    hypothesis, level = truth
-    mean, _ = evidence.posterior(hypothesis.terms, hypothesis.strengths[level], level)
+    terms = hypothesis.terms + rival.terms
+    there = planned.linearise(attribution.calibrated, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
+    mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     size = sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)
-    made = [_columns(case.library, linear, hypothesis.terms) @ mean[:size] for linear in (here, there)]
-    rival, rival_level = imitator
-    designs = [
-        np.concatenate([linear.base, _columns(case.library, linear, rival.terms)], axis=-1) for linear in (here, there)
-    ]
+    made, designs = [], []
+    for linear in (evidence.linear, there):
+        nothing = np.zeros((*linear.data.shape, 0))
+        made.append(np.concatenate([nothing, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean[:size])
+        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
-    penalty[here.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
+    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
     now = _misfit(designs[0], made[0], penalty, case.noise_mm)
     gains = []
-    for candidate in candidates:
-        chosen = candidate["rows"][planned.used]
+    for number in np.unique(planned.measurements["run"]):
+        chosen = planned.run == number
         design = np.concatenate([designs[0], designs[1][chosen]])
         gains.append(_misfit(design, np.concatenate([made[0], made[1][chosen]]), penalty, case.noise_mm) - now)
     return now, gains
@@ -90,69 +88,39 @@ def _misfit(design, data, penalty, noise_mm):
     return float(0.5 * (target @ target - moment @ np.linalg.solve(scaled, moment)))
 
 
-def _columns(library, linear, terms):
-    """Columns (n, 3, k) of the terms' free numbers."""
-    own = [linear.columns[t.effect, t.shape] @ spread(library[t.effect].coordinates, t.legs) for t in terms]
-    return np.concatenate(own, axis=-1) if own else np.zeros((*linear.base.shape[:2], 0))
+def _candidates(frame):
+    """Candidate runs as rows of `gap_next_runs`, and their table of commands, numbered from 1.
 
-
-def _candidates(case):
-    """Candidate runs, each a mapping with its rows of a table of commands, and that table: every kind of pass along
-    some trajectories.
+    Every kind of pass along some of a measurement table's trajectories.
     """
-    frame = case.measurements
     names = pd.unique(frame["trajectory"])
     chosen = names[np.unique(np.linspace(0, len(names) - 1, _MOST_TRAJECTORIES).astype(int))]
     end = np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
-    found, frames = [], []
+    result, tables = [], []
     for name in chosen:
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
-        speed, load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
-        for reverse, fast, loaded in (
-            (False, False, False),
-            (True, False, False),
-            (False, True, False),
-            (False, False, True),
-            (True, True, True),
-        ):
-            if fast and not (np.isfinite(speed) and speed < _FAST_MM_S and np.isfinite(end)):
+        own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
+        for reverse, fast, loaded in _KINDS:
+            if fast and not (own_speed < _FAST_MM_S and np.isfinite(end)):
                 continue
-            run = _pass(
-                first, len(found) + 1, end, reverse, _FAST_MM_S if fast else speed, load + (_LOAD_KG if loaded else 0.0)
-            )
-            words = [str(name), *(["in reverse"] if reverse else []), *([f"at {_FAST_MM_S:g} mm/s"] if fast else [])]
-            if loaded:
-                words.append(f"with {load + _LOAD_KG:g} kg payload")
-            found.append(
-                {
-                    "run": " ".join(words) if len(words) > 1 else f"{name} once more",
-                    "trajectory": str(name),
-                    "reverse": reverse,
-                    "speed_mm_s": _FAST_MM_S if fast else speed,
-                    "payload_kg": load + (_LOAD_KG if loaded else 0.0),
-                    "points": len(run),
-                    "number": len(found) + 1,
-                }
-            )
-            frames.append(run)
-    table = pd.concat(frames, ignore_index=True) if frames else frame.iloc[:0]
-    for candidate in found:
-        candidate["rows"] = (table["run"] == candidate.pop("number")).to_numpy()
-    return found, table
+            speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
+            how = ["in reverse"] * reverse + [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
+            tables.append(_pass(first, len(tables) + 1, end + _REST_S, reverse, speed, load))
+            words = f"{name} {' '.join(how) or 'once more'}", str(name), reverse, speed, load, len(first)
+            result.append(dict(zip(_COLUMNS, words, strict=False)))
+    return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
 
 
-def _pass(first, number, end_s, reverse, speed_mm_s, payload_kg):
-    """Table of one more pass along the points of a run, a minute after the campaign's end."""
+def _pass(first, number, start_s, reverse, speed_mm_s, payload_kg):
+    """Table of one more pass along the points of a run."""
     run = (first.iloc[::-1] if reverse else first).reset_index(drop=True)
-    length = float(np.linalg.norm(np.diff(rows.command(run), axis=0), axis=1).sum())
     clock = first["time_s"].to_numpy(dtype=float)
-    time = clock - clock[0] if not reverse else clock[-1] - clock[::-1]
+    time = clock[-1] - clock[::-1] if reverse else clock - clock[0]
     own_speed = float(first["speed_mm_s"].iloc[0])
     if np.isfinite(own_speed) and speed_mm_s != own_speed:
         # the same profile, driven faster: the average speed over the run rises in proportion
-        time = time * own_speed / speed_mm_s if length > 0.0 else time
-    measured = {f"measured_{axis}_mm": run[f"command_{axis}_mm"] for axis in "xyz"}
-    return run.assign(
-        run=number, time_s=end_s + 60.0 + time, speed_mm_s=speed_mm_s, payload_kg=payload_kg, status="ok", **measured
-    )
+        time = time * own_speed / speed_mm_s
+    measured = rows.vector_columns("measured", rows.command(run))
+    told = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s, "payload_kg": payload_kg}
+    return run.assign(**told, status="ok", **measured)

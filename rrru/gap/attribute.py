@@ -1,17 +1,19 @@
 """Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.campaign import noise
 from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.gap.case import State
-from rrru.gap.evidence import Evidence
-from rrru.gap.noise import estimate_noise, spoilt
-from rrru.gap.posterior import posterior
+from rrru.gap.case import Case, State
+from rrru.gap.evidence import ModelEvidence
+from rrru.gap.heldout import HeldOut
+from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.unknown import UNKNOWN
@@ -19,6 +21,7 @@ from rrru.gap.unknown import UNKNOWN
 _MOST_ROUNDS, _MOST_CLEANINGS = 4, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
+_NO_COVARIANCE = np.zeros((0, 0))
 
 
 @dataclass(frozen=True)
@@ -28,24 +31,34 @@ class Attribution:
     calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the
     covariance (k, k) of its terms' coefficients; evidence: on the last linearisation, about that state; posterior over
     all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given", "repeats" or
-    "high_frequency"; dropped: number of points left out as spoilt.
+    "high_frequency"; dropped: number of points left out as outliers.
     """
 
-    case: object
+    case: Case
     calibrated: State
     state: State
     covariance: np.ndarray
-    evidence: Evidence
-    posterior: object
-    hypothesis: object
+    evidence: ModelEvidence
+    posterior: Posterior
+    hypothesis: Hypothesis
     level: int
-    noise_from: str
-    dropped: int
+    noise_from: str = "given"
+    dropped: int = 0
+
+    @cached_property
+    def held_out(self):
+        """Predictions of left-out points."""
+        return HeldOut(self.case, self.evidence)
+
+    def believing(self, beliefs):
+        """The attribution with another posterior and its best hypothesis; the state stays."""
+        hypothesis, level = beliefs.best()
+        return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
 
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    frame = case.measurements.iloc[np.flatnonzero(case.used)]
+    frame = case.points
     fit = least_squares(Residuals(case.mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame)))
     return State(fit.deviations, {})
 
@@ -57,50 +70,57 @@ def attribute(case, prior, noise_from="given"):
         calibrated = calibrate(case)
         if noise_from != "given":
             # spikes would pass for noise
-            bad = spoilt(case, case.measured_mm - case.model(calibrated), 0.0)
-            if bad.any():
-                case = case.without(bad)
+            outliers = noise.isolated(case.measured_mm - case.model(calibrated), case.run, 0.0)
+            if outliers.any():
+                case = case.without(outliers)
                 calibrated = calibrate(case)
-            noise, noise_from = estimate_noise(case, case.linearise(calibrated))
-            case = replace(case, noise_mm=noise)
-        found = _rounds(case, calibrated, prior)
-        bad = spoilt(case, case.measured_mm - case.model(found[0]), case.noise_mm)
-        if cleaning == _MOST_CLEANINGS or not bad.any():
+            case, noise_from = _with_noise(case, calibrated)
+        attribution = _rounds(case, calibrated, prior)
+        residual = case.measured_mm - case.model(attribution.state)
+        outliers = noise.isolated(residual, case.run, case.noise_mm)
+        if cleaning == _MOST_CLEANINGS or not outliers.any():
             break
-        case = case.without(bad)
-    state, covariance, evidence, beliefs, hypothesis, level = found
-    return Attribution(
-        case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, noise_from, total - len(case)
-    )
+        case = case.without(outliers)
+    return replace(attribution, noise_from=noise_from, dropped=total - len(case))
 
 
-def settle(found, effects):
-    """The attribution with its hypothesis and state those of exactly the named effects, fitted anew; the posterior
-    stays.
-    """
-    if found.hypothesis.effects == frozenset(effects):
-        return found
-    known = found.posterior.best_of(frozenset(effects))
+def with_effects(attribution, effects):
+    """The attribution with hypothesis and state of exactly the named effects, fitted anew; the posterior stays."""
+    if attribution.hypothesis.effects == frozenset(effects):
+        return attribution
+    known = attribution.posterior.best_of(frozenset(effects))
     if known is None:
-        chosen = [k for k, term in enumerate(found.hypothesis.terms) if term.effect in effects]
-        terms = tuple(found.hypothesis.terms[k] for k in chosen)
-        known = Hypothesis(terms, found.evidence.score(terms), found.hypothesis.strengths[:, chosen]), found.level
+        before = attribution.hypothesis
+        chosen = [k for k, term in enumerate(before.terms) if term.effect in effects]
+        terms = tuple(before.terms[k] for k in chosen)
+        known = Hypothesis(terms, attribution.evidence.score(terms), before.strengths[:, chosen]), attribution.level
     hypothesis, level = known
-    if not hypothesis.terms:
-        return replace(found, hypothesis=hypothesis, level=level, state=found.calibrated, covariance=np.zeros((0, 0)))
-    try:
-        state, covariance = refine(found.case, found.state, hypothesis, level)
-    except FitError:
-        # the exact sim cannot follow: only the linear one is corrected
-        return replace(found, hypothesis=hypothesis, level=level, state=found.calibrated, covariance=np.zeros((0, 0)))
-    return replace(found, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
+    state, covariance = attribution.calibrated, _NO_COVARIANCE
+    if hypothesis.terms:
+        try:
+            state, covariance = refine(attribution.case, attribution.state, hypothesis, level)
+        except FitError:
+            # the exact sim cannot follow: only the linear one is corrected
+            pass
+    return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
+
+
+def _with_noise(case, calibrated):
+    """The case with its noise estimated, and where from: from what neither calibration nor any effect can fit."""
+    linear = case.linearise(calibrated)
+    columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
+    if columns.shape[-1] > len(case):
+        # too few points to fit everything: what the calibration leaves has to do
+        columns = linear.base
+    noise_mm, source = noise.estimate(case.points, linear.data, columns)
+    return replace(case, noise_mm=noise_mm), source
 
 
 def _rounds(case, calibrated, prior):
     """Search and refinement in turn until the best hypothesis repeats itself."""
-    state, covariance, last = calibrated, np.zeros((0, 0)), None
+    state, covariance, last = calibrated, _NO_COVARIANCE, None
     linear = case.linearise(state)
-    evidence = Evidence(case.library, linear, case.run, case.noise_mm)
+    evidence = ModelEvidence(case.library, linear, case.run, case.noise_mm)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
     # linear sim or a law's shape is still to be fitted
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
@@ -108,7 +128,8 @@ def _rounds(case, calibrated, prior):
         beliefs = posterior(evidence, search(evidence), prior)
         hypothesis, level = beliefs.best()
         if not hypothesis.terms:
-            return calibrated, np.zeros((0, 0)), evidence, beliefs, hypothesis, level
+            state, covariance = calibrated, _NO_COVARIANCE
+            break
         shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
         unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
         if last == frozenset(hypothesis.terms) or (small and not shaped and unknown):
@@ -119,8 +140,8 @@ def _rounds(case, calibrated, prior):
             hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
             state, covariance = refine(case, state, hypothesis, level)
-            evidence = Evidence(case.library, case.linearise(state), case.run, case.noise_mm)
+            evidence = ModelEvidence(case.library, case.linearise(state), case.run, case.noise_mm)
         except FitError:
             # the sim cannot follow: what the last linearisation says stands
             break
-    return state, covariance, evidence, beliefs, hypothesis, level
+    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level)

@@ -1,5 +1,4 @@
-"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, and the exact
-corrected sim.
+"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, the exact sim.
 
 The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the
 best one found. Lengths in mm, angles in rad.
@@ -10,9 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs
 from rrru.effects.effect import Contribution
+from rrru.effects.motion import make_motion
 from rrru.errors import FitError
-from rrru.gap.driven_path import at_turn_back, motion_of, starts_of_runs
 from rrru.gap.unknown import UNKNOWN, unknown_functions
 from rrru.plant.closure import corrected_sim
 from rrru.robots.first_order import first_order
@@ -21,30 +21,33 @@ from rrru.robots.first_order import first_order
 _SHAPE_STEP = 0.3
 # an effect is tested where at least this share of the points has what it needs
 _ENOUGH = 0.8
+# nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
+_NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
 @dataclass(frozen=True)
 class State:
-    """A corrected sim: deviations (p,) of the mechanism, per effect (name, shape) its coordinates (c,), and shapes fitted
-    further, by name.
+    """A corrected sim: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+
+    shape_values: effect to the values of its shape's parameters where they have been fitted further.
     """
 
     deviations: np.ndarray
     effects: dict
-    shapes: dict = field(default_factory=dict)
+    shape_values: dict = field(default_factory=dict)
 
     def shape(self, library, key):
         """Values of the shape's parameters of one effect (name, shape) by name."""
         name, number = key
         listed = library[name].coordinates.shapes[number]
-        return self.shapes.get(name, listed) if key in self.effects else listed
+        return self.shape_values.get(name, listed) if key in self.effects else listed
 
-    def values(self, library):
-        """Parameter values (p,) by effect name."""
-        return {
-            key[0]: library[key[0]].coordinates.to_values(value, self.shape(library, key))
-            for key, value in self.effects.items()
-        }
+    def contribution(self, library, key, motion, coordinates=None, shape=None):
+        """What one effect (name, shape) changes along a motion, at its own coordinates and shape or other ones."""
+        coordinates = self.effects[key] if coordinates is None else coordinates
+        effect = library[key[0]]
+        values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
+        return effect.contribute(motion, values)
 
 
 @dataclass(frozen=True)
@@ -52,17 +55,17 @@ class Linear:
     """The sim linearised about a state.
 
     data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the
-    mechanism's errors; columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates; laws: effect
-    of the state to what the parameters of its shape may be wrong by, (n, 3, q), each column one standard deviation;
-    reshaped: effect to these parameters, each (name, value, stepped value); drive (n, 3 axes, 3): derivative by the
-    actuator values.
+    mechanism's deviations; columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates;
+    shape_columns: effect of the state to what its shape's parameters may be wrong by, (n, 3, q), each column one
+    standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (n, 3 axes,
+    3): derivative by the actuator values.
     """
 
     data: np.ndarray
     base: np.ndarray
     columns: dict
-    laws: dict
-    reshaped: dict
+    shape_columns: dict
+    shape_steps: dict
     drive: np.ndarray
 
 
@@ -91,6 +94,11 @@ class Case:
         return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
 
     @property
+    def points(self):
+        """The measurement table of the n used points."""
+        return self.measurements.iloc[np.flatnonzero(self.used)]
+
+    @property
     def measured_mm(self):
         """Measured positions (n, 3)."""
         return rows.measured(self.measurements)[self.used]
@@ -110,44 +118,31 @@ class Case:
         """Positions (m, 3) of the calibrated sim without effects."""
         return self.mechanism.forward(rows.actuators(self.measurements), deviations, rows.command(self.measurements))
 
-    def contribution(self, state):
-        """What the state's effects change along the motion, together."""
-        values = state.values(self.library)
-        return sum((self.library[name].contribute(self.motion, values[name]) for name in values), Contribution())
-
     def exact(self, state):
         """Positions (n, 3) of the sim corrected by a state: the exact closure with its effects."""
+        change = sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
         actuators, command = rows.actuators(self.measurements), rows.command(self.measurements)
-        return corrected_sim(self.mechanism, state.deviations, actuators, command, self.contribution(state))[self.used]
+        return corrected_sim(self.mechanism, state.deviations, actuators, command, change)[self.used]
 
     def model(self, state):
-        """Positions (n, 3) of a state's sim: the exact one where it has effects, the calibrated one where it has
-        none.
-        """
+        """Positions (n, 3) of a state's sim: exact where it has effects, the calibrated one where it has none."""
         return self.exact(state) if state.effects else self.sim(state.deviations)[self.used]
 
-    def linearise(self, state, shapes=None):
+    def linearise(self, state, keys=None):
         """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
 
-        shapes: (effect, shape) pairs to make columns for, by default all.
+        keys: (effect, shape) pairs to make columns for, by default all.
         """
-        actuators = rows.actuators(self.measurements)
-        position = self.sim(state.deviations)
+        actuators, position = rows.actuators(self.measurements), self.sim(state.deviations)
         legs = first_order(self.mechanism, position, actuators, state.deviations)
         model = self.model(state)
         lost = ~np.isfinite(model).all(axis=1) | ~np.isfinite(position[self.used]).all(axis=1)
         if lost.any():
             raise FitError(f"the sim has no pose at {int(lost.sum())} points")
-        if shapes is None:
-            shapes = [
-                (name, shape)
-                for name, effect in self.library.items()
-                for shape in range(len(effect.coordinates.shapes))
-            ]
-        columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*shapes, *state.effects))}
-        laws, reshaped = {}, {}
-        for key in state.effects:
-            laws[key[0]], reshaped[key[0]] = self._laws(legs, key, state)
+        if keys is None:
+            keys = [(name, k) for name, effect in self.library.items() for k in range(len(effect.coordinates.shapes))]
+        columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*keys, *state.effects))}
+        by_shape = {key[0]: self._by_shape(legs, key, state) for key in state.effects}
         data = self.measured_mm - model
         for key, coordinates in state.effects.items():
             data = data + columns[key] @ coordinates
@@ -155,28 +150,22 @@ class Case:
             data,
             self.mechanism.parameter_jacobian(position, actuators, state.deviations)[self.used],
             columns,
-            laws,
-            reshaped,
+            {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
+            {name: steps for name, (_, steps) in by_shape.items()},
             (legs.response[..., 0] * legs.drive[:, None, :])[self.used],
         )
 
-    def _laws(self, legs, key, state):
-        """What the shape of an effect of the state may be wrong by, (n, 3, q), and the steps of its parameters; see
-        Linear.
-        """
-        coordinates, effect = self.library[key[0]].coordinates, self.library[key[0]]
-        shape = state.shape(self.library, key)
-        leg = legs.leg_deviations(effect.contribute(self.motion, coordinates.to_values(state.effects[key], shape)))
+    def _by_shape(self, legs, key, state):
+        """`Linear.shape_columns` and `Linear.shape_steps` of one effect of the state."""
+        shape, effect = state.shape(self.library, key), self.library[key[0]]
+        leg = legs.leg_deviations(state.contribution(self.library, key, self.motion))
         columns, steps = [], []
         for name, value in shape.items():
-            high = effect.parameters[name].high
-            stepped = (
-                value * (1.0 + _SHAPE_STEP) if value * (1.0 + _SHAPE_STEP) <= high else value * (1.0 - _SHAPE_STEP)
-            )
+            stepped = value * (1.0 + _SHAPE_STEP)
+            if stepped > effect.parameters[name].high:
+                stepped = value * (1.0 - _SHAPE_STEP)
             if stepped != value:
-                other = effect.contribute(
-                    self.motion, coordinates.to_values(state.effects[key], dict(shape) | {name: stepped})
-                )
+                other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
                 columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_deviations(other) - leg)[self.used])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
@@ -184,18 +173,14 @@ class Case:
 
     def _columns(self, legs, key, state):
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
-        effect, active = self.library[key[0]], state.effects.get(key)
-        shape = state.shape(self.library, key)
-        coordinates = effect.coordinates
-        step = np.array(coordinates.typical)
-        if active is not None:
+        step = np.array(self.library[key[0]].coordinates.typical)
+        if key in state.effects:
+            active = state.effects[key]
             step = np.where(np.abs(active) > 1e-3 * step, active, step)
-        result = np.empty((len(self), 3, len(coordinates)))
-        for k in range(len(coordinates)):
-            one = np.zeros(len(coordinates))
-            one[k] = step[k]
-            values = coordinates.to_values(one, shape)
-            result[..., k] = legs.move(effect.contribute(self.motion, values))[self.used] / step[k]
+        result = np.empty((len(self), 3, len(step)))
+        for k, one in enumerate(np.diag(step)):
+            change = state.contribution(self.library, key, self.motion, one)
+            result[..., k] = legs.move(change)[self.used] / step[k]
         return result
 
 
@@ -207,13 +192,12 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     """
     if not len(measurements):
         raise FitError("the campaign has no points")
-    motion = motion_of(measurements, mechanism, masses)
+    actuators, command = rows.actuators(measurements), rows.command(measurements)
+    motion = _motion(measurements, mechanism, masses, actuators)
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
-    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_turn_back(motion, mechanism.drive_unit)
-    used &= np.isfinite(mechanism.forward(rows.actuators(measurements), guess_mm=rows.command(measurements))).all(
-        axis=1
-    )
+    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_reversals(motion, mechanism.drive_unit)
+    used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
@@ -222,10 +206,47 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
             untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
         else:
             testable[name] = effect
-            complete &= np.all(list(known.values()), axis=0) if known else True
+            complete = np.all([complete, *known.values()], axis=0)
     used &= complete
     for name, function in unknown_functions(mechanism.drive_unit).items():
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm))
+
+
+def at_reversals(motion, drive_unit):
+    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell."""
+    path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
+    for leg in range(3):
+        step = np.diff(path[:, leg])
+        reversals = np.flatnonzero(step[:-1] * step[1:] < 0.0) + 1
+        if len(reversals):
+            nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
+            close = np.abs(nearest - motion.path_index) <= STEPS
+            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[drive_unit])
+    return result
+
+
+def _motion(measurements, mechanism, masses, actuators):
+    """The motion that the effects see; at the measured points with the table's own actuator values."""
+    driven = driven_path(measurements)
+    path_drive = mechanism.inverse(driven.path_mm)
+    lost = ~np.isfinite(path_drive).all(axis=1)
+    if lost.any():
+        # what is out of reach stays where it was last
+        good = np.flatnonzero(~lost)
+        path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
+    path_drive[driven.path_index] = actuators
+    return make_motion(
+        mechanism,
+        masses,
+        driven.position_mm,
+        actuators,
+        path_drive,
+        driven.path_index,
+        driven.time_s,
+        driven.velocity_mm_s,
+        driven.acceleration_mm_s2,
+        driven.payload_kg,
+    )

@@ -4,195 +4,158 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.gap import shrink
-from rrru.gap.heldout import folds, log_score, predict
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
+from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import spread
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 
+_MOST_SETS = 20
+_LIKELY = 0.5
+_EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan, "note": ""}
 
-def details_of(found, verdict, steps, residual, further, generator, settings):
-    """Frames by table name, without the campaign."""
-    case, linear = found.case, found.case.linearise(found.calibrated)
-    exact = case.measured_mm - case.exact(found.state) if found.state.effects else None
+
+def details_of(attribution, verdict, steps, residual_mm, generator, draws):
+    """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
+    case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
+    exact = case.measured_mm - case.exact(attribution.state) if attribution.state.effects else None
     return {
-        "gap_locate": locate(case, residual, linear.drive, generator, settings.draws),
+        "gap_locate": locate(case, residual_mm, linear.drive, generator, draws),
         "gap_identifiability": identify(case, linear),
-        "gap_attribute": _attribute_rows(found, verdict),
-        "gap_sets": _set_rows(found),
-        "gap_shrink": shrink.table(case, steps, exact),
-        "gap_parameters": _parameter_rows(found),
-        "gap_next_runs": further.assign(rank=np.arange(1, len(further) + 1)),
-        "gap_points": _point_rows(
-            case,
-            rows.measured(case.measurements) - case.sim(found.calibrated.deviations),
-            steps[-1].residual_mm,
-            drive_errors(residual, linear.drive),
-        ),
+        "gap_attribute": _attribute_rows(attribution),
+        "gap_sets": _set_rows(attribution),
+        "gap_shrink": shrink_table(case, steps, exact),
+        "gap_parameters": _parameter_rows(attribution),
+        "gap_points": _point_rows(attribution, steps[-1].residual_mm, drive_errors(residual_mm, linear.drive)),
     }
 
 
-def _attribute_rows(found, verdict):
+def _attribute_rows(attribution):
     """Rows of `gap_attribute`: every effect of the library, none and unexplained."""
-    beliefs, evidence, case = found.posterior, found.evidence, found.case
-    none = evidence.none.max()
-    fold = folds(case)
-    alone = log_score(predict(case, evidence, (), [], 0, fold), case)
-    result = []
-    for name in case.effects:
-        holding = [h for h in beliefs.hypotheses if name in h.effects]
-        best = max(holding, key=lambda h: h.evidence.max(), default=None)
-        legs = beliefs.legs(name)
-        gain, error = np.nan, np.nan
-        alone_best = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
-        if alone_best:
-            hypothesis, level = alone_best, int(alone_best.evidence.argmax())
-            gained = (
-                log_score(predict(case, evidence, hypothesis.terms, hypothesis.strengths[level], level, fold), case)
-                - alone
-            )
-            by_fold = np.array([gained[fold == k].sum() for k in np.unique(fold)])
-            gain, error = (
-                float(by_fold.sum()),
-                float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1)) if len(by_fold) > 1 else np.nan,
-            )
-        result.append(
-            {
-                "effect": name,
-                "probability": beliefs.marginal(name),
-                "legs": str(max(legs, key=legs.get)) if legs else "",
-                "log_evidence": float(best.evidence.max() - none) if best else np.nan,
-                "heldout_gain": gain,
-                "heldout_gain_se": error,
-                "note": "" if best else "far less probable than others",
-            }
-        )
-    empty = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan}
+    beliefs, case = attribution.posterior, attribution.case
+    alone = attribution.held_out.predict((), [], 0).log_score
+    result = [_effect_row(attribution, name, alone) for name in case.effects]
     result += [
-        {"effect": name, "probability": 0.0, **empty, "note": f"not tested: {note}"}
+        {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
     ]
-    sets = beliefs.sets()
-    result.append({"effect": "none", "probability": sets.get((frozenset(), False), 0.0), **empty, "note": ""})
-    unknown = sum(p for (_, flag), p in sets.items() if flag)
-    result.append(
-        {
-            "effect": "unexplained",
-            "probability": unknown,
-            **empty,
-            "note": _looks_like(beliefs) if unknown > 0.5 else "",
-        }
-    )
+    none, unknown = beliefs.sets().get((frozenset(), False), 0.0), beliefs.probability_unexplained
+    note = _looks_like(beliefs) if unknown > _LIKELY else ""
+    result.append({"effect": "none", "probability": none, **_EMPTY})
+    result.append({"effect": "unexplained", "probability": unknown, **_EMPTY, "note": note})
     return pd.DataFrame(result)
+
+
+def _effect_row(attribution, name, alone):
+    """The row of one testable effect; alone (n,): log predictive score of the calibration alone."""
+    beliefs = attribution.posterior
+    row = {"effect": name, "probability": beliefs.marginal(name), **_EMPTY}
+    holding = [h for h in beliefs.hypotheses if name in h.effects]
+    if not holding:
+        return row | {"note": "far less probable than others"}
+    best = max(holding, key=lambda h: h.evidence.max())
+    row["log_evidence"] = float(best.evidence.max() - attribution.evidence.none.max())
+    if legs := beliefs.legs(name):
+        row["legs"] = str(max(legs, key=legs.get))
+    single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
+    if single:
+        level, held_out = int(single.evidence.argmax()), attribution.held_out
+        gained = held_out.predict(single.terms, single.strengths[level], level).log_score - alone
+        by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
+        row["heldout_gain"] = float(by_fold.sum())
+        if len(by_fold) > 1:
+            row["heldout_gain_se"] = float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
+    return row
 
 
 def _looks_like(beliefs):
     """What the unexplained part follows, where one of the unknown functions is likely."""
     likely = {name: beliefs.marginal(name) for name in UNKNOWN}
     best = max(likely, key=likely.get)
-    return (
-        f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})"
-        if likely[best] > 0.5
-        else "follows no smooth function tried"
-    )
+    if likely[best] > _LIKELY:
+        return f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})"
+    return "follows no smooth function tried"
 
 
-def _set_rows(found, most=20):
+def _set_rows(attribution):
     """Rows of `gap_sets`: the most probable sets."""
-    result = []
-    for rank, ((effects, flag), p) in enumerate(list(found.posterior.sets().items())[:most], start=1):
-        hypothesis, _ = found.posterior.best_of(effects, flag)
-        legs = ", ".join(f"{term.effect}: {term.legs}" for term in hypothesis.terms)
-        gained = float(hypothesis.evidence.max() - found.evidence.none.max())
-        names = label(tuple(sorted(effects)), flag)
-        result.append(
-            {
-                "rank": rank,
-                "effects": names,
-                "legs": legs,
-                "unexplained": flag,
-                "probability": p,
-                "log_evidence": gained,
-            }
-        )
+    result, none = [], attribution.evidence.none.max()
+    sets = list(attribution.posterior.sets().items())[:_MOST_SETS]
+    for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
+        hypothesis, _ = attribution.posterior.best_of(effects, unexplained)
+        row = {
+            "rank": rank,
+            "effects": label(tuple(sorted(effects)), unexplained),
+            "legs": ", ".join(f"{term.effect}: {term.legs}" for term in hypothesis.terms),
+            "unexplained": unexplained,
+            "probability": probability,
+            "log_evidence": float(hypothesis.evidence.max() - none),
+        }
+        result.append(row)
     return pd.DataFrame(result)
 
 
-def _parameter_rows(found):
-    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors by their change
-    with the coordinates.
-    """
-    columns = ("effect", "parameter", "unit", "value", "standard_error", "at_bound")
-    result, start, library = [], 0, found.case.library
-    for parameter, value in zip(found.case.mechanism.parameters, found.state.deviations, strict=True):
-        result.append(
-            dict(zip(columns, ("calibration", parameter.name, parameter.unit, value, np.nan, False), strict=True))
-        )
-    for term in found.hypothesis.terms:
+def _parameter_rows(attribution):
+    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors."""
+    parameters, state = attribution.case.mechanism.parameters, attribution.state
+    result = [
+        ("calibration", parameter.name, parameter.unit, value, np.nan, False)
+        for parameter, value in zip(parameters, state.deviations, strict=True)
+    ]
+    start, library = 0, attribution.case.library
+    for term in attribution.hypothesis.terms:
         key, effect = (term.effect, term.shape), library[term.effect]
-        if key not in found.state.effects:
+        if key not in state.effects:
             break
-        shape, coordinates = found.state.shape(library, key), found.state.effects[key]
-        values = effect.coordinates.to_values(coordinates, shape)
+        shape, coordinates = state.shape(library, key), state.effects[key]
         matrix = spread(effect.coordinates, term.legs)
-        covariance = (
-            matrix @ found.covariance[start : start + matrix.shape[1], start : start + matrix.shape[1]] @ matrix.T
-        )
-        start += matrix.shape[1]
-        errors = np.sqrt(
-            np.maximum(
-                np.diag(_slope(effect, coordinates, shape) @ covariance @ _slope(effect, coordinates, shape).T), 0.0
-            )
-        )
-        bound = effect.parameters.at_bound(values)
-        for k, parameter in enumerate(effect.parameters):
-            fitted = bool(errors[k] > 0.0)
-            result.append(
-                dict(
-                    zip(
-                        columns,
-                        (
-                            term.effect,
-                            parameter.name,
-                            parameter.unit,
-                            values[k],
-                            errors[k] if fitted else np.nan,
-                            fitted and bool(bound[k]),
-                        ),
-                        strict=True,
-                    )
-                )
-            )
-    return pd.DataFrame(result, columns=columns)
+        own = slice(start, start + matrix.shape[1])
+        start = own.stop
+        slope = _slope(effect, coordinates, shape)
+        covariance = slope @ (matrix @ attribution.covariance[own, own] @ matrix.T) @ slope.T
+        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        values = effect.coordinates.to_values(coordinates, shape)
+        bound = effect.parameters.at_bound(values) & (errors > 0.0)
+        errors = np.where(errors > 0.0, errors, np.nan)
+        result += [
+            (term.effect, parameter.name, parameter.unit, *numbers)
+            for parameter, *numbers in zip(effect.parameters, values, errors, bound.tolist(), strict=True)
+        ]
+    return pd.DataFrame(result, columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"))
 
 
 def _slope(effect, coordinates, shape):
     """Derivative (p, c) of an effect's parameter values by its coordinates."""
-    steps = 1e-4 * np.asarray(effect.coordinates.typical)
     columns = []
-    for k, step in enumerate(steps):
-        shift = np.zeros(len(steps))
-        shift[k] = step
-        difference = effect.coordinates.to_values(coordinates + shift, shape) - effect.coordinates.to_values(
-            coordinates - shift, shape
-        )
-        columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / (2.0 * step))
+    for shift in np.diag(1e-4 * np.asarray(effect.coordinates.typical)):
+        ends = (effect.coordinates.to_values(coordinates + sign * shift, shape) for sign in (1.0, -1.0))
+        difference = next(ends) - next(ends)
+        # a phase may have gone once round
+        columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / (2.0 * shift.sum()))
     return np.stack(columns, axis=-1)
 
 
-def _point_rows(case, before, after, drive):
-    """Rows of `gap_points`: residuals before (m, 3), after and as drive errors (n, 3) of the used points."""
+def _point_rows(attribution, after, drive):
+    """Rows of `gap_points`; after, drive (n, 3): residuals of the corrected sim and errors of the drives."""
+    case = attribution.case
     frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
-    position = rows.command(case.measurements)
-    result = frame.assign(**{f"command_{axis}_mm": position[:, k] for k, axis in enumerate("xyz")})
-    result = result.assign(**{f"before_{axis}_mm": before[:, k] for k, axis in enumerate("xyz")})
-    unit = case.mechanism.drive_unit
-    other = "mm" if unit == "rad" else "rad"
-    drives = (("drive_error{}_" + unit, drive, "123"), ("drive_error{}_" + other, np.nan, "123"))
-    for stem, values, suffix in (("after_{}_mm", after, "xyz"), *drives):
-        full = np.full(position.shape, np.nan)
-        full[case.used] = values
-        result = result.assign(**{stem.format(end): full[:, k] for k, end in enumerate(suffix)})
-    return result.assign(used=case.used)
+    before = rows.measured(case.measurements) - case.sim(attribution.calibrated.deviations)
+    own, other = ("rad", "mm") if case.mechanism.drive_unit == "rad" else ("mm", "rad")
+    after, drive = (_at(case.used, values) for values in (after, drive))
+    unknown = np.full_like(before, np.nan)
+    return frame.assign(
+        **rows.vector_columns("command", rows.command(case.measurements)),
+        **rows.vector_columns("before", before),
+        **rows.vector_columns("after", after),
+        **{f"drive_error{k}_{own}": drive[:, k - 1] for k in (1, 2, 3)},
+        **{f"drive_error{k}_{other}": unknown[:, k - 1] for k in (1, 2, 3)},
+        used=case.used,
+    )
+
+
+def _at(used, values):
+    """Values (m, 3) at all points from those (n, 3) of the used ones, NaN at the others."""
+    result = np.full((len(used), 3), np.nan)
+    result[used] = values
+    return result

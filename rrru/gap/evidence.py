@@ -1,32 +1,32 @@
-"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models with
-a discrepancy.
+"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models.
 
 Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   e ~ N(0, sigma^2),   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with the calibration's errors b (flat prior), the effects' coefficients c, and a discrepancy w for whatever the library
-does not hold: K is diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth along the
-path, plus a small part that is not (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so
-that `strength` is the rms of the effect's part of the gap per axis over sigma, the calibration's share taken out;
-positive coefficients have the positive half of their prior. Strengths are averaged over a grid, even in their
+with the calibration's deviations b (flat prior), the effects' coefficients c, and a discrepancy w for whatever the
+library does not hold: K is diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth
+along the path, plus a small part that is not (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is
+scaled so that `strength` is the rms of the effect's part of the gap per axis over sigma, the calibration's share taken
+out; positive coefficients have the positive half of their prior. Strengths are averaged over a grid, even in their
 logarithm; none makes a coefficient's prior wider than the largest size that its law allows.
 
-The parameters of a law's shape, such as a time constant, may be off the grid on which they were tried: each has a
-coefficient N(0, 1) on `Linear.laws`.
+A law's shape parameters, such as a time constant, may be off the grid on which they were tried: each has a coefficient
+N(0, 1) on `Linear.shape_columns`.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import dct
+from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
-from scipy.special import logsumexp
 
+from rrru.campaign.noise import along_runs
 from rrru.gap import evidence_kernels as kernels
-from rrru.gap.terms import spread
+from rrru.gap.terms import EACH, SAME, per_leg, spread
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
@@ -36,24 +36,44 @@ _HALF_WAVES, _WHITE = 3.0, 0.01
 _LEAST_VISIBLE = 1e-9
 
 
-def along_runs(values, run):
-    """Cosine transform of (n, ...) along each run, orthonormal, and the half-wave number (n,) of each row; run (n,)."""
-    result, wave = np.empty_like(values), np.empty(len(run))
-    for label in np.unique(run):
-        rows = np.flatnonzero(run == label)
-        result[rows] = dct(values[rows], axis=0, norm="ortho")
-        wave[rows] = np.arange(len(rows))
-    return result, wave
-
-
 def spectrum(wave):
-    """Variance (n,) of the discrepancy by half-wave number, 1 on average."""
+    """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
     density = 1.0 / (1.0 + (wave / _HALF_WAVES) ** 2) + _WHITE
     return density / density.mean()
 
 
+class _Prior(NamedTuple):
+    """Prior of k coefficients: their columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
+
+    index: np.ndarray
+    size: np.ndarray
+    largest: np.ndarray
+    positive: np.ndarray
+
+
 @dataclass(frozen=True)
-class Evidence:
+class Projected:
+    """Least squares of k coefficients with their priors, the calibration taken out.
+
+    Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels, k);
+    size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody.
+    """
+
+    gram: np.ndarray
+    moment: np.ndarray
+    size: np.ndarray
+    largest: np.ndarray
+    positive: np.ndarray
+    owner: np.ndarray
+
+    def scale(self, strengths):
+        """Prior standard deviations (m, k) at strengths (m, terms)."""
+        each = np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
+        return np.minimum(each[:, self.owner] * self.size, self.largest)
+
+
+@dataclass(frozen=True)
+class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
     library: effects by name; linear: `rrru.gap.case.Linear`; run (n,); noise_mm per axis.
@@ -68,168 +88,162 @@ class Evidence:
         return len(self.run)
 
     @cached_property
-    def _offsets(self):
-        """First column of each (effect, shape), and of each ("law", effect), among all columns but the
-        calibration's.
-        """
-        sizes = [columns.shape[-1] for columns in self._blocks.values()]
-        return dict(zip(self._blocks, np.cumsum([0, *sizes[:-1]]), strict=True))
+    def _layout(self):
+        """Numbers of all columns but the calibration's by (effect, shape, "each" or "same") and effect.
 
-    @property
-    def _blocks(self):
-        """All columns but the calibration's by key."""
-        return self.linear.columns | {("law", name): columns for name, columns in self.linear.laws.items()}
+        With the matrix (K, k) that makes them, those of one value on all legs being sums, of the linearisation's.
+        """
+        linear = self.linear
+        blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
+        blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
+        ends = np.cumsum([0, *(size for _, size in blocks)])
+        numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
+        every, made = np.eye(ends[-1]), [np.eye(ends[-1])]
+        for name, shape in linear.columns:
+            if per_leg(self.library[name]):
+                sums = every[:, numbers[name, shape, EACH]] @ spread(self.library[name].coordinates, SAME)
+                numbers[name, shape, SAME] = sum(map(np.size, made)) // len(every) + np.arange(sums.shape[1])
+                made.append(sums)
+        return numbers, np.concatenate(made, axis=1)
 
     @cached_property
     def _grams(self):
-        """Gram matrices (levels, K, K) of the whitened effects' columns and the data, the calibration projected out,
-        constants (levels,), and the Gram matrix (K, K) of the same columns with the calibration's part, without
-        discrepancy.
+        """Gram matrices (levels, k, k) of the whitened columns, their moments (levels, k) with the data, constants.
+
+        The calibration is projected out; of the last matrix (k, k), without discrepancy, it is not.
         """
-        linear = self.linear
+        linear, (_, join) = self.linear, self._layout
         p = linear.base.shape[-1]
-        together = np.concatenate([linear.base, *self._blocks.values(), linear.data[..., None]], axis=-1)
-        turned, wave = along_runs(together.reshape(len(self), -1), self.run)
-        turned, shape = turned.reshape(together.shape), spectrum(wave)
+        blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
+        together = np.concatenate(blocks, axis=-1)
+        cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
+        cosines, shape = cosines.reshape(together.shape), spectrum(wave)
+        join = block_diag(join, 1.0)
         grams, constants = [], []
-        whole = (together[..., p:] / self.noise_mm).reshape(-1, together.shape[-1] - p)
         for level in LEVELS:
             variance = 1.0 + level**2 * shape
-            white = (turned / (self.noise_mm * np.sqrt(variance))[:, None, None]).reshape(-1, together.shape[-1])
+            white = (cosines / (self.noise_mm * np.sqrt(variance))[:, None, None]).reshape(-1, together.shape[-1])
             basis, triangle = np.linalg.qr(white[:, :p])
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
-            grams.append(rest.T @ rest)
-            constants.append(
-                -1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * grams[-1][-1, -1]
-            )
-        return np.array(grams), np.array(constants), whole.T @ whole
+            gram = rest.T @ rest
+            grams.append(join.T @ gram @ join)
+            constants.append(-1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1])
+        grams, whole = np.array(grams), (together[..., p:] / self.noise_mm).reshape(-1, together.shape[-1] - p)
+        whole = join.T @ (whole.T @ whole) @ join
+        return grams[:, :-1, :-1], grams[:, :-1, -1], np.array(constants), whole[:-1, :-1]
 
     @property
     def none(self):
         """Log evidence (levels,) of no effect at all."""
-        return self._grams[1]
+        return self._grams[2]
 
-    def projected(self, terms):
-        """What a set of terms needs: Gram (levels, k, k), moment (levels, k), prior size (k,), largest size (k,),
-        positive (k,), owner (k,) of each coefficient; the coefficients of the terms come first, those of their shapes,
-        owned by nobody, last.
-        """
-        maps, index, sizes, largest, positive, owner = [], [], [], [], [], []
-        for number, term in enumerate(terms):
-            coordinates = self.library[term.effect].coordinates
+    @cached_property
+    def _priors(self):
+        """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
+        return {
+            name: _Prior(
+                self._layout[0][name],
+                np.ones(columns.shape[-1]),
+                np.full(columns.shape[-1], np.inf),
+                np.zeros(columns.shape[-1], dtype=bool),
+            )
+            for name, columns in self.linear.shape_columns.items()
+        }
+
+    def _prior(self, term):
+        """The prior of one term's coefficients."""
+        if term not in self._priors:
+            coordinates, (grams, _, _, whole) = self.library[term.effect].coordinates, self._grams
             matrix = spread(coordinates, term.legs)
-            maps.append(matrix)
-            index.append(self._offsets[term.effect, term.shape] + np.arange(len(coordinates)))
-            sizes.append(matrix.T @ coordinates.typical / matrix.sum(axis=0))
-            each = np.broadcast_to(coordinates.most, len(coordinates))
-            largest.append(np.array([each[column > 0.0].max() for column in matrix.T]))
-            positive.append(matrix.T @ coordinates.positive > 0)
-            owner.append(np.full(matrix.shape[1], number))
-        for term in terms:
-            if term.effect in self.linear.laws:
-                count = self.linear.laws[term.effect].shape[-1]
-                maps.append(np.eye(count))
-                index.append(self._offsets["law", term.effect] + np.arange(count))
-                sizes.append(np.ones(count))
-                largest.append(np.full(count, np.inf))
-                positive.append(np.zeros(count, dtype=bool))
-                owner.append(np.full(count, len(terms)))
-        index = np.concatenate(index)
-        k = sum(matrix.shape[1] for matrix in maps)
-        join, row, column = np.zeros((len(index), k)), 0, 0
-        for matrix in maps:
-            join[row : row + matrix.shape[0], column : column + matrix.shape[1]] = matrix
-            row, column = row + matrix.shape[0], column + matrix.shape[1]
-        grams, _, whole = self._grams
-        gram = join.T @ grams[:, index[:, None], index] @ join
-        raw = join.T @ whole[index[:, None], index] @ join
-        moment = grams[:, index, -1] @ join
-        size, owner = np.concatenate(sizes), np.concatenate(owner)
-        for number in range(len(terms)):
-            own = owner == number
-            power, total = ((np.diag(g)[own] * size[own] ** 2).sum() / (3.0 * len(self)) for g in (gram[0], raw))
-            # of what the calibration takes up, rounding is all that is left: it must not be blown up to the size of an
-            # effect
-            size[own] /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
-        return gram, moment, size, np.concatenate(largest), np.concatenate(positive), owner
+            index = self._layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
+            index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
+            size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
+            power, total = (
+                (gram[index, index] * size**2).sum() / (3.0 * len(self)) for gram in (grams[0], whole)
+            )
+            # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
+            size /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
+            most = np.broadcast_to(coordinates.most, len(coordinates))
+            largest = np.array([most[column > 0.0].max() for column in matrix.T])
+            self._priors[term] = _Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
+        return self._priors[term]
+
+    def projected(self, terms, levels=slice(None)):
+        """The projected problem of a set of terms at discrepancy levels (indices)."""
+        priors = [self._prior(term) for term in terms]
+        priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
+        owner = np.repeat(np.minimum(np.arange(len(priors)), len(terms)), [len(prior.index) for prior in priors])
+        index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
+        grams, moments, *_ = self._grams
+        return Projected(grams[levels][:, index[:, None], index], moments[levels][:, index], *rest, owner)
 
     def over_strengths(self, terms, strengths=None, levels=slice(None)):
-        """Log evidence (levels, combinations) over every combination of the terms' strengths, and the combinations (m,
-        terms).
+        """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
 
         strengths: grids, one per term, by default STRENGTHS for each.
         """
-        gram, moment, size, largest, positive, owner = self.projected(terms)
+        problem = self.projected(terms, levels)
         combinations = np.array(list(product(*(strengths or (STRENGTHS,) * len(terms)))))
-        scale = np.minimum(_with_laws(combinations)[:, owner] * size, largest)
-        gained = kernels.log_evidence(
-            np.ascontiguousarray(gram[levels]),
-            np.ascontiguousarray(moment[levels]),
-            np.ascontiguousarray(scale),
-            positive,
-        )
-        return self.none[levels, None] + gained, combinations
+        scale = np.ascontiguousarray(problem.scale(combinations))
+        gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
+        return self.none[levels, None] + kernels.log_evidence(gram, moment, scale, problem.positive), combinations
 
     def score(self, terms, strengths=None, levels=slice(None)):
         """Log evidence (levels,) of a set of terms, averaged over their strengths."""
         if not terms:
             return self.none[levels]
-        value, _ = self.over_strengths(terms, strengths, levels)
-        return averaged(value, len(terms))
+        return averaged(self.over_strengths(terms, strengths, levels)[0], len(terms))
 
     def scales(self, terms, strengths):
         """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
         if not terms:
             return np.zeros(0)
-        _, _, size, largest, _, owner = self.projected(terms)
-        own = owner < len(terms)
-        return np.minimum(np.asarray(strengths)[owner[own]] * size[own], largest[own])
+        problem = self.projected(terms, [0])
+        return problem.scale(np.asarray(strengths)[None])[0, problem.owner < len(terms)]
 
     def explained(self, hypothesis):
-        """Rms per axis, over sigma, of what a hypothesis explains at its best level and strengths, the calibration's
-        share taken out.
-        """
+        """Rms per axis, over sigma, of what a hypothesis explains at its best, the calibration's share taken out."""
         if not hypothesis.terms:
             return 0.0
         level = int(hypothesis.evidence.argmax())
-        mean, _ = self.posterior(hypothesis.terms, hypothesis.strengths[level], level)
-        gram = self.projected(hypothesis.terms)[0][0]
+        mean, _ = self.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+        gram = self.projected(hypothesis.terms, [0]).gram[0]
         return float(np.sqrt(max(mean @ gram @ mean, 0.0) / (3.0 * len(self))))
 
-    def posterior(self, terms, strengths, level):
-        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at given strengths and discrepancy
-        level (an index).
+    def coefficients(self, terms, strengths, level):
+        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).
 
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
-        gram, moment, size, largest, positive, owner = self.projected(terms)
-        scale = np.minimum(_with_laws(np.asarray(strengths)[None])[0, owner] * size, largest)
-        precision = gram[level] + np.diag(scale**-2.0)
+        problem = self.projected(terms, [level])
+        moment, positive = problem.moment[0], problem.positive
+        precision = problem.gram[0] + np.diag(problem.scale(np.asarray(strengths)[None])[0] ** -2.0)
         covariance = np.linalg.inv(precision)
-        mean = covariance @ moment[level]
+        mean = covariance @ moment
         if (mean[positive] < 0.0).any():
-            mean = _not_negative(precision, moment[level], positive)
+            mean = _not_negative(precision, moment, positive)
         return mean, covariance
 
 
 def averaged(value, terms):
-    """Log evidence (levels,) averaged over the strengths of a number of terms from that of every combination (levels,
-    m) of them.
+    """Log evidence (levels,) averaged over the strengths of some terms from that of all combinations (levels, m).
 
     A grid that was cut short counts as the whole one.
     """
-    return logsumexp(value, axis=1) - terms * np.log(len(STRENGTHS))
+    return log_sum_exp(value) - terms * np.log(len(STRENGTHS))
 
 
-def _with_laws(strengths):
-    """Strengths (m, terms) with the strength 1 of all laws' shapes appended: (m, terms + 1)."""
-    return np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
+def log_sum_exp(value):
+    """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
+    top = value.max(axis=-1, keepdims=True)
+    largest = value == top
+    count = largest.sum(axis=-1)
+    rest = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
+    return np.log1p(rest / count) + np.log(count) + top[..., 0]
 
 
 def _not_negative(precision, moment, positive):
-    """The point (k,) of highest posterior density with no negative positive coefficient: bounded least squares on the
-    Cholesky factor.
-    """
+    """The most probable point (k,) without negative positive coefficients: bounded least squares on the Cholesky factor."""
     factor = np.linalg.cholesky(precision)
     low = np.where(positive, 0.0, -np.inf)
     return lsq_linear(factor.T, np.linalg.solve(factor, moment), bounds=(low, np.inf), method="bvls").x

@@ -1,110 +1,111 @@
 """What a hypothesis predicts of points that it was not fitted on."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from rrru.gap.evidence import LEVELS, along_runs, spectrum
-from rrru.gap.terms import spread
+from rrru.campaign.noise import along_runs
+from rrru.gap.case import Case
+from rrru.gap.evidence import LEVELS, ModelEvidence, spectrum
+from rrru.gap.terms import signatures
 
 # where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
 # so-manieth is left out
 _STRETCH, _FOLDS = 5, 5
-
-
-def folds(case):
-    """Fold numbers (n,): one fold per run where every trajectory was driven more than once, else five of interleaved
-    stretches.
-
-    Leaving out the only run of a kind would ask for extrapolation, which says nothing about the effect.
-    """
-    frame = case.measurements.iloc[np.flatnonzero(case.used)]
-    passes = frame.groupby("trajectory")["run"].nunique()
-    if (passes > 1).all():
-        return np.unique(case.run, return_inverse=True)[1]
-    result = np.empty(len(frame), dtype=int)
-    for run in np.unique(case.run):
-        rows = np.flatnonzero(case.run == run)
-        result[rows] = (np.arange(len(rows)) // _STRETCH + run) % _FOLDS
-    return np.unique(result, return_inverse=True)[1]
+# fewer runs than this are resampled by stretches
+_ENOUGH_RUNS = 10
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Residuals (n, 3) in mm of predictions of left-out points, and the part (n, 3, k) of them that one standard
-    deviation of each of k independent combinations of the fitted numbers makes: the prediction's own uncertainty.
+    """Predictions of left-out points.
+
+    residual_mm (n, 3): what they get wrong; spread (n, 3, k): the part of it that one standard deviation of each of k
+    independent combinations of the fitted numbers makes; log_score (n,): under noise and this uncertainty.
     """
 
     residual_mm: np.ndarray
     spread: np.ndarray
+    noise_mm: float
 
     @property
     def uncertainty_mm2(self):
         """Expected squared distance (n,) between prediction and truth if the hypothesis holds."""
         return (self.spread**2).sum(axis=(1, 2))
 
-
-def predict(case, evidence, terms, strengths, level, fold):
-    """Prediction of every used point from the other folds (n,) by the calibration together with a set of terms.
-
-    The fit is that of `Evidence.posterior` at given strengths and discrepancy level (an index), with the laws as they
-    are.
-    """
-    linear = evidence.linear
-    columns = np.concatenate([linear.base, *_chosen(evidence, terms)], axis=-1)
-    penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
-    weights, transformed, data = _weighted(case, evidence, columns, level, fold)
-    gram = np.einsum("nak,nal,n->nkl", transformed, transformed, weights)
-    moment = np.einsum("nak,na,n->nk", transformed, data, weights)
-    total, total_moment = gram.sum(axis=0), moment.sum(axis=0)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
-    residual, spread = np.empty_like(linear.data), np.empty((len(case), 3, columns.shape[-1]))
-    for number in np.unique(fold):
-        out = fold == number
-        precision = total - gram[out].sum(axis=0) + np.diag(penalty)
-        factor = np.linalg.cholesky(unit[:, None] * precision * unit + 1e-12 * np.eye(len(unit)))
-        half = unit[:, None] * np.linalg.inv(factor).T
-        mean = half @ (half.T @ (total_moment - moment[out].sum(axis=0)))
-        residual[out] = linear.data[out] - columns[out] @ mean
-        spread[out] = columns[out] @ half
-    return Prediction(residual, spread)
+    @property
+    def log_score(self):
+        """Log predictive score (n,) under the instrument's noise and the prediction's own uncertainty."""
+        variance = self.noise_mm**2 + self.uncertainty_mm2 / 3.0
+        return -0.5 * (self.residual_mm**2).sum(axis=1) / variance - 1.5 * np.log(variance)
 
 
-def log_score(prediction, case):
-    """Log predictive score (n,) of left-out points under the instrument's noise and the prediction's own
-    uncertainty.
-    """
-    variance = case.noise_mm**2 + prediction.uncertainty_mm2 / 3.0
-    return -0.5 * (prediction.residual_mm**2).sum(axis=1) / variance - 1.5 * np.log(variance)
+@dataclass(frozen=True)
+class HeldOut:
+    """Predictions of every used point of a case from the points of the other folds, on one linearisation."""
 
+    case: Case
+    evidence: ModelEvidence
 
-def _chosen(evidence, terms):
-    """Columns of the terms' free numbers."""
-    return [
-        evidence.linear.columns[t.effect, t.shape] @ spread(evidence.library[t.effect].coordinates, t.legs)
-        for t in terms
-    ]
+    @cached_property
+    def fold(self):
+        """Fold numbers (n,): one fold per run where every trajectory was driven more than once, else five.
 
+        Those are interleaved stretches: leaving out the only run of a kind would ask for extrapolation, which says
+        nothing about the effect.
+        """
+        frame, run = self.case.points, self.case.run
+        if (frame.groupby("trajectory")["run"].nunique() > 1).all():
+            return np.unique(run, return_inverse=True)[1]
+        result = np.empty(len(frame), dtype=int)
+        for label in np.unique(run):
+            rows = np.flatnonzero(run == label)
+            result[rows] = (np.arange(len(rows)) // _STRETCH + label) % _FOLDS
+        return np.unique(result, return_inverse=True)[1]
 
-def _weighted(case, evidence, columns, level, fold):
-    """Weights (n,), columns and data in which the fit is an ordinary weighted one: along the runs' cosines if folds are
-    whole runs.
-    """
-    data = evidence.linear.data
-    whole = all(len(np.unique(fold[case.run == run])) == 1 for run in np.unique(case.run))
-    if not whole:
-        return np.full(len(case), 1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2))), columns, data
-    together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), case.run)
-    weights = 1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * spectrum(wave)))
-    return weights, together[..., :-1], together[..., -1]
+    def predict(self, terms, strengths, level):
+        """Prediction by the calibration together with a set of terms.
+
+        The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
+        laws as they are.
+        """
+        evidence, linear = self.evidence, self.evidence.linear
+        columns = np.concatenate([linear.base, *signatures(evidence.library, linear, terms)], axis=-1)
+        penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
+        weights, transformed, data = self._weighted(columns, level)
+        gram = np.einsum("nak,nal,n->nkl", transformed, transformed, weights)
+        moment = np.einsum("nak,na,n->nk", transformed, data, weights)
+        total, total_moment = gram.sum(axis=0), moment.sum(axis=0)
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
+        residual, spread = np.empty_like(linear.data), np.empty((len(self.case), 3, columns.shape[-1]))
+        for number in np.unique(self.fold):
+            out = self.fold == number
+            precision = total - gram[out].sum(axis=0) + np.diag(penalty)
+            factor = np.linalg.cholesky(unit[:, None] * precision * unit + 1e-12 * np.eye(len(unit)))
+            half = unit[:, None] * np.linalg.inv(factor).T
+            mean = half @ (half.T @ (total_moment - moment[out].sum(axis=0)))
+            residual[out] = linear.data[out] - columns[out] @ mean
+            spread[out] = columns[out] @ half
+        return Prediction(residual, spread, self.case.noise_mm)
+
+    def _weighted(self, columns, level):
+        """Weights (n,), columns and data in which the fit is an ordinary weighted one.
+
+        Where folds are whole runs they are along these runs' cosines.
+        """
+        data, run, variance = self.evidence.linear.data, self.case.run, self.case.noise_mm**2
+        if not all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run)):
+            return np.full(len(run), 1.0 / (variance * (1.0 + LEVELS[level] ** 2))), columns, data
+        together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), run)
+        weights = 1.0 / (variance * (1.0 + LEVELS[level] ** 2 * spectrum(wave)))
+        return weights, together[..., :-1], together[..., -1]
 
 
 def resampled_rows(run, generator, draws):
-    """Rows (draws, n) of points resampled by runs (n,), or by stretches of five points where there are fewer than ten
-    runs.
-    """
+    """Rows (draws, n) of points resampled by runs (n,), or by stretches of five points where there are few runs."""
     block = run
-    if len(np.unique(run)) < 10:
+    if len(np.unique(run)) < _ENOUGH_RUNS:
         within = np.concatenate([np.arange(np.count_nonzero(run == label)) for label in dict.fromkeys(run.tolist())])
         block = run * (len(run) + 1) + within // _STRETCH
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]

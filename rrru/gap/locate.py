@@ -1,17 +1,21 @@
-"""Where the gap lies: its variance split over trajectory, region, direction, leg, sense of motion, speed, payload and
-time.
-"""
+"""Where the gap lies: its variance over trajectory, region, direction, leg, sense of motion, speed, payload and time."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from rrru.gap.heldout import resampled_rows
 
 # the worst spot is the middle of the neighbours with the largest mean square; regions are cells of the points' box
 _NEIGHBOURS, _CELLS = 9, (3, 3, 2)
 _MOST_LEVELS = 12
+# drives slower than this, in their unit a second, are at rest
+_AT_REST = 1e-6
+_COLUMNS = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_high", "share_of_noise", "noise_could")
+_MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 
 
 def locate(case, residual_mm, drive, generator, draws=200):
@@ -21,56 +25,20 @@ def locate(case, residual_mm, drive, generator, draws=200):
     values. Shares are of the mean square with the noise taken off; their 95 % intervals come from resampled runs
     (stretches where there are fewer than ten).
     """
-    frame = case.measurements.iloc[np.flatnonzero(case.used)].reset_index(drop=True)
-    squares = (residual_mm**2).sum(axis=1)
-    variance = case.noise_mm**2
     resampled = resampled_rows(case.run, generator, draws)
+    whole = _Whole((residual_mm**2).sum(axis=1), case.noise_mm**2, resampled)
     rows = []
-    for name, levels in _levels(case, frame).items():
-        factor = name.split()[0]
+    for name, levels in _levels(case).items():
         for level in pd.unique(levels[levels != ""]):
-            here = levels == level
-            rows.append(
-                _row(
-                    factor,
-                    level,
-                    np.where(here, squares, 0.0),
-                    squares,
-                    3.0 * here,
-                    np.full(len(here), 3.0),
-                    variance,
-                    resampled,
-                )
-            )
-            if factor == "region":
-                centre = case.motion.position_mm[case.used][here].mean(axis=0)
+            chosen = levels == level
+            rows.append(whole.row(name.split()[0], level, np.where(chosen, whole.squares, 0.0), 3.0 * chosen))
+            if name == "region":
+                centre = case.motion.position_mm[case.used][chosen].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
-    for k, axis in enumerate("xyz"):
-        rows.append(
-            _row(
-                "direction",
-                axis,
-                residual_mm[:, k] ** 2,
-                squares,
-                np.ones(len(squares)),
-                np.full(len(squares), 3.0),
-                variance,
-                resampled,
-            )
-        )
+    one = np.ones(len(residual_mm))
+    rows.extend(whole.row("direction", axis, residual_mm[:, k] ** 2, one) for k, axis in enumerate("xyz"))
     rows.extend(_leg_rows(case, residual_mm, drive, resampled))
-    columns = (
-        "factor",
-        "level",
-        "points",
-        "rms_mm",
-        "share",
-        "share_low",
-        "share_high",
-        "share_of_noise",
-        "noise_could",
-    )
-    return pd.DataFrame(rows).reindex(columns=[*columns, "drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm"])
+    return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
 
 def worst_spot(position_mm, residual_mm):
@@ -86,35 +54,40 @@ def drive_errors(residual_mm, drive):
     return np.linalg.solve(drive, residual_mm[..., None])[..., 0]
 
 
-def _row(factor, level, part, whole, part_freedom, whole_freedom, variance, resampled):
-    """One row: share of `part` (n,) in `whole` (n,), both sums of squares with their numbers of components (n,) of a
-    variance.
-    """
-    excess, total = part - part_freedom * variance, whole - whole_freedom * variance
-    drawn_total = total[resampled].sum(axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        drawn = np.where(drawn_total > 0.0, excess[resampled].sum(axis=1) / drawn_total, 0.0)
-    share = excess.sum() / total.sum() if total.sum() > 0.0 else 0.0
-    low, high = np.quantile(np.clip(drawn, 0.0, 1.0), [0.025, 0.975])
-    share = float(np.clip(share, 0.0, 1.0))
-    freedom = part_freedom.sum()
-    count = int((part_freedom > 0.0).sum())
-    return {
-        "factor": factor,
-        "level": str(level),
-        "points": count,
-        "rms_mm": float(np.sqrt(part.sum() / max(count, 1))),
-        "share": share,
-        "share_low": float(min(low, share)),
-        "share_high": float(max(high, share)),
-        "share_of_noise": float(freedom / whole_freedom.sum()),
-        "noise_could": bool(part.sum() / variance < chi2.ppf(0.95, freedom)),
-    }
+@dataclass(frozen=True)
+class _Whole:
+    """Sums of squares (n,) of three components each, their noise's variance, and resampled rows (draws, n)."""
+
+    squares: np.ndarray
+    variance: float
+    resampled: np.ndarray
+
+    def row(self, factor, level, part, freedom):
+        """One row: share of a part (n,) of the squares, of so many components (n,)."""
+        excess, total = part - freedom * self.variance, self.squares - 3.0 * self.variance
+        drawn_total = total[self.resampled].sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            drawn = np.where(drawn_total > 0.0, excess[self.resampled].sum(axis=1) / drawn_total, 0.0)
+        share = excess.sum() / total.sum() if total.sum() > 0.0 else 0.0
+        low, high = np.quantile(np.clip(drawn, 0.0, 1.0), [0.025, 0.975])
+        share = float(np.clip(share, 0.0, 1.0))
+        count = int((freedom > 0.0).sum())
+        return {
+            "factor": factor,
+            "level": str(level),
+            "points": count,
+            "rms_mm": float(np.sqrt(part.sum() / max(count, 1))),
+            "share": share,
+            "share_low": float(min(low, share)),
+            "share_high": float(max(high, share)),
+            "share_of_noise": float(freedom.sum() / (3.0 * len(part))),
+            "noise_could": bool(part.sum() / self.variance < chdtri(freedom.sum(), 0.05)),
+        }
 
 
-def _levels(case, frame):
+def _levels(case):
     """Level (n,) of each point by factor; an empty text where it is unknown."""
-    position, rate = case.motion.position_mm[case.used], case.motion.drive_rate[case.used]
+    frame, position, rate = case.points, case.motion.position_mm[case.used], case.motion.drive_rate[case.used]
     result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
     for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
         values = frame[column].to_numpy(dtype=float)
@@ -123,18 +96,14 @@ def _levels(case, frame):
     time = frame["time_s"].to_numpy(dtype=float)
     if np.isfinite(time).any():
         edges = np.nanquantile(time, [0.25, 0.5, 0.75])
-        quarter = np.searchsorted(edges, time, side="right") + 1
-        result["time"] = np.array(
-            [f"quarter {q}" if np.isfinite(t) else "" for q, t in zip(quarter, time, strict=True)], dtype=object
-        )
+        quarter = np.char.add("quarter ", (np.searchsorted(edges, time, side="right") + 1).astype(str))
+        result["time"] = np.where(np.isfinite(time), quarter, "").astype(object)
     if np.isfinite(rate).any():
         more, less = ("down", "up") if case.mechanism.drive_unit == "rad" else ("out", "in")
         for leg in range(3):
-            sense = np.where(rate[:, leg] > 1e-6, more, np.where(rate[:, leg] < -1e-6, less, "at rest"))
-            result[f"motion_direction {leg + 1}"] = np.array(
-                [f"leg {leg + 1} {s}" if np.isfinite(r) else "" for s, r in zip(sense, rate[:, leg], strict=True)],
-                dtype=object,
-            )
+            sense = np.where(rate[:, leg] > _AT_REST, more, np.where(rate[:, leg] < -_AT_REST, less, "at rest"))
+            named = np.char.add(f"leg {leg + 1} ", sense)
+            result[f"motion_direction {leg + 1}"] = np.where(np.isfinite(rate[:, leg]), named, "").astype(object)
     return result
 
 
@@ -148,20 +117,13 @@ def _cells(position):
 def _leg_rows(case, residual_mm, drive, resampled):
     """Rows of the factor leg: shares of the squared errors of the drives."""
     errors = drive_errors(residual_mm, drive)
-    inverse = np.linalg.inv(drive)
-    noise = case.noise_mm**2 * (inverse**2).sum(axis=-1)
-    rows = []
+    # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
+    scaled = errors**2 / (case.noise_mm**2 * (np.linalg.inv(drive) ** 2).sum(axis=-1))
+    whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
     for leg in range(3):
-        # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
-        scaled = errors**2 / noise
-        ones = np.ones(len(scaled))
-        row = _row("leg", f"leg {leg + 1}", scaled[:, leg], scaled.sum(axis=1), ones, 3.0 * ones, 1.0, resampled)
         moved = np.linalg.norm(drive[:, :, leg] * errors[:, leg, None], axis=1)
-        rows.append(
-            row
-            | {
-                "rms_mm": float(np.sqrt((moved**2).mean())),
-                f"drive_rms_{case.mechanism.drive_unit}": float(np.sqrt((errors[:, leg] ** 2).mean())),
-            }
-        )
+        row = whole.row("leg", f"leg {leg + 1}", scaled[:, leg], np.ones(len(scaled)))
+        row["rms_mm"] = float(np.sqrt((moved**2).mean()))
+        row[f"drive_rms_{case.mechanism.drive_unit}"] = float(np.sqrt((errors[:, leg] ** 2).mean()))
+        rows.append(row)
     return rows

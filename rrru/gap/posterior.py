@@ -1,14 +1,11 @@
-"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of something that no effect
-explains.
-"""
+"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of what no effect explains."""
 
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.special import logsumexp
 
-from rrru.gap.evidence import LEVELS
+from rrru.gap.evidence import LEVELS, log_sum_exp
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
 
@@ -31,9 +28,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class Posterior:
-    """Hypotheses with weights (h, levels) that sum to one, and which of these levels count as unexplained (h,
-    levels).
-    """
+    """Hypotheses with weights (h, levels) that sum to one, and where these count as unexplained (h, levels)."""
 
     hypotheses: tuple
     weights: np.ndarray
@@ -41,8 +36,7 @@ class Posterior:
 
     def best(self):
         """The hypothesis of highest weight and its level (an index)."""
-        row, level = np.unravel_index(self.weights.argmax(), self.weights.shape)
-        return self.hypotheses[row], int(level)
+        return self._best(range(len(self.hypotheses)), self.weights)
 
     def sets(self):
         """Probability by (frozenset of effects, unexplained), highest first."""
@@ -54,14 +48,18 @@ class Posterior:
                     result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
         return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
 
+    @property
+    def probability_unexplained(self):
+        """Probability that something acts that the library does not hold."""
+        return sum(p for (_, flag), p in self.sets().items() if flag)
+
     def marginal(self, effect):
         """Probability that an effect acts."""
-        has = np.array([effect in h.effects for h in self.hypotheses])
-        return float(self.weights[has].sum())
+        return float(self.weights[self._holding(effect)].sum())
 
     def without(self, effect):
         """The posterior with an effect ruled out."""
-        keep = np.array([effect not in h.effects for h in self.hypotheses])
+        keep = ~self._holding(effect)
         weights = self.weights[keep]
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
         return Posterior(kept, weights / max(weights.sum(), 1e-300), self.unexplained[keep])
@@ -88,8 +86,16 @@ class Posterior:
         weights = self.weights[rows]
         if unexplained is not None:
             weights = np.where(self.unexplained[rows] == unexplained, weights, -1.0)
+        return self._best(rows, weights)
+
+    def _best(self, rows, weights):
+        """The hypothesis among some rows (k) of highest weight (k, levels), and its level (an index)."""
         row, level = np.unravel_index(weights.argmax(), weights.shape)
         return self.hypotheses[rows[row]], int(level)
+
+    def _holding(self, effect):
+        """Which hypotheses (h,) hold an effect."""
+        return np.array([effect in h.effects for h in self.hypotheses])
 
 
 def posterior(evidence, hypotheses, prior):
@@ -97,19 +103,17 @@ def posterior(evidence, hypotheses, prior):
     library = evidence.library
     log_weight = np.array([h.evidence + _log_prior_terms(library, h.terms, prior) for h in hypotheses])
     # single effects stay, however improbable: tables show what each does alone
-    worth = (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE) | np.array(
-        [len(h.terms) <= 1 for h in hypotheses]
-    )
+    single = np.array([len(h.terms) <= 1 for h in hypotheses])
+    worth = single | (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE)
     kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
     log_weight = log_weight[worth]
     unexplained = np.zeros(log_weight.shape, dtype=bool)
     for row, hypothesis in enumerate(kept):
-        tolerated = prior.tolerance * evidence.explained(hypothesis)
-        unexplained[row] = tolerated < LEVELS
-        if not hypothesis.effects.isdisjoint(UNKNOWN):
-            unexplained[row] = True
+        # an unknown function is unexplained whatever else is
+        known = hypothesis.effects.isdisjoint(UNKNOWN)
+        unexplained[row] = prior.tolerance * evidence.explained(hypothesis) < LEVELS if known else True
         log_weight[row] += _log_prior_levels(unexplained[row], prior)
-    return Posterior(kept, np.exp(log_weight - logsumexp(log_weight)), unexplained)
+    return Posterior(kept, np.exp(log_weight - log_sum_exp(log_weight.ravel())), unexplained)
 
 
 def _log_prior_terms(library, terms, prior):

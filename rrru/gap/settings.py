@@ -10,7 +10,7 @@ from rrru.gap.posterior import Prior
 @dataclass(frozen=True)
 class GapSettings:
     """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known,
-    such as a gear ratio; prior; draws: resamplings for intervals; seed.
+    such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
     effects: tuple = tuple(EFFECTS | SLIDER_EFFECTS)
@@ -18,12 +18,14 @@ class GapSettings:
     prior: Prior = field(default_factory=Prior)
     draws: int = 200
     seed: int = 0
+    use_near_singularity: bool = True
 
     @classmethod
-    def from_config(cls, section, seed=0):
+    def from_config(cls, section, seed=0, use_near_singularity=True):
         """Settings of the configuration's `gap` section."""
         prior = Prior(tuple(section["prior_counts"]), section["prior_unexplained"], section["tolerance"])
-        return cls((*section["effects"], *section["own_effects"]), section["known"], prior, section["draws"], seed)
+        effects = *section["effects"], *section["own_effects"]
+        return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
 
     def without(self, name):
         """The settings with one effect taken out of the library."""

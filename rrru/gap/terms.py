@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rrru.effects.effect import LEGS
+
 # on which legs a law acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"
 
 
 @dataclass(frozen=True)
 class Term:
-    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg that it acts
-    on.
-    """
+    """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg it acts on."""
 
     effect: str
     shape: int = 0
@@ -26,13 +26,13 @@ def spread(coordinates, legs):
         return every
     if legs == SAME:
         # coordinates of one kind come in the order of the legs
-        return np.stack([every[:, coordinates.legs == leg] for leg in (1, 2, 3)]).sum(axis=0)
+        return np.stack([every[:, coordinates.legs == leg] for leg in LEGS]).sum(axis=0)
     return every[:, coordinates.legs == legs]
 
 
 def per_leg(effect):
     """Whether every coordinate of an effect belongs to one leg, and every leg has some."""
-    return set(effect.coordinates.legs.tolist()) == {1, 2, 3}
+    return set(effect.coordinates.legs.tolist()) == set(LEGS)
 
 
 def variants(effect):
@@ -42,5 +42,10 @@ def variants(effect):
     errors of an assembly.
     """
     coordinates, legs = effect.coordinates, per_leg(effect)
-    choices = (EACH, *((SAME,) if legs and coordinates.positive.all() else ()), *((1, 2, 3) if legs else ()))
+    choices = (EACH, *((SAME,) if legs and coordinates.positive.all() else ()), *(LEGS if legs else ()))
     return tuple(Term(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
+
+
+def signatures(library, linear, terms):
+    """Columns (n, 3, k) of each term's free numbers on a linearisation."""
+    return [linear.columns[t.effect, t.shape] @ spread(library[t.effect].coordinates, t.legs) for t in terms]

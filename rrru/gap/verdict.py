@@ -8,13 +8,14 @@ from rrru.gap.terms import per_leg
 _RIVAL = 0.05
 _SURE, _HALF = 0.9, 0.5
 _NOTHING = 0.2
+_NONE = (frozenset(), False)
 
 
 @dataclass(frozen=True)
 class Verdict:
     """effects: names in order of share, () for none; unexplained: something is left that no effect explains;
     probability of both together; leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the
-    data leave open, each (names, probability).
+    data leave open, each (names, unexplained, probability).
     """
 
     effects: tuple
@@ -30,9 +31,7 @@ class Verdict:
 
     @property
     def confusable_with(self):
-        """Effects outside the verdict that appear in a rival, most probable first; "unexplained" and "none" count as
-        such.
-        """
+        """Effects, "unexplained" and "none" in a rival but not in the verdict, most probable first."""
         names = []
         for effects, unexplained, _ in self.rivals:
             others = [name for name in sorted(effects) if name not in self.effects]
@@ -53,54 +52,47 @@ def decide(attribution, shares):
     """Verdict of an attribution; shares: effect to the share of the gap that it explains, for the order.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter.
-
-    Beside something unexplained effects are named only where they act with a probability of 0.9 each and explain half
-    of the gap together; else they are what could be mistaken for a part of it.
+    matter. Beside something unexplained effects are named only where they act with a probability of 0.9 each and
+    explain half of the gap together; else they are what could be mistaken for a part of it.
     """
     beliefs = attribution.posterior
-    sets = beliefs.sets()
-    unknown = sum(p for (_, flag), p in sets.items() if flag)
+    unknown, sets = beliefs.probability_unexplained, beliefs.sets()
     known = {key: p for key, p in sets.items() if not key[1]}
-    best = max(known, key=known.get) if known else (frozenset(), False)
-    nothing = known.get((frozenset(), False), 0.0)
-    if nothing > _NOTHING:
-        best, unknown = (frozenset(), False), 0.0
-    if unknown > known.get(best, 0.0):
-        within = {key: p for key, p in sets.items() if key[1]}
-        everywhere = {name for effects, _ in within for name in effects}
-        sure = frozenset(
-            n for n in everywhere if sum(p for (effects, _), p in within.items() if n in effects) > _SURE * unknown
-        )
-        named = sure if sum(shares.get(name, 0.0) for name in sure) >= _HALF else frozenset()
-        effects, probability = named, sum(p for (names, _), p in within.items() if named <= names)
-        # what imitates a part of the unknown, and what would do without it
-        rivals = {(names, True): p for (names, _), p in within.items() if names != named} | known
+    best = max(known, key=known.get, default=_NONE)
+    if known.get(_NONE, 0.0) > _NOTHING:
+        best = _NONE
+    unexplained = known.get(_NONE, 0.0) <= _NOTHING and unknown > known.get(best, 0.0)
+    if unexplained:
+        effects, probability, rivals = _beside_unexplained(sets, unknown, shares)
     else:
         effects, probability = best[0], known[best]
-        rivals = {key: p for key, p in known.items() if key != best}
-        rivals[frozenset(), True] = sum(p for (_, flag), p in sets.items() if flag)
-    named = tuple(sorted(effects, key=lambda name: (-shares.get(name, 0.0), name)))
-    rivals = tuple(
-        (names, flag, p)
-        for (names, flag), p in sorted(rivals.items(), key=lambda r: (-r[1], sorted(r[0][0])))
-        if p > _RIVAL * probability
-    )
+        rivals = {key: p for key, p in known.items() if key != best} | {(frozenset(), True): unknown}
+    ordered = sorted(rivals.items(), key=lambda rival: (-rival[1], sorted(rival[0][0])))
     return Verdict(
-        named,
-        unknown > known.get(best, 0.0),
+        tuple(sorted(effects, key=lambda name: (-shares.get(name, 0.0), name))),
+        unexplained,
         float(min(probability, 1.0)),
         _leg(beliefs, effects, attribution.case.library),
-        rivals,
+        tuple((*key, p) for key, p in ordered if p > _RIVAL * probability),
     )
+
+
+def _beside_unexplained(sets, unknown, shares):
+    """Effects to name beside something unexplained, the probability of that, and the rivals' by (names, unexplained)."""
+    within = {effects: p for (effects, flag), p in sets.items() if flag}
+    acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
+    named = frozenset(name for name, p in acting.items() if p > _SURE * unknown)
+    if sum(shares.get(name, 0.0) for name in named) < _HALF:
+        named = frozenset()
+    # what imitates a part of the unknown, and what would do without it
+    rivals = {(effects, True): p for effects, p in within.items() if effects != named}
+    rivals |= {key: p for key, p in sets.items() if not key[1]}
+    return named, sum(p for effects, p in within.items() if named <= effects), rivals
 
 
 def _leg(beliefs, effects, library):
     """The one leg that all effects with legs of their own name, 0 where there is none."""
-    found = set()
-    for name in effects:
-        if per_leg(library[name]):
-            legs = beliefs.legs(name)
-            best = max(legs, key=legs.get)
-            found.add(best if isinstance(best, int) else 0)
-    return found.pop() if len(found) == 1 else 0
+    likely = [beliefs.legs(name) for name in effects if per_leg(library[name])]
+    best = {max(legs, key=legs.get) for legs in likely}
+    leg = best.pop() if len(best) == 1 else 0
+    return leg if isinstance(leg, int) else 0

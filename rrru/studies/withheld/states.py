@@ -15,7 +15,7 @@ def state_row(robot, calibrated, state):
         "calibrated": json.dumps(np.asarray(calibrated).tolist()),
         "deviations": json.dumps(np.asarray(state.deviations).tolist()),
         "effects": json.dumps(effects),
-        "shapes": json.dumps(state.shapes, sort_keys=True),
+        "shapes": json.dumps(state.shape_values, sort_keys=True),
     }
 
 
