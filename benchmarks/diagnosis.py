@@ -11,7 +11,8 @@ import numpy as np
 
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import make_case
-from rrru.gap.diagnose import GapSettings, diagnose, sim
+from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
+from rrru.gap.settings import GapSettings
 from rrru.studies.withheld.chunks import Member
 from rrru.studies.withheld.draw import draw
 from rrru.studies.withheld.robots import Conditions
@@ -44,14 +45,14 @@ def plain(measurements, conditions, settings):
 def main(count=40):
     """Print a line per robot and the sums."""
     conditions, settings = Conditions.from_config(_SETTINGS), GapSettings()
-    known = (conditions.mechanism, conditions.masses, settings, conditions.noise_mm)
+    known = MeasuredRobot(conditions.mechanism, conditions.masses, conditions.noise_mm)
     seconds, right = {"here": [], "plain": []}, {"here": 0, "plain": 0}
     for number in range(count):
         robot = draw(Member("label", "", number), conditions)
         (measurements, _), truth = robot.campaign(conditions).run(), robot.truth
         answers = {}
         for name, method in (
-            ("here", lambda m: diagnose(m, *known).verdict["effects"]),
+            ("here", lambda m: diagnose(m, known, settings).verdict["effects"]),
             ("plain", lambda m: plain(m, conditions, settings)),
         ):
             start = perf_counter()

@@ -4,8 +4,6 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-# degrees of freedom from which on repeated points tell the noise
-ENOUGH_REPEATS = 30
 USED = ("ok", "near_singularity")
 
 
@@ -51,22 +49,6 @@ def usable(measurements, use_near_singularity=True):
     """Rows (n,) that fits may use: measured, no outlier and, if so asked, not near a singularity."""
     allowed = USED if use_near_singularity else USED[:1]
     return measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1)
-
-
-def repeat_noise(measurements):
-    """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
-
-    Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
-    nothing repeats. What moves the robot from pass to pass counts as noise here.
-    """
-    frame = measurements.loc[usable(measurements)]
-    frame = frame.assign(direction=direction(frame))
-    axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
-    keys = ["trajectory", "direction", *places, "speed_mm_s", "payload_kg"]
-    groups = frame.groupby(keys, dropna=False, sort=False)[axes]
-    deviation = (frame[axes] - groups.transform("mean")).to_numpy()
-    freedom = 3 * int(len(frame) - groups.ngroups)
-    return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
 
 
 def direction(measurements):

@@ -27,10 +27,10 @@ def repeat_noise(measurements):
     Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
     nothing repeats. What moves the robot from pass to pass counts as noise here.
     """
-    frame = measurements.loc[rows.usable(measurements)].copy()
-    axes = [f"measured_{axis}_mm" for axis in "xyz"]
-    frame["direction"] = rows.direction(frame)
-    keys = ["trajectory", "direction", *(f"command_{axis}_mm" for axis in "xyz"), "speed_mm_s", "payload_kg"]
+    frame = measurements.loc[rows.usable(measurements)]
+    frame = frame.assign(direction=rows.direction(frame))
+    axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
+    keys = ["trajectory", "direction", *places, "speed_mm_s", "payload_kg"]
     groups = frame.groupby(keys, dropna=False, sort=False)[axes]
     deviation = (frame[axes] - groups.transform("mean")).to_numpy()
     freedom = 3 * int(len(frame) - groups.ngroups)

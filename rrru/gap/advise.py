@@ -65,7 +65,9 @@ def _worth(attribution, truth, imitator, planned):
     made, designs = [], []
     for linear in (evidence.linear, there):
         nothing = np.zeros((*linear.data.shape, 0))
-        made.append(np.concatenate([nothing, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean[:size])
+        made.append(
+            np.concatenate([nothing, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean[:size]
+        )
         designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
     penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0

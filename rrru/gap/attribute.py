@@ -1,5 +1,6 @@
 """Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -63,6 +64,17 @@ def calibrate(case):
     return State(fit.deviations, {})
 
 
+def with_noise(case, calibrated):
+    """The case with its noise estimated, and where from: from what neither calibration nor any effect can fit."""
+    linear = case.linearise(calibrated)
+    columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
+    if columns.shape[-1] > len(case):
+        # too few points to fit everything: what the calibration leaves has to do
+        columns = linear.base
+    noise_mm, source = noise.estimate(case.points, linear.data, columns)
+    return replace(case, noise_mm=noise_mm), source
+
+
 def attribute(case, prior, noise_from="given"):
     """Attribution of a case; its noise is estimated first where noise_from is not "given"."""
     total = len(case)
@@ -74,7 +86,7 @@ def attribute(case, prior, noise_from="given"):
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
-            case, noise_from = _with_noise(case, calibrated)
+            case, noise_from = with_noise(case, calibrated)
         attribution = _rounds(case, calibrated, prior)
         residual = case.measured_mm - case.model(attribution.state)
         outliers = noise.isolated(residual, case.run, case.noise_mm)
@@ -97,23 +109,10 @@ def with_effects(attribution, effects):
     hypothesis, level = known
     state, covariance = attribution.calibrated, _NO_COVARIANCE
     if hypothesis.terms:
-        try:
+        # where the exact sim cannot follow only the linear one is corrected
+        with suppress(FitError):
             state, covariance = refine(attribution.case, attribution.state, hypothesis, level)
-        except FitError:
-            # the exact sim cannot follow: only the linear one is corrected
-            pass
     return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
-
-
-def _with_noise(case, calibrated):
-    """The case with its noise estimated, and where from: from what neither calibration nor any effect can fit."""
-    linear = case.linearise(calibrated)
-    columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-    if columns.shape[-1] > len(case):
-        # too few points to fit everything: what the calibration leaves has to do
-        columns = linear.base
-    noise_mm, source = noise.estimate(case.points, linear.data, columns)
-    return replace(case, noise_mm=noise_mm), source
 
 
 def _rounds(case, calibrated, prior):

@@ -1,4 +1,4 @@
-"""One campaign as the diagnosis sees it: its usable points, the calibrated sim, every effect's signature, the exact sim.
+"""One campaign as the diagnosis sees it: usable points, the calibrated sim, every effect's signature, the exact sim.
 
 The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the
 best one found. Lengths in mm, angles in rad.

@@ -1,4 +1,4 @@
-"""The diagnosis of one campaign: where its gap lies, which effect causes it, how far it shrinks, what to measure next."""
+"""The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
 
 from dataclasses import dataclass, field, replace
 

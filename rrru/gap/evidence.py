@@ -55,8 +55,8 @@ class _Prior(NamedTuple):
 class Projected:
     """Least squares of k coefficients with their priors, the calibration taken out.
 
-    Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels, k);
-    size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody.
+    Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels,
+    k); size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody.
     """
 
     gram: np.ndarray
@@ -127,7 +127,9 @@ class ModelEvidence:
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
             gram = rest.T @ rest
             grams.append(join.T @ gram @ join)
-            constants.append(-1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1])
+            constants.append(
+                -1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
+            )
         grams, whole = np.array(grams), (together[..., p:] / self.noise_mm).reshape(-1, together.shape[-1] - p)
         whole = join.T @ (whole.T @ whole) @ join
         return grams[:, :-1, :-1], grams[:, :-1, -1], np.array(constants), whole[:-1, :-1]
@@ -158,9 +160,7 @@ class ModelEvidence:
             index = self._layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
             index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
             size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
-            power, total = (
-                (gram[index, index] * size**2).sum() / (3.0 * len(self)) for gram in (grams[0], whole)
-            )
+            power, total = ((gram[index, index] * size**2).sum() / (3.0 * len(self)) for gram in (grams[0], whole))
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
             size /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
             most = np.broadcast_to(coordinates.most, len(coordinates))
@@ -243,7 +243,7 @@ def log_sum_exp(value):
 
 
 def _not_negative(precision, moment, positive):
-    """The most probable point (k,) without negative positive coefficients: bounded least squares on the Cholesky factor."""
+    """The most probable point (k,) without negative positive coefficients: bounded least squares."""
     factor = np.linalg.cholesky(precision)
     low = np.where(positive, 0.0, -np.inf)
     return lsq_linear(factor.T, np.linalg.solve(factor, moment), bounds=(low, np.inf), method="bvls").x

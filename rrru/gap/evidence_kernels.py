@@ -9,10 +9,10 @@ import numpy as np
 @numba.njit(cache=True, error_model="numpy")
 def log_ndtr(x):
     """Logarithm of the standard normal distribution function."""
-    if x > -10.0:
+    if x > -30.0:
         return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
-    # the tail's asymptotic series (Abramowitz and Stegun 26.2.12), good to 1e-4 here
-    return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / (x * x)
+    # the tail's asymptotic series (Abramowitz and Stegun 26.2.12), good to 1e-7 here
+    return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / x**2 + 2.5 / x**4
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})

@@ -1,4 +1,4 @@
-"""Where the gap lies: its variance over trajectory, region, direction, leg, sense of motion, speed, payload and time."""
+"""Where the gap lies: its variance by trajectory, region, direction, leg, sense of motion, speed, payload and time."""
 
 from dataclasses import dataclass
 

@@ -15,7 +15,7 @@ _MOST_SHAPE_STEPS = 1.5
 
 
 def refine(case, state, hypothesis, level):
-    """State of the hypothesis fitted from a start by Gauss-Newton: renewed linearisation, steps halved where it worsens.
+    """State of the hypothesis fitted from a start: Gauss-Newton on a renewed linearisation, steps halved where worse.
 
     Returns (state, covariance (k, k) of the terms' coefficients). Raises FitError where the sim loses its pose.
     """
@@ -72,7 +72,9 @@ def _between(first, second, share):
     """The state at a share of the way from one to another with the same effects."""
     effects = {key: first.effects[key] + share * (second.effects[key] - first.effects[key]) for key in second.effects}
     shapes = {
-        name: {k: first.shape_values[name][k] + share * (value - first.shape_values[name][k]) for k, value in shape.items()}
+        name: {
+            k: first.shape_values[name][k] + share * (value - first.shape_values[name][k]) for k, value in shape.items()
+        }
         for name, shape in second.shape_values.items()
     }
     return State(first.deviations + share * (second.deviations - first.deviations), effects, shapes)

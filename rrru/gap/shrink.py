@@ -12,7 +12,7 @@ CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
 
 @dataclass(frozen=True)
 class ShrinkStep:
-    """The gap after some effects are added: at each point (n,) its square in mm^2, noise taken off, and draws (b, n)."""
+    """The gap after some effects are added: its square (n,) in mm^2 at each point, less the noise; draws (b, n) of it."""
 
     added: str
     effects: tuple
@@ -37,7 +37,7 @@ def gap_rms(squares):
 
 
 def order_by_share(attribution):
-    """(term, share of the gap's mean square that it removes when it comes next) from the largest on, on left-out points."""
+    """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
     hypothesis, level = attribution.hypothesis, attribution.level
     left, chosen, result = list(hypothesis.terms), [], []
     noise = 3.0 * attribution.case.noise_mm**2

@@ -78,7 +78,7 @@ def decide(attribution, shares):
 
 
 def _beside_unexplained(sets, unknown, shares):
-    """Effects to name beside something unexplained, the probability of that, and the rivals' by (names, unexplained)."""
+    """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained)."""
     within = {effects: p for (effects, flag), p in sets.items() if flag}
     acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
     named = frozenset(name for name, p in acting.items() if p > _SURE * unknown)

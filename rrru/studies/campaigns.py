@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.noise import ENOUGH_REPEATS, repeat_noise
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
@@ -21,8 +22,8 @@ def noise(robot, measurements, given, use_near_singularity):
     """
     if given is not None:
         return given, "given"
-    repeated, freedom = rows.repeat_noise(measurements)
-    if freedom >= rows.ENOUGH_REPEATS and repeated > 0.0:
+    repeated, freedom = repeat_noise(measurements)
+    if freedom >= ENOUGH_REPEATS and repeated > 0.0:
         return repeated, "repeats"
     residuals = select(measurements, robot, ["*"], use_near_singularity)
     if residuals is None:

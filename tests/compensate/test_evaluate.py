@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.noise import repeat_noise
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.compensate import evaluate
@@ -137,7 +138,7 @@ def test_outliers_are_kept_but_not_counted(campaign):
 
 def test_noise_from_repeats_is_the_noise(campaign):
     _, _, measurements = campaign
-    noise, freedom = rows.repeat_noise(measurements)
+    noise, freedom = repeat_noise(measurements)
     assert freedom == 3 * 2 * 100 and noise == pytest.approx(0.01, rel=0.1)
     once = measurements[measurements["run"] <= 4]
-    assert rows.repeat_noise(once)[1] == 0 and np.isnan(rows.repeat_noise(once)[0])
+    assert repeat_noise(once)[1] == 0 and np.isnan(repeat_noise(once)[0])

@@ -14,7 +14,7 @@ from rrru.effects.library import EFFECTS
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.gap.case import make_case
-from rrru.gap.diagnose import diagnose, sim
+from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
 from rrru.gap.settings import GapSettings
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses
@@ -95,4 +95,5 @@ def case_of(measurements, library=EFFECTS, noise_mm=NOISE_MM):
 
 def diagnosed(measurements, noise_mm=NOISE_MM, details=False, settings=None):
     """Diagnosis of a measurement table with the whole library."""
-    return diagnose(measurements, ROBOT, MASSES, settings or GapSettings(draws=50), noise_mm, details)
+    robot = MeasuredRobot(ROBOT, MASSES, noise_mm)
+    return diagnose(measurements, robot, settings or GapSettings(draws=50), details)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import starts_of_runs
 from rrru.effects.library import EFFECTS
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State
-from rrru.gap.driven_path import at_turn_back, starts_of_runs
+from rrru.gap.case import State, at_reversals
 from tests.gap import campaigns
 from tests.gap.campaigns import ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 
@@ -29,7 +29,7 @@ def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     run = case.measurements["run"].to_numpy()
     starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
-    np.testing.assert_array_equal(case.used, ~starts & ~at_turn_back(case.motion, "rad"))
+    np.testing.assert_array_equal(case.used, ~starts & ~at_reversals(case.motion, "rad"))
     assert len(case) == case.used.sum() == len(case.measured_mm) == len(case.run)
 
 
@@ -42,7 +42,7 @@ def test_points_that_are_lost_or_marked_are_not_used():
     frame.loc[60:70, "status"] = "near_singularity"
     near = slice(60, 71)
     kept = case_of(frame).used[near]
-    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_turn_back(case_of(frame).motion, "rad")
+    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_reversals(case_of(frame).motion, "rad")
     assert kept.any() and kept.sum() == (~doubtful)[near].sum()
 
 
@@ -130,9 +130,12 @@ def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, na
     np.testing.assert_allclose(
         linear.data - linear.columns[key] @ coordinates, case.measured_mm - case.exact(state), atol=1e-9
     )
-    steps = {step[0] for step in linear.reshaped[name]}
+    steps = {step[0] for step in linear.shape_steps[name]}
     assert steps <= set(EFFECTS[name].coordinates.shapes[0])
-    assert linear.laws[name].shape[-1] == len(linear.reshaped[name]) and np.isfinite(linear.laws[name]).all()
+    assert (
+        linear.shape_columns[name].shape[-1] == len(linear.shape_steps[name])
+        and np.isfinite(linear.shape_columns[name]).all()
+    )
 
 
 def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_two_points_does_not():
@@ -144,17 +147,19 @@ def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_tw
         path[:, 0] = path[:, 2] = 0.001 * steps
         index = np.arange(0, 97, 8)
         motion = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
-        assert np.flatnonzero(at_turn_back(motion, "rad")).tolist() == doubtful
+        assert np.flatnonzero(at_reversals(motion, "rad")).tolist() == doubtful
 
 
 def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
     state = _state("thermal_growth", 2, size=4.0)
     linear = case.linearise(state)
-    (name, value, stepped), *_ = linear.reshaped["thermal_growth"]
+    (name, value, stepped), *_ = linear.shape_steps["thermal_growth"]
     assert name == "time_constant" and stepped != value
-    other = replace(state, shapes={"thermal_growth": {name: stepped}})
+    other = replace(state, shape_values={"thermal_growth": {name: stepped}})
     change = case.exact(other) - case.exact(state)
-    np.testing.assert_allclose(linear.laws["thermal_growth"][..., -1], change, atol=0.02 * np.abs(change).max())
+    np.testing.assert_allclose(
+        linear.shape_columns["thermal_growth"][..., -1], change, atol=0.02 * np.abs(change).max()
+    )
 
 
 def test_what_the_columns_do_not_tell_is_not_tested():

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.fft import dct
 
+from rrru.campaign.noise import isolated
 from rrru.gap import shrink
-from rrru.gap.attribute import calibrate
-from rrru.gap.evidence import LEVELS, Evidence
-from rrru.gap.heldout import folds, predict, resampled_rows
-from rrru.gap.noise import estimate_noise, spoilt
+from rrru.gap.attribute import calibrate, with_noise
+from rrru.gap.evidence import LEVELS, ModelEvidence
+from rrru.gap.heldout import HeldOut, resampled_rows
 from rrru.gap.terms import Term
 from tests.gap.campaigns import (
     EFFECTS,
@@ -36,7 +36,7 @@ def _setting(passes, effects=()):
     case = case_of(
         measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")}
     )
-    return case, Evidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+    return HeldOut(case, ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm))
 
 
 @pytest.fixture(scope="module")
@@ -44,8 +44,9 @@ def full():
     return _setting(FULL, (strong("leg_asymmetry", 3.0),))
 
 
-def _refitted(case, evidence, level, fold, smooth):
+def _refitted(held_out, level, smooth):
     """Residuals and covariances of predictions of each fold by a dense fit of all others."""
+    case, evidence, fold = held_out.case, held_out.evidence, held_out.fold
     linear, n = evidence.linear, len(case)
     columns = np.concatenate(
         [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1
@@ -81,33 +82,29 @@ def _refitted(case, evidence, level, fold, smooth):
 @pytest.mark.parametrize("level", [0, 3])
 @pytest.mark.parametrize("passes", [(FORWARD,), FULL], ids=["stretches", "runs"])
 def test_predictions_equal_a_refit_without_the_fold(passes, level):
-    case, evidence = _setting(passes)
-    fold = folds(case)
-    found = predict(case, evidence, TERMS, STRENGTHS, level, fold)
-    residual, uncertain = _refitted(case, evidence, level, fold, smooth=passes is FULL)
+    held_out = _setting(passes)
+    found = held_out.predict(TERMS, STRENGTHS, level)
+    residual, uncertain = _refitted(held_out, level, smooth=passes is FULL)
     np.testing.assert_allclose(found.residual_mm, residual, atol=2e-6)
     np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
 
 
 def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(full):
-    case, _ = full
-    assert [len(np.unique(case.run[folds(case) == k])) for k in np.unique(folds(case))] == [1] * 16
-    once, _ = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))
-    fold = folds(once)
-    assert np.unique(fold).tolist() == [0, 1, 2, 3, 4]
-    for run in np.unique(once.run):
-        own = fold[once.run == run]
+    assert [len(np.unique(full.case.run[full.fold == k])) for k in np.unique(full.fold)] == [1] * 16
+    once = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))
+    assert np.unique(once.fold).tolist() == [0, 1, 2, 3, 4]
+    for run in np.unique(once.case.run):
+        own = once.fold[once.case.run == run]
         assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * (
             (len(own) - 1) // 5
         )
 
 
 def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
-    case, evidence = full
-    found = predict(case, evidence, (Term("leg_asymmetry"),), [3.0], 0, folds(case))
+    found = full.predict((Term("leg_asymmetry"),), [3.0], 0)
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
     ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
-    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(case))))
+    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.case))))
 
 
 def test_rows_are_resampled_by_runs_or_by_stretches():
@@ -134,7 +131,7 @@ def test_the_share_closed_holds_on_other_trajectories(name):
     effect = strong(name, 5.0)
     found = diagnosed(measure((effect,)))
     case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
-    before = case.measured_mm - case.sim(found.calibrated_errors)[case.used]
+    before = case.measured_mm - case.sim(found.attribution.calibrated.deviations)[case.used]
     after = case.measured_mm - case.exact(found.state)
     true = 1.0 - np.sqrt((after**2).sum() / (before**2).sum())
     assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
@@ -144,7 +141,7 @@ def test_the_share_closed_holds_on_other_trajectories(name):
 
 def _step(residual_mm, draws=3):
     squares = (residual_mm**2).sum(axis=1)
-    return shrink.Step("", (), residual_mm, squares, np.tile(squares, (draws, 1)))
+    return shrink.ShrinkStep("", (), residual_mm, squares, np.tile(squares, (draws, 1)))
 
 
 def test_shares_of_made_up_steps():
@@ -161,9 +158,9 @@ def test_shares_of_made_up_steps():
 @pytest.mark.parametrize("name", [None, "thermal_growth", "leg_asymmetry", "servo_lag"])
 def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
     case = case_of(measure((strong(name, 6.0),) if name else ()))
-    found, source = estimate_noise(case, case.linearise(calibrate(case)))
+    estimated, source = with_noise(case, calibrate(case))
     upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
-    assert source == "high_frequency" and found == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
+    assert source == "high_frequency" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
 
 
 def test_repeats_give_the_noise_where_they_are_clearly_quieter():
@@ -173,22 +170,21 @@ def test_repeats_give_the_noise_where_they_are_clearly_quieter():
     for k, axis in enumerate("xyz"):
         frame[f"measured_{axis}_mm"] += np.tile(jagged[:, k], 6)
     case = case_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
-    found, source = estimate_noise(case, case.linearise(calibrate(case)))
-    assert source == "repeats" and found == pytest.approx(NOISE_MM, rel=0.2)
+    estimated, source = with_noise(case, calibrate(case))
+    assert source == "repeats" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=0.2)
 
 
-def test_single_spikes_are_spoilt_and_smooth_gaps_and_noise_are_not(full):
-    case, _ = full
-    generator = np.random.default_rng(2)
+def test_single_spikes_are_isolated_and_smooth_gaps_and_noise_are_not(full):
+    case, generator = full.case, np.random.default_rng(2)
     noise = NOISE_MM * generator.standard_normal((len(case), 3))
-    assert not spoilt(case, noise, NOISE_MM).any()
+    assert not isolated(noise, case.run, NOISE_MM).any()
     smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
-    assert not spoilt(
-        case, 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2] + noise, NOISE_MM
-    ).any()
-    assert not spoilt(case, smooth * 0.05 + noise, NOISE_MM).any()
+    wave = 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2]
+    assert not isolated(wave + noise, case.run, NOISE_MM).any()
+    assert not isolated(smooth * 0.05 + noise, case.run, NOISE_MM).any()
     spiked = noise.copy()
     at = [4, 40, 100, 200]
     spiked[at, [0, 1, 2, 0]] += [1.0, -1.0, 0.5, 0.6]
-    assert np.flatnonzero(spoilt(case, spiked, NOISE_MM)).tolist() == at
-    assert not spoilt(case, noise + 5.0 * (generator.random((len(case), 1)) < 0.3), NOISE_MM).any()
+    assert np.flatnonzero(isolated(spiked, case.run, NOISE_MM)).tolist() == at
+    frequent = noise + 5.0 * (generator.random((len(case), 1)) < 0.3)
+    assert not isolated(frequent, case.run, NOISE_MM).any()

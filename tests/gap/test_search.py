@@ -14,7 +14,7 @@ from rrru.effects.library import EFFECTS
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
-from rrru.gap.evidence import LEVELS, Evidence
+from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.posterior import Prior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
@@ -33,7 +33,7 @@ def _library(*names):
 @pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
 def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
     case = case_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
-    evidence = Evidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+    evidence = ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
     found = search(evidence)
     choices = {name: variants(EFFECTS[name]) for name in FEW}
     for size in range(3):
@@ -48,7 +48,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 
 def test_every_effect_alone_is_always_weighed():
     case = case_of(measure())
-    evidence = Evidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+    evidence = ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
     single = {h.terms[0] for h in search(evidence, most=1) if h.terms}
     assert single >= {term for effect in EFFECTS.values() for term in variants(effect)}
 
@@ -78,7 +78,7 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
     case = case_of(measure((true,)), {"thermal_growth": effect})
     shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
     state, _ = refine(case, calibrate(case), _hypothesis(Term("thermal_growth", shape)), 0)
-    assert state.shapes["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
+    assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
     assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
 
 
@@ -119,9 +119,9 @@ def twins():
     payload only.
     """
     case, calibrated = _twins()
-    evidence = Evidence(case.library, case.linearise(calibrated), case.run, case.noise_mm)
+    evidence = ModelEvidence(case.library, case.linearise(calibrated), case.run, case.noise_mm)
     beliefs = posterior(evidence, search(evidence), Prior())
-    found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best(), "given", 0)
+    found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
     return found, verdict, advise(found, verdict, MASSES)
 
@@ -180,7 +180,7 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
     names = TWINS - frozenset(verdict.effects)
     assert best["separates"] == f"{verdict.label} / {'+'.join(names)}"
     rival = found.posterior.best_of(names)
-    mean, _ = found.evidence.posterior(favoured[0].terms, favoured[0].strengths[favoured[1]], favoured[1])
+    mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].strengths[favoured[1]], favoured[1])
     size = _columns(case.library, new, favoured[0]).shape[-1] - 7
     prior = found.evidence.scales(rival[0].terms, rival[0].strengths[rival[1]])
     costs = []

@@ -6,7 +6,7 @@ import pytest
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.effects.library import active_effects
-from rrru.gap.diagnose import diagnose
+from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
@@ -23,7 +23,7 @@ def _diagnosed(mechanism, height, deviations, effects, payloads=(0.0, 2.0, 5.0),
     )
     robot = VirtualTripod(mechanism, deviations, active_effects(effects, mechanism.drive_unit))
     measurements, _ = robot.run(plan, NOISE_MM, np.random.default_rng(seed))
-    return diagnose(measurements, mechanism, Masses(), noise_mm=NOISE_MM, name="test")
+    return diagnose(measurements, MeasuredRobot(mechanism, Masses(), NOISE_MM, "test"))
 
 
 def _each(name, *values):

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import diagnose
+from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
@@ -13,15 +13,10 @@ from rrru.studies import setup
 
 def main(settings, inputs, outputs):
     """Write the verdict and everything behind it."""
-    result = diagnose(
-        tables.read(inputs["measurements"]),
-        setup.mechanism(settings["robot"]),
-        Masses(**settings["masses"]),
-        GapSettings.from_config(settings["gap"], settings["seed"]),
-        settings["noise_mm"],
-        name=settings["campaign"],
-        use_near_singularity=settings["use_near_singularity"],
-    )
+    nominal, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
+    robot = MeasuredRobot(nominal, masses, settings["noise_mm"], settings["campaign"])
+    chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
+    result = diagnose(tables.read(inputs["measurements"]), robot, chosen)
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     named = {
         name: frames[name] if name == "gap_points" else frames[name].assign(campaign=settings["campaign"])

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import diagnose
+from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
 from rrru.store import tables
@@ -21,10 +21,10 @@ def main(settings, inputs, outputs):
     for (name, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=False):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
         known = library.without(taken_out[name]) if taken_out[name] else library
-        result = diagnose(points, robot, masses, known, noise_mm, details=False, name=name)
+        result = diagnose(points, MeasuredRobot(robot, masses, noise_mm, name), known, details=False)
         label = {"check": "effect" if taken_out[name] else "label", "robot": name, "kind": kind}
         verdicts.append(label | {key: result.verdict[key] for key in VERDICT})
-        states.append(state_row(name, result.calibrated_errors, result.state))
+        states.append(state_row(name, result.attribution.calibrated.deviations, result.state))
     frames = {"withheld_verdicts": pd.DataFrame(verdicts), "withheld_states": pd.DataFrame(states)}
     tables.write_all(TABLES, frames, outputs)
 

@@ -107,7 +107,7 @@ def test_states_survive_as_text():
     calibrated, again = state_of(state_row("a", [0.5, 0.25], state))
     np.testing.assert_array_equal(calibrated, [0.5, 0.25])
     np.testing.assert_array_equal(again.deviations, state.deviations)
-    assert set(again.effects) == set(state.effects) and again.shapes == state.shapes
+    assert set(again.effects) == set(state.effects) and again.shape_values == state.shape_values
     assert all((again.effects[key] == value).all() for key, value in state.effects.items())
 
 
