@@ -1,68 +1,35 @@
 """The path behind a measurement table, as far as its columns tell. Lengths in mm, times in s."""
 
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_interp_spline
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.plan import connect
 
-# points of the path from one commanded point to the next, and of a transfer between runs
-STEPS, _TRANSFER_POINTS = 8, 28
+# points of the path from one commanded point to the next, and of a transfer between runs with its ends
+STEPS, _TRANSFER_STEPS = 8, 30
 # an interval at a run's end that is this much slower than the next leads to rest
 _SLOWER = 0.9
 
 
-@dataclass(frozen=True)
-class DrivenPath:
-    """What a robot was told to do at n points, in the order driven, and on the way between them; NaN where unknown.
-
-    position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3); time_s, payload_kg: (n,); path_mm (N, 3): everything that is
-    driven, transfers included, with the n points in its rows path_index.
-    """
-
-    position_mm: np.ndarray
-    velocity_mm_s: np.ndarray
-    acceleration_mm_s2: np.ndarray
-    time_s: np.ndarray
-    payload_kg: np.ndarray
-    path_mm: np.ndarray
-    path_index: np.ndarray
-
-
-def joined(paths, indices, transfer_points):
-    """Points (N, 3) of runs' paths, one after another, and the rows (n,) of their sampled points; indices: per run.
-
-    # ASSUME the robot goes straight from the end of a run to the start of the next, by so many points in between.
-    """
-    pieces, rows_of, length = [], [], 0
-    share = np.linspace(0.0, 1.0, transfer_points + 2)[1:-1, None]
-    for path, index in zip(paths, indices, strict=True):
-        if pieces:
-            last = pieces[-1][-1]
-            pieces.append(last + share * (path[0] - last))
-            length += transfer_points
-        pieces.append(path)
-        rows_of.append(length + index)
-        length += len(path)
-    return np.concatenate(pieces), np.concatenate(rows_of)
-
-
 def driven_path(measurements):
-    """The path driven at the n rows of a measurement table, all of them in the order driven.
+    """The path (N, 3) of everything that is driven, transfers included, and what a robot was told to do on it.
+
+    That is by name, of the n rows of a measurement table, all of them in the order driven: position_mm, velocity_mm_s,
+    acceleration_mm_s2 (n, 3), time_s, payload_kg and path_index, their places on the path (n,); NaN where nobody knows.
 
     # ASSUME the robot passes smoothly through a run's commanded points and rests where it slows down at an end. Speeds
     and accelerations come from the times; where a run has no increasing times they are NaN.
     """
-    position = rows.command(measurements)
-    time, payload = (measurements[name].to_numpy(dtype=float) for name in ("time_s", "payload_kg"))
-    run = measurements["run"].to_numpy()
+    position, run = rows.command(measurements), measurements["run"].to_numpy()
+    told = {name: measurements[name].to_numpy(dtype=float) for name in ("time_s", "payload_kg")}
     pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
-    derivatives = [_derivatives(position[piece], time[piece]) for piece in pieces]
+    derivatives = [_derivatives(position[piece], told["time_s"][piece]) for piece in pieces]
     velocity, acceleration = (np.concatenate(parts) for parts in zip(*derivatives, strict=True))
-    path, index = joined(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_POINTS)
-    return DrivenPath(position, velocity, acceleration, time, payload, path, index)
+    path, index = connect(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_STEPS)
+    told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
+    return path, told | {"path_index": index}
 
 
 def starts_of_runs(run):
@@ -75,6 +42,8 @@ def _derivatives(points, time):
 
     An end is one of rest where the robot slows down towards it; else the recording stopped or began on the way.
     """
+    from scipy.interpolate import CubicSpline
+
     nothing = np.full_like(points, np.nan)
     if len(points) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
         return nothing, nothing
@@ -88,6 +57,8 @@ def _derivatives(points, time):
 
 def _smooth(points):
     """Points (N, 3) of a smooth path through the points (k, 3) of one run and the rows (k,) of these in it."""
+    from scipy.interpolate import make_interp_spline
+
     at = np.arange(len(points)) * STEPS
     if len(points) == 1:
         return points, at

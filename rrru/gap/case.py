@@ -11,7 +11,7 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs
 from rrru.effects.effect import Contribution
-from rrru.effects.motion import make_motion
+from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.unknown import UNKNOWN, unknown_functions
 from rrru.plant.closure import corrected_sim
@@ -230,23 +230,12 @@ def at_reversals(motion, drive_unit):
 
 def _motion(measurements, mechanism, masses, actuators):
     """The motion that the effects see; at the measured points with the table's own actuator values."""
-    driven = driven_path(measurements)
-    path_drive = mechanism.inverse(driven.path_mm)
+    path, told = driven_path(measurements)
+    path_drive = mechanism.inverse(path)
     lost = ~np.isfinite(path_drive).all(axis=1)
     if lost.any():
         # what is out of reach stays where it was last
         good = np.flatnonzero(~lost)
         path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
-    path_drive[driven.path_index] = actuators
-    return make_motion(
-        mechanism,
-        masses,
-        driven.position_mm,
-        actuators,
-        path_drive,
-        driven.path_index,
-        driven.time_s,
-        driven.velocity_mm_s,
-        driven.acceleration_mm_s2,
-        driven.payload_kg,
-    )
+    path_drive[told["path_index"]] = actuators
+    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, **told))

@@ -12,7 +12,7 @@ CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
 
 @dataclass(frozen=True)
 class ShrinkStep:
-    """The gap after some effects are added: its square (n,) in mm^2 at each point, less the noise; draws (b, n) of it."""
+    """The gap after some effects are added: its square (n,) in mm^2 at each point, less noise; draws (b, n) of it."""
 
     added: str
     effects: tuple
