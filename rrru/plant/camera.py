@@ -22,6 +22,8 @@ import numpy as np
 _PLATE, _DOT = 215.0, 40.0
 # samples per pixel and axis
 _FINE = 2
+# rows of samples that are computed at a time
+_ROWS = 8
 # the inverse of the distortion ends after so many steps or below this many pixels
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-7)
 
@@ -106,18 +108,28 @@ def render(camera, target, rotation, translation_mm, generator):
     pixel noise.
     """
     to_plane = np.linalg.inv(np.column_stack([rotation[:, 0], rotation[:, 1], translation_mm]))
-    x, y = camera.rays
+    rays = camera.rays
+    # a few rows at a time stay in the processor's cache
+    blocks = [_greys(camera, target, to_plane, *rays[:, k : k + _ROWS]) for k in range(0, rays.shape[1], _ROWS)]
+    fine = np.concatenate(blocks, dtype=np.float32, casting="same_kind")
+    if camera.blur_px > 0.0:
+        fine = cv2.GaussianBlur(fine, (0, 0), camera.blur_px * _FINE, borderType=cv2.BORDER_REPLICATE)
+    size = camera.width_px, camera.height_px
+    image = cv2.resize(fine.astype(float), size, interpolation=cv2.INTER_AREA)
+    noisy = image + camera.noise_grey * generator.standard_normal(image.shape)
+    return np.clip(np.rint(noisy), 0.0, 255.0).astype(np.uint8)
+
+
+def _greys(camera, target, to_plane, x, y):
+    """Grey (m, k) of the target on rays x, y (m, k); to_plane (3, 3): from rays to the target's plane."""
     across, up, scale = (row[0] * x + row[1] * y + row[2] for row in to_plane)
     across, up = across / scale, up / scale
     column = np.clip(np.rint(across / target.pitch_mm), 0, target.columns - 1).astype(int)
     row = np.clip(np.rint(up / target.pitch_mm), 0, target.rows - 1).astype(int)
-    lattice = target.pitch_mm * np.stack([column, row]) + np.moveaxis(target.offsets_mm[row, column], -1, 0)
-    distance = np.hypot(across - lattice[0], up - lattice[1])
+    offsets = target.offsets_mm.reshape(-1, 2).take(target.columns * row + column, axis=0)
+    across -= target.pitch_mm * column + offsets[..., 0]
+    up -= target.pitch_mm * row + offsets[..., 1]
+    distance = np.sqrt(across * across + up * up)
     # the depth is 1 / scale; a sample on a dot's edge is covered by the share of it that lies inside
     covered = np.clip((target.diameter_mm / 2.0 - distance) * scale * camera.focal_px * _FINE + 0.5, 0.0, 1.0)
-    fine = (_PLATE + (_DOT - _PLATE) * covered).astype(np.float32)
-    if camera.blur_px > 0.0:
-        fine = cv2.GaussianBlur(fine, (0, 0), camera.blur_px * _FINE, borderType=cv2.BORDER_REPLICATE)
-    image = fine.reshape(camera.height_px, _FINE, camera.width_px, _FINE).mean(axis=(1, 3), dtype=float)
-    noisy = image + camera.noise_grey * generator.standard_normal(image.shape)
-    return np.clip(np.rint(noisy), 0.0, 255.0).astype(np.uint8)
+    return _PLATE + (_DOT - _PLATE) * covered
