@@ -1,111 +1,92 @@
 """Tables of the campaigns."""
 
-from rrru.store.schema import CAMPAIGN, NUMBER, STATUS, Column, Table, numbers, xyz
+from rrru.store.schema import read_tables
 
-_POINT = (
-    Column("run", "int64", "as in measurements"),
-    Column("trajectory", "str", "as in measurements"),
-    Column("point", "int64", "as in measurements"),
-)
-_NOISE_FROM = "given: by the configuration; repeats: pooled over repeated points; residuals: from the fit of all points"
-_MEASURES = ("translational_measure", "constraint_measure", "constraint_determinant")
-_STATUS_MEANS = (
-    "every point is kept; outlier and unsolved are left out of fits, "
-    "near_singularity only with use_near_singularity: false"
-)
+TABLES = read_tables("""
+run                    int    number of the pass, from 1 in the order driven
+trajectory             str    name of the trajectory
+point                  int    number of the point in its run, from 1
+time_s                 float? time since the campaign's start; null where the file has none
+command_{xyz}_mm       float  commanded position, robot frame
+measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
+speed_mm_s             float? speed of the run; null where the file has none
+payload_kg             float? payload on the platform; null where the file has none
+status                 str    every point is kept; outlier and unsolved are left out of fits, near_singularity only
+    with use_near_singularity: false {ok, outlier, near_singularity, unsolved}
+campaign               str    name of the campaign in the configuration
 
+## measurements | campaigns/{campaign}/measurements.parquet | run point
+One row per commanded point, robots with drive arms: what was commanded and what the instrument saw.
+--
+run trajectory point time_s command_{xyz}_mm
+theta1_rad             float  commanded drive angle of leg 1
+theta2_rad             float  commanded drive angle of leg 2
+theta3_rad             float  commanded drive angle of leg 3
+measured_{xyz}_mm speed_mm_s payload_kg status
 
-def _measurements(name, robots, drive, meaning):
-    """Schema of the measurement table of robots whose actuator values stand in columns such as theta1_rad."""
-    return Table(
-        name,
-        "campaigns/{campaign}/measurements.parquet",
-        f"One row per commanded point, {robots}: what was commanded and what the instrument saw.",
-        (
-            Column("run", "int64", "number of the pass, from 1 in the order driven"),
-            Column("trajectory", "str", "name of the trajectory"),
-            Column("point", "int64", "number of the point in its run, from 1"),
-            *numbers(True, time_s="time since the campaign's start; null where the file has none"),
-            *xyz("command", "mm", "commanded position, robot frame"),
-            *numbers(**{drive.format(leg): f"commanded {meaning} {leg}" for leg in (1, 2, 3)}),
-            *xyz("measured", "mm", "measured position, robot frame; null where the point was not measured", True),
-            *numbers(True, speed_mm_s="speed of the run; null where the file has none"),
-            *numbers(True, payload_kg="payload on the platform; null where the file has none"),
-            Column("status", "str", _STATUS_MEANS, allowed=STATUS),
-        ),
-        ("run", "point"),
-    )
+## slider_measurements | campaigns/{campaign}/measurements.parquet | run point
+One row per commanded point, robots with sliders: what was commanded and what the instrument saw.
+--
+run trajectory point time_s command_{xyz}_mm
+slider1_mm             float  commanded position of slider 1
+slider2_mm             float  commanded position of slider 2
+slider3_mm             float  commanded position of slider 3
+measured_{xyz}_mm speed_mm_s payload_kg status
 
+## truth | campaigns/{campaign}/truth.parquet | run point
+What only the virtual robot knows, one row per commanded point.
+--
+run                    int    as in measurements
+trajectory             str    as in measurements
+point                  int    as in measurements
+true_{xyz}_mm          float? true position, non-repeatability included; null where the chains do not close
+platform_rotation_rad  float? the platform's turn; null where the chains do not close
 
-TABLES = (
-    _measurements("measurements", "robots with drive arms", "theta{}_rad", "drive angle of leg"),
-    _measurements("slider_measurements", "robots with sliders", "slider{}_mm", "position of slider"),
-    Table(
-        "truth",
-        "campaigns/{campaign}/truth.parquet",
-        "What only the virtual robot knows, one row per commanded point.",
-        (
-            *_POINT,
-            *xyz("true", "mm", "true position, non-repeatability included; null where the chains do not close", True),
-            *numbers(True, platform_rotation_rad="the platform's turn; null where the chains do not close"),
-        ),
-        ("run", "point"),
-    ),
-    Table(
-        "singularity",
-        "tables/singularity.parquet",
-        "Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: "
-        "0 at it, 1 at best).",
-        (
-            CAMPAIGN,
-            *_POINT,
-            *numbers(
-                translational_measure="0 where the platform can move with locked drives",
-                constraint_measure="0 where the platform can turn with locked drives; eq. (8) does not see it",
-                constraint_determinant="changes its sign across a constraint singularity",
-            ),
-            Column("status", "str", "as in measurements", allowed=STATUS),
-        ),
-        ("campaign", "run", "point"),
-    ),
-    Table(
-        "workspace",
-        "campaigns/{campaign}/workspace.parquet",
-        "Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.",
-        (
-            CAMPAIGN,
-            Column("slice", "str", "plane", allowed=("xz", "xy")),
-            *numbers(**{f"{axis}_mm": f"grid point, {axis}, robot frame" for axis in "xyz"}),
-            Column("reachable", "bool", "true where all three legs reach"),
-            *numbers(True, **dict.fromkeys(_MEASURES, "as in singularity; null out of reach")),
-        ),
-        ("slice", "x_mm", "y_mm", "z_mm"),
-    ),
-    Table(
-        "campaigns",
-        "tables/campaigns.parquet",
-        "One row per campaign: where it came from and what state it is in.",
-        (
-            CAMPAIGN,
-            Column("robot", "str", "mechanism"),
-            Column("source", "str", "virtual robot or file"),
-            Column("points", "int64", "commanded points"),
-            Column("runs", "int64", "passes"),
-            *(Column(name, "int64", f"points with status {name}") for name in STATUS),
-            Column("noise_mm", NUMBER, "measuring noise per axis, 1 sigma"),
-            Column("noise_from", "str", _NOISE_FROM, allowed=("given", "repeats", "residuals")),
-            *numbers(
-                True,
-                platform_mass_kg="the real robot's platform, as given; null where it was not",
-                registration_rms_mm="residual of the frame registration; null where the frame was the robot's",
-                registration_max_mm="largest residual of the frame registration",
-            ),
-            *numbers(
-                min_translational_measure="nearest approach to a translational singularity",
-                min_constraint_measure="nearest approach to a constraint singularity",
-            ),
-            Column("notes", "str", "what was computed or missing on ingest; empty where nothing was"),
-        ),
-        ("campaign",),
-    ),
-)
+## singularity | tables/singularity.parquet | campaign run point
+Distance of every commanded point from both kinds of singularity (smallest singular value of three unit rows: 0 at it,
+1 at best).
+--
+campaign
+run                    int    as in measurements
+trajectory             str    as in measurements
+point                  int    as in measurements
+translational_measure  float  0 where the platform can move with locked drives
+constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
+constraint_determinant float  changes its sign across a constraint singularity
+status                 str    as in measurements {ok, outlier, near_singularity, unsolved}
+
+## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
+Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.
+--
+campaign
+slice                  str    plane {xz, xy}
+x_mm                   float  grid point, x, robot frame
+y_mm                   float  grid point, y, robot frame
+z_mm                   float  grid point, z, robot frame
+reachable              bool   true where all three legs reach
+translational_measure  float? as in singularity; null out of reach
+constraint_measure     float? as in singularity; null out of reach
+constraint_determinant float? as in singularity; null out of reach
+
+## campaigns | tables/campaigns.parquet | campaign
+One row per campaign: where it came from and what state it is in.
+--
+campaign
+robot                  str    mechanism
+source                 str    virtual robot or file
+points                 int    commanded points
+runs                   int    passes
+ok                     int    points with status ok
+outlier                int    points with status outlier
+near_singularity       int    points with status near_singularity
+unsolved               int    points with status unsolved
+noise_mm               float  measuring noise per axis, 1 sigma
+noise_from             str    given: by the configuration; repeats: pooled over repeated points; residuals: from the
+    fit of all points {given, repeats, residuals}
+platform_mass_kg       float? the real robot's platform, as given; null where it was not
+registration_rms_mm    float? residual of the frame registration; null where the frame was the robot's
+registration_max_mm    float? largest residual of the frame registration
+min_translational_measure float  nearest approach to a translational singularity
+min_constraint_measure float  nearest approach to a constraint singularity
+notes                  str    what was computed or missing on ingest; empty where nothing was
+""")

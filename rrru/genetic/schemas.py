@@ -1,159 +1,114 @@
 """Tables of the genetic algorithm and its sweeps."""
 
-from rrru.store.schema import CALIBRATION, CAMPAIGN, HISTORY, METHOD, NUMBER, SETTING, Column, Table
+from rrru.store.schema import read_tables
 
-TABLES = (
-    Table(
-        "genetic",
-        "tables/genetic.parquet",
-        "One row per run of the genetic algorithm with the chosen settings, beside the least mean distance that it should find.",
-        (
-            CAMPAIGN,
-            CALIBRATION,
-            Column("seed", "int64", "number of the run"),
-            Column("objective_mm", NUMBER, "mean distance that the run reached"),
-            Column("generations", "int64", "generations done"),
-            Column("evaluations", "int64", "evaluations of the objective"),
-            Column("stopped", "str", "why it stopped", allowed=("generations", "stalled")),
-            Column("polished_mm", NUMBER, "mean distance after a local polish from where the run ended"),
-            Column("optimum_mm", NUMBER, "least mean distance within the bounds, found from the least-squares fit"),
-            Column("polish_evaluations", "int64", "evaluations of the local polish"),
-            Column("excess", NUMBER, "objective_mm / optimum_mm - 1; null where the optimum is zero", True),
-            Column("polished_excess", NUMBER, "polished_mm / optimum_mm - 1; null where the optimum is zero", True),
-            *(
-                Column(
-                    name,
-                    NUMBER,
-                    f"error that the run found, {'rad' if name.startswith('dtheta') else 'mm'}; null for a robot without it",
-                    True,
-                )
-                for name in (
-                    "dtheta1",
-                    "dtheta2",
-                    "dtheta3",
-                    "dL1",
-                    "dL2",
-                    "dL3",
-                    "dR",
-                    "dr",
-                    "db1",
-                    "db2",
-                    "db3",
-                    "dL",
-                    "dl1",
-                    "dl2",
-                )
-            ),
-            Column(
-                "da", NUMBER, "dr - dR, the part of both that can be identified, mm; null for a robot without it", True
-            ),
-        ),
-        ("campaign", "calibration", "seed"),
-    ),
-    Table(
-        "genetic_history",
-        "tables/genetic_history.parquet",
-        "Convergence of the runs in `genetic`: every generation up to 100, every 10th after it, and the last.",
-        (CAMPAIGN, CALIBRATION, *HISTORY),
-        ("campaign", "calibration", "seed", "generation"),
-    ),
-    Table(
-        "genetic_against_least_squares",
-        "tables/genetic_against_least_squares.parquet",
-        "Methods side by side on every calibration; the genetic algorithm's entries are medians over its seeds.",
-        (
-            CAMPAIGN,
-            CALIBRATION,
-            METHOD,
-            Column("runs", "int64", "seeds; 1 for what has none"),
-            Column("mean_mm", NUMBER, "mean distance reached (median over the seeds)"),
-            Column("worst_mean_mm", NUMBER, "mean distance of the worst seed"),
-            Column("excess", NUMBER, "mean_mm over the least mean distance - 1; null where that is zero", True),
-            Column("evaluations", NUMBER, "evaluations of all residuals (median over the seeds)"),
-            Column(
-                "angle_error_rad",
-                NUMBER,
-                "RMS deviation of the drive-angle errors from the truth; null where nobody knows it",
-                True,
-            ),
-            Column("length_error_mm", NUMBER, "RMS deviation of dL1, dL2, dL3 and da from the truth", True),
-        ),
-        ("campaign", "calibration", "method"),
-    ),
-    Table(
-        "timings",
-        "timings/{campaign}.parquet",
-        "Time of one calibration by each method on this machine; the only table whose bytes differ from run to run.",
-        (
-            CAMPAIGN,
-            CALIBRATION,
-            METHOD,
-            Column("seconds", NUMBER, "wall time of one calibration (median over the seeds)"),
-        ),
-        ("campaign", "calibration", "method"),
-    ),
-    Table(
-        "sweep_runs",
-        "tables/sweep_runs.parquet",
-        "One row per run of the sweeps of the crossover and migration fraction.",
-        (
-            *SETTING,
-            Column("seed", "int64", "number of the run"),
-            Column("objective_mm", NUMBER, "mean distance that the run reached"),
-            Column("generations", "int64", "generations done"),
-            Column("evaluations", "int64", "evaluations of the objective"),
-            Column("stopped", "str", "why it stopped", allowed=("generations", "stalled")),
-            *(
-                Column(
-                    name,
-                    NUMBER,
-                    "error that the run found, rad" if name.startswith("dtheta") else "error that the run found, mm",
-                )
-                for name in ("dtheta1", "dtheta2", "dtheta3", "dL1", "dL2", "dL3", "dR", "dr")
-            ),
-        ),
-        ("parameter", "population", "value", "seed"),
-    ),
-    Table(
-        "sweep_history",
-        "tables/sweep_history.parquet",
-        "Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th after it, and the last.",
-        (*SETTING, *HISTORY),
-        ("parameter", "population", "value", "seed", "generation"),
-    ),
-    Table(
-        "sweep_effect",
-        "tables/sweep_effect.parquet",
-        "Whether a setting's effect can be told from the seeds' scatter: Kruskal-Wallis test over all values.",
-        (
-            *SETTING[:2],
-            Column("settings", "int64", "values compared"),
-            Column("runs", "int64", "runs compared"),
-            Column("statistic", NUMBER, "H"),
-            Column("p_value", NUMBER, "chance of such differences if the setting did nothing"),
-            Column("epsilon_squared", NUMBER, "share of the rank variance that the setting explains"),
-            Column("statistic_mutating", NUMBER, "H without the crossover fraction 1.0, where nothing mutates"),
-            Column("p_value_mutating", NUMBER, "the same"),
-            Column("epsilon_squared_mutating", NUMBER, "the same"),
-            Column("distinguishable_mutating", "bool", "p_value_mutating below 5 %"),
-        ),
-        ("parameter", "population"),
-    ),
-    Table(
-        "sweep_pairs",
-        "tables/sweep_pairs.parquet",
-        "Every value against the one with the lowest median: Mann-Whitney test, corrected after Holm.",
-        (
-            *SETTING,
-            Column("best_value", NUMBER, "value with the lowest median"),
-            Column("median_mm", NUMBER, "median mean distance"),
-            Column("difference_mm", NUMBER, "median minus that of the best value"),
-            Column("difference_low_mm", NUMBER, "lower end of the 95 % bootstrap interval", True),
-            Column("difference_high_mm", NUMBER, "upper end", True),
-            Column("p_value", NUMBER, "Mann-Whitney, two-sided"),
-            Column("p_holm", NUMBER, "corrected for the number of values"),
-            Column("distinguishable", "bool", "p_holm below 5 %"),
-        ),
-        ("parameter", "population", "value"),
-    ),
-)
+TABLES = read_tables("""
+campaign               str    name of the campaign in the configuration
+calibration            str    set of trajectories that was calibrated on; none before any calibration
+seed                   int    number of the run
+objective_mm           float  mean distance that the run reached
+generations            int    generations done
+evaluations            int    evaluations of the objective
+stopped                str    why it stopped {generations, stalled}
+generation             int    0: initial population
+best_mm                float  lowest mean distance so far
+mean_mm                float  mean over the population; infinite where a member is out of reach
+method                 str    how: least_squares, least_mean_distance (the optimum of the paper's objective), genetic;
+    none before
+parameter              str    swept setting {crossover_fraction, migration_fraction}
+population             str    one population, or islands {one, islands}
+value                  float  value of the setting
+
+## genetic | tables/genetic.parquet | campaign calibration seed
+One row per run of the genetic algorithm with the chosen settings, beside the least mean distance that it should find.
+--
+campaign calibration seed objective_mm generations evaluations stopped
+polished_mm            float  mean distance after a local polish from where the run ended
+optimum_mm             float  least mean distance within the bounds, found from the least-squares fit
+polish_evaluations     int    evaluations of the local polish
+excess                 float? objective_mm / optimum_mm - 1; null where the optimum is zero
+polished_excess        float? polished_mm / optimum_mm - 1; null where the optimum is zero
+dtheta1                float? error that the run found, rad; null for a robot without it
+dtheta2                float? error that the run found, rad; null for a robot without it
+dtheta3                float? error that the run found, rad; null for a robot without it
+dL1                    float? error that the run found, mm; null for a robot without it
+dL2                    float? error that the run found, mm; null for a robot without it
+dL3                    float? error that the run found, mm; null for a robot without it
+dR                     float? error that the run found, mm; null for a robot without it
+dr                     float? error that the run found, mm; null for a robot without it
+db1                    float? error that the run found, mm; null for a robot without it
+db2                    float? error that the run found, mm; null for a robot without it
+db3                    float? error that the run found, mm; null for a robot without it
+dL                     float? error that the run found, mm; null for a robot without it
+dl1                    float? error that the run found, mm; null for a robot without it
+dl2                    float? error that the run found, mm; null for a robot without it
+da                     float? dr - dR, the part of both that can be identified, mm; null for a robot without it
+
+## genetic_history | tables/genetic_history.parquet | campaign calibration seed generation
+Convergence of the runs in `genetic`: every generation up to 100, every 10th after it, and the last.
+--
+campaign calibration seed generation best_mm mean_mm
+
+## genetic_against_least_squares | tables/genetic_against_least_squares.parquet | campaign calibration method
+Methods side by side on every calibration; the genetic algorithm's entries are medians over its seeds.
+--
+campaign calibration method
+runs                   int    seeds; 1 for what has none
+mean_mm                float  mean distance reached (median over the seeds)
+worst_mean_mm          float  mean distance of the worst seed
+excess                 float? mean_mm over the least mean distance - 1; null where that is zero
+evaluations            float  evaluations of all residuals (median over the seeds)
+angle_error_rad        float? RMS deviation of the drive-angle errors from the truth; null where nobody knows it
+length_error_mm        float? RMS deviation of dL1, dL2, dL3 and da from the truth
+
+## timings | timings/{campaign}.parquet | campaign calibration method
+Time of one calibration by each method on this machine; the only table whose bytes differ from run to run.
+--
+campaign calibration method
+seconds                float  wall time of one calibration (median over the seeds)
+
+## sweep_runs | tables/sweep_runs.parquet | parameter population value seed
+One row per run of the sweeps of the crossover and migration fraction.
+--
+parameter population value seed objective_mm generations evaluations stopped
+dtheta1                float  error that the run found, rad
+dtheta2                float  error that the run found, rad
+dtheta3                float  error that the run found, rad
+dL1                    float  error that the run found, mm
+dL2                    float  error that the run found, mm
+dL3                    float  error that the run found, mm
+dR                     float  error that the run found, mm
+dr                     float  error that the run found, mm
+
+## sweep_history | tables/sweep_history.parquet | parameter population value seed generation
+Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th after it, and the last.
+--
+parameter population value seed generation best_mm mean_mm
+
+## sweep_effect | tables/sweep_effect.parquet | parameter population
+Whether a setting's effect can be told from the seeds' scatter: Kruskal-Wallis test over all values.
+--
+parameter population
+settings               int    values compared
+runs                   int    runs compared
+statistic              float  H
+p_value                float  chance of such differences if the setting did nothing
+epsilon_squared        float  share of the rank variance that the setting explains
+statistic_mutating     float  H without the crossover fraction 1.0, where nothing mutates
+p_value_mutating       float  the same
+epsilon_squared_mutating float  the same
+distinguishable_mutating bool   p_value_mutating below 5 %
+
+## sweep_pairs | tables/sweep_pairs.parquet | parameter population value
+Every value against the one with the lowest median: Mann-Whitney test, corrected after Holm.
+--
+parameter population value
+best_value             float  value with the lowest median
+median_mm              float  median mean distance
+difference_mm          float  median minus that of the best value
+difference_low_mm      float? lower end of the 95 % bootstrap interval
+difference_high_mm     float? upper end
+p_value                float  Mann-Whitney, two-sided
+p_holm                 float  corrected for the number of values
+distinguishable        bool   p_holm below 5 %
+""")

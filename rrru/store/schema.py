@@ -1,13 +1,16 @@
-"""What a schema is made of, and the columns that many tables share."""
+"""What a schema is made of, and how it is read from rows of text."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
+
+_KINDS = {"int": "int64", "float": "float64", "str": "str", "bool": "bool"}
+# name, kind, description, {allowed values}
+_ROW = re.compile(r"(\S+) +(int|float|str|bool)(\??) +(.*?)(?: +\{([^}]*)\})?$")
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: name with its unit, kind (int64, float64, str, bool), meaning; `allowed` lists the values of a closed
-    set.
-    """
+    """One column: name with its unit, kind (int64, float64, str, bool), meaning, and the values of a closed set."""
 
     name: str
     kind: str
@@ -43,41 +46,44 @@ class Table:
         return pa.DataFrameSchema(columns, strict=True, coerce=True, unique=list(self.key) or None)
 
 
-def xyz(prefix, suffix, text, nullable=False):
-    """Three columns for the axes."""
-    return tuple(Column(f"{prefix}_{axis}_{suffix}", "float64", f"{text}, {axis}", nullable) for axis in "xyz")
+def read_tables(text):
+    """Tables out of rows of text, in blocks that blank lines separate.
+
+    A block that begins with "## name | path | key" is a table: lines that describe it, "--", then its columns. A column
+    is "name kind description {allowed, values}", continued on indented lines, its kind int, float, str or bool, with ?
+    where it may be null; {xyz} in its name makes one for each axis. A block without a heading holds columns that tables
+    share: there a line of their names stands for them.
+    """
+    shared, tables = {}, []
+    for block in text.strip().split("\n\n"):
+        if not block.startswith("## "):
+            shared |= {line.split()[0]: tuple(_columns(line, {})) for line in _lines(block)}
+            continue
+        heading, _, rest = block.removeprefix("## ").partition("\n")
+        name, path, key = (part.strip() for part in heading.split("|"))
+        description, _, rows = rest.partition("\n--\n")
+        columns = tuple(_columns(rows, shared))
+        tables.append(Table(name, path, " ".join(description.split()), columns, tuple(key.split())))
+    return tuple(tables)
 
 
-def numbers(nullable=False, **texts):
-    """One column of numbers per name, with its description."""
-    return tuple(Column(name, "float64", text, nullable) for name, text in texts.items())
+def _columns(text, shared):
+    """Columns of the lines of a block."""
+    for line in _lines(text):
+        row = _ROW.match(line)
+        if not row:
+            yield from (column for name in line.split() for column in shared[name])
+            continue
+        name, kind, null, description, allowed = row.groups()
+        values = tuple(value.strip() for value in allowed.split(",")) if allowed else ()
+        column = Column(name, _KINDS[kind], description, bool(null), values)
+        if "{xyz}" not in name:
+            yield column
+            continue
+        for axis in "xyz":
+            yield replace(column, name=name.replace("{xyz}", axis), description=f"{description}, {axis}")
 
 
-CAMPAIGN = Column("campaign", "str", "name of the campaign in the configuration")
-CALIBRATION = Column("calibration", "str", "set of trajectories that was calibrated on; none before any calibration")
-METHOD = Column(
-    "method",
-    "str",
-    "how: least_squares, least_mean_distance (the optimum of the paper's objective), genetic; none before",
-)
-MODE = Column(
-    "mode",
-    "str",
-    "before: measured minus commanded; model: measured minus calibrated model; closed_loop: driven again with corrected commands",
-    allowed=("before", "model", "closed_loop"),
-)
-NUMBER = "float64"
-
-SETTING = (
-    Column("parameter", "str", "swept setting", allowed=("crossover_fraction", "migration_fraction")),
-    Column("population", "str", "one population, or islands", allowed=("one", "islands")),
-    Column("value", NUMBER, "value of the setting"),
-)
-HISTORY = (
-    Column("seed", "int64", "number of the run"),
-    Column("generation", "int64", "0: initial population"),
-    Column("best_mm", NUMBER, "lowest mean distance so far"),
-    Column("mean_mm", NUMBER, "mean over the population; infinite where a member is out of reach"),
-)
-
-STATUS = ("ok", "outlier", "near_singularity", "unsolved")
+def _lines(text):
+    """Lines of a block, those that are continued in one."""
+    return re.sub(r"\n {2,}", " ", text).splitlines()

@@ -8,8 +8,8 @@ from rrru.robots.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.withheld.schemas import TABLES, VERDICT
-from rrru.studies.withheld.states import state_row
+from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.withheld.states import VERDICT, state_row
 
 
 def main(settings, inputs, outputs):

@@ -5,7 +5,7 @@ import pandas as pd
 
 from rrru.effects.library import EFFECTS
 from rrru.errors import ConfigError
-from rrru.studies.withheld.schemas import VERDICT
+from rrru.studies.withheld.states import VERDICT
 from rrru.studies.withheld.verdicts import in_order, is_outside, scores
 
 

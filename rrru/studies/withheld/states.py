@@ -6,6 +6,9 @@ import numpy as np
 
 from rrru.gap.case import State
 
+# what a verdict is scored by
+VERDICT = ["effects", "probability", "leg", "gap_rms_mm", "noise_rms_mm", "share_closed"]
+
 
 def state_row(robot, calibrated, state):
     """Row of `withheld_states` from the calibrated deviations (p,) and the corrected sim."""

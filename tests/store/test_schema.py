@@ -1,0 +1,40 @@
+"""Tables read from rows of text."""
+
+from rrru.store.schema import Column, Table, read_tables
+
+_TEXT = """
+run          int    number of the pass,
+    from 1
+{xyz}_mm     float? place
+
+## paths | tables/paths.parquet | run point
+What was driven,
+point by point.
+--
+run {xyz}_mm
+point        int    number
+state        str    what became of it {ok, lost}
+
+## flags | flags.parquet | run
+Which were seen.
+--
+run
+seen         bool   whether {curly} words stay words here
+"""
+
+
+def test_rows_of_text_are_the_tables_that_they_say():
+    run = Column("run", "int64", "number of the pass, from 1")
+    place = tuple(Column(f"{axis}_mm", "float64", f"place, {axis}", True) for axis in "xyz")
+    state = Column("state", "str", "what became of it", allowed=("ok", "lost"))
+    number, seen = Column("point", "int64", "number"), Column("seen", "bool", "whether {curly} words stay words here")
+    assert read_tables(_TEXT) == (
+        Table(
+            "paths",
+            "tables/paths.parquet",
+            "What was driven, point by point.",
+            (run, *place, number, state),
+            ("run", "point"),
+        ),
+        Table("flags", "flags.parquet", "Which were seen.", (run, seen), ("run",)),
+    )
