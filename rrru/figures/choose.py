@@ -50,9 +50,8 @@ def trajectories(paths, pattern, figure):
     present = sorted(paths["trajectory"].unique(), key=natural)
     chosen = [name for name in present if fnmatchcase(name, pattern)]
     if not chosen:
-        raise ConfigError(
-            f"{figure}: the campaign has no trajectory {pattern!r}; it has {', '.join(present) or 'none'}"
-        )
+        known = ", ".join(present) or "none"
+        raise ConfigError(f"{figure}: the campaign has no trajectory {pattern!r}; it has {known}")
     return chosen
 
 
@@ -77,20 +76,16 @@ def before(tables, options, figure):
 
 
 def after(tables, options, calibration, figure):
-    """Rows of `errors` under a calibration, and their mode; raises ConfigError naming the calibration where there are
-    none.
-    """
-    errors = of_campaign(tables, "errors", options["campaign"], figure)
+    """Rows of `errors` under a calibration, and their mode; raises ConfigError where there are none."""
+    campaign, method = options["campaign"], options["method"]
+    errors = of_campaign(tables, "errors", campaign, figure)
     mode = mode_of(errors, options)
-    rows = errors[
-        (errors["calibration"] == calibration) & (errors["method"] == options["method"]) & (errors["mode"] == mode)
-    ]
+    drawn = errors[errors["mode"] == mode]
+    rows = drawn[(drawn["calibration"] == calibration) & (drawn["method"] == method)]
     if rows.empty:
-        known = errors.loc[errors["mode"] == mode, "calibration"]
-        raise ConfigError(
-            f"{figure}: campaign {options['campaign']!r} has no errors under calibration {calibration!r} by {options['method']!r}"
-            f" (mode {mode}); it has {_listed(known)}"
-        )
+        wanted = f"calibration {calibration!r} by {method!r} (mode {mode})"
+        known = _listed(drawn["calibration"])
+        raise ConfigError(f"{figure}: campaign {campaign!r} has no errors under {wanted}; it has {known}")
     return rows, mode
 
 
@@ -100,30 +95,24 @@ def after_label(calibration, mode):
 
 
 def stations(paths, trajectory):
-    """Points of a trajectory in all passes with their station: the number of the nearest point of the first pass, from
-    1.
+    """Points of a trajectory in all passes with their station: the number of the first pass's nearest point, from 1.
 
     So passes in the other direction, or of another number of points, lie at the right places. Columns run, point,
     station, the command of the first pass there (x_mm, y_mm, z_mm) and status.
     """
     rows = paths[paths["trajectory"] == trajectory].sort_values(["run", "point"])
     position = rows[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-    first = position[(rows["run"] == rows["run"].iloc[0]).to_numpy()]
-    distance = np.linalg.norm(position[:, None] - first[None], axis=2)
-    index = distance.argmin(axis=1)
-    same_run = (rows["run"] == rows["run"].iloc[0]).to_numpy()
+    in_first = (rows["run"] == rows["run"].iloc[0]).to_numpy()
+    first = position[in_first]
+    index = np.linalg.norm(position[:, None] - first, axis=2).argmin(axis=1)
     # a closed path passes the same place twice: in the first pass every point is its own station
-    index[same_run] = np.arange(len(first))
-    place = first[index]
-    return rows[["run", "point", "status"]].assign(
-        station=index + 1, x_mm=place[:, 0], y_mm=place[:, 1], z_mm=place[:, 2]
-    )
+    index[in_first] = np.arange(len(first))
+    place = dict(zip(("x_mm", "y_mm", "z_mm"), first[index].T, strict=True))
+    return rows[["run", "point", "status"]].assign(station=index + 1, **place)
 
 
 def along(errors, places, columns=("error_mm",)):
-    """Mean, lowest and highest value of error columns at each station over the passes: frames indexed by station, null
-    where none.
-    """
+    """Mean, lowest and highest of error columns at each station over the passes: frames by station, null where none."""
     joined = places.merge(errors[["run", "point", *columns]], on=["run", "point"], how="left", validate="one_to_one")
     groups = joined.groupby("station")[list(columns)]
     return groups.mean(), groups.min(), groups.max()

@@ -1,6 +1,7 @@
 """How the genetic algorithm converges, seed by seed, against the optimum of its own objective."""
 
 import numpy as np
+from matplotlib.collections import LineCollection
 
 from rrru.errors import ConfigError
 from rrru.figures import choose, style
@@ -20,58 +21,36 @@ def convergence(tables, options):
     names = list(dict.fromkeys(history["calibration"]))
     missing = [name for name in names if not (runs["calibration"] == name).any()]
     if missing:
-        raise ConfigError(
-            f"convergence: table genetic of campaign {campaign!r} has no calibration {', '.join(missing)}"
-        )
-    columns = min(len(names), 2)
-    rows = -(-len(names) // columns)
-    figure = style.new(style.DOUBLE_MM if columns > 1 else style.SINGLE_MM, 14.0 + 55.0 * rows)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for axes in grid.ravel()[len(names) :]:
-        axes.set_axis_off()
-    for place, (name, axes) in enumerate(zip(names, grid.ravel(), strict=False)):
+        lacking = f"no calibration {', '.join(missing)}"
+        raise ConfigError(f"convergence: table genetic of campaign {campaign!r} has {lacking}")
+    figure, panels = style.panel_grid(len(names), 55.0, sharex=True, sharey=True)
+    for place, (name, axes) in enumerate(zip(names, panels[:, 0], strict=True)):
         optimum = float(runs.loc[runs["calibration"] == name, "optimum_mm"].iloc[0])
         _panel(axes, history[history["calibration"] == name], optimum)
         axes.set_title(f"({chr(97 + place)}) {choose.calibration_label(name)}, optimum {optimum:.4f} mm")
-        axes.tick_params(labelbottom=place + columns >= len(names))
-        if place + columns >= len(names):
-            axes.set_xlabel("generation")
-    for row in grid:
-        row[0].set_ylabel("excess over the optimum (mm)")
-    style.legend_above(figure, grid.ravel()[: len(names)], columns=5 if columns > 1 else 2)
+        lowest = place + 2 >= len(names)
+        axes.tick_params(labelbottom=lowest)
+        axes.set_xlabel("generation" if lowest else "")
+        axes.set_ylabel("" if place % 2 else "excess over the optimum (mm)")
+    style.legend_above(figure, panels[:, 0], columns=5 if len(names) > 1 else 2)
     return figure
 
 
 def _panel(axes, history, optimum):
     """Every seed as a thin line, their median and quartiles; a run that has stopped keeps what it reached."""
     wide = history.pivot(index="generation", columns="seed", values="best_mm").sort_index()
-    ends = history.groupby("seed")["generation"].max()
-    excess = wide.where(np.isfinite(wide)).ffill() - optimum
     # a log axis has no zero: a run that has reached the optimum is drawn there
-    excess = excess.clip(lower=_FLOOR_MM)
-    place = excess.index.to_numpy()
-    for seed in excess:
-        alive = excess.index <= ends[seed]
-        axes.plot(place[alive], excess.loc[alive, seed], color=style.SKY, linewidth=0.4, zorder=1, label="one seed")
-        axes.plot(
-            ends[seed],
-            excess.loc[ends[seed], seed],
-            ".",
-            color=style.SKY,
-            markersize=3.0,
-            zorder=2,
-            label="end of a run",
-        )
+    excess = (wide.where(np.isfinite(wide)).ffill() - optimum).clip(lower=_FLOOR_MM)
+    place, ends = excess.index.to_numpy(), history.groupby("seed")["generation"].max()
+    runs = [np.column_stack([place, excess[seed]])[place <= end] for seed, end in ends.items()]
+    seeds = LineCollection(runs, colors=style.SKY, linewidths=0.4, zorder=1, label="one seed")
+    axes.add_collection(seeds)
+    last = np.array([run[-1] for run in runs])
+    axes.plot(*last.T, ".", color=style.SKY, markersize=3.0, zorder=2, label="end of a run")
     low, high = excess.quantile(0.25, axis=1), excess.quantile(0.75, axis=1)
     axes.fill_between(place, low, high, color=style.BLUE, alpha=0.25, linewidth=0.0, zorder=3, label="quartiles")
-    axes.plot(
-        place,
-        excess.median(axis=1),
-        color=style.BLUE,
-        linewidth=1.4,
-        zorder=4,
-        label=f"median of {excess.shape[1]} seeds",
-    )
+    median = f"median of {excess.shape[1]} seeds"
+    axes.plot(place, excess.median(axis=1), color=style.BLUE, linewidth=1.4, zorder=4, label=median)
     # generation 0, the initial population, has its place on a log axis that is linear up to 1
     axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
     axes.set_yscale("log")

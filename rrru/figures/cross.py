@@ -1,6 +1,7 @@
 """Every calibration applied to every trajectory."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.ticker import LogLocator
 
@@ -23,18 +24,20 @@ def cross(tables, options):
     after = summary[(summary["mode"] == mode) & (summary["method"] == options["method"])]
     rows = ["before", *dict.fromkeys(after["calibration"])]
     present = [name for name in summary["trajectory"].unique() if name not in _NOT_SHOWN]
-    columns = [
-        *sorted((name for name in present if name not in _GROUPS), key=choose.natural),
-        *(g for g in _GROUPS if g in present),
+    single = sorted((name for name in present if name not in _GROUPS), key=choose.natural)
+    columns = [*single, *(name for name in _GROUPS if name in present)]
+    shown = pd.concat([before, after]).drop_duplicates(["calibration", "trajectory"], keep="last")
+    both = [
+        shown.pivot(index="calibration", columns="trajectory", values=size).reindex(rows)[columns].to_numpy(dtype=float)
+        for size in ("mean_mm", "max_mm")
     ]
-    both = {column: _matrix(before, after, column, rows, columns) for column in ("mean_mm", "max_mm")}
     beside = len(columns) <= _SIDE_BY_SIDE
     height = 8.0 * len(rows) + 22.0
     figure = style.new(style.DOUBLE_MM, height + 22.0 if beside else 2.0 * height + 14.0)
     panels = figure.subplots(*((1, 2) if beside else (2, 1)), sharey=beside)
-    scale = _scale(both.values())
+    scale = _scale(np.concatenate(both))
     meaning = "residual of the calibrated model" if mode == "model" else "error when driven again"
-    for mark, word, axes, matrix in zip("ab", ("mean", "largest"), panels, both.values(), strict=True):
+    for mark, word, axes, matrix in zip("ab", ("mean", "largest"), panels, both, strict=True):
         image = _panel(axes, matrix, scale, rows, columns)
         axes.set_title(f"({mark}) {word} {meaning} (mm)")
         axes.set_xlabel("applied to")
@@ -47,21 +50,10 @@ def cross(tables, options):
     return figure
 
 
-def _matrix(before, after, column, rows, columns):
-    """Errors (rows, columns), NaN where there is none."""
-    cells = {}
-    for frame in (before, after):
-        cells.update(dict(zip(zip(frame["calibration"], frame["trajectory"], strict=True), frame[column], strict=True)))
-    return np.array([[cells.get((row, name), np.nan) for name in columns] for row in rows], dtype=float)
-
-
-def _scale(matrices):
+def _scale(values):
     """One log colour scale for all panels."""
-    values = np.concatenate([matrix.ravel() for matrix in matrices])
     values = values[np.isfinite(values) & (values > 0.0)]
-    if not values.size:
-        return LogNorm(0.1, 1.0)
-    return LogNorm(values.min(), max(values.max(), values.min() * 1.1))
+    return LogNorm(values.min(), max(values.max(), values.min() * 1.1)) if values.size else LogNorm(0.1, 1.0)
 
 
 def _panel(axes, matrix, scale, rows, columns):

@@ -16,22 +16,16 @@ def observability(tables, options):
     """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     names = list(dict.fromkeys(rows["calibration"]))
-    columns = min(len(names), 2)
-    lines = -(-len(names) // columns)
-    figure = style.new(style.DOUBLE_MM if columns > 1 else style.SINGLE_MM, 14.0 + 58.0 * lines)
-    grid = figure.subplots(lines, 2 * columns, squeeze=False, width_ratios=[2.6, 1.0] * columns)
-    pairs = grid.reshape(-1, 2)
+    widths = [2.6, 1.0] * min(len(names), 2)
+    figure, panels = style.panel_grid(len(names), 58.0, each=2, width_ratios=widths)
     limits = _error_limits(rows["standard_error_mm"])
-    for place, (name, (weights, errors)) in enumerate(zip(names, pairs, strict=False)):
+    for place, (name, (weights, errors)) in enumerate(zip(names, panels, strict=True)):
         part = rows[rows["calibration"] == name]
         image = _weights(weights, part)
         weights.set_title(f"({chr(97 + place)}) {choose.calibration_label(name)}")
+        weights.set_ylabel("" if place % 2 else "direction, best seen first")
         _errors(errors, part, limits)
-        if place % columns == 0:
-            weights.set_ylabel("direction, best seen first")
-    for axes in pairs[len(names) :].ravel():
-        axes.set_axis_off()
-    bar = figure.colorbar(image, ax=list(grid.ravel()), location="top", fraction=0.03, aspect=50, shrink=0.6)
+    bar = figure.colorbar(image, ax=figure.axes, location="top", fraction=0.03, aspect=50, shrink=0.6)
     bar.set_label("size of the weight in the unit direction (angles as arcs at the end of the drive arm)")
     return figure
 

@@ -42,6 +42,7 @@ _STYLE = {
     "axes.titlesize": 8.0,
     "axes.titlelocation": "left",
     "axes.titlepad": 4.0,
+    "axes.titley": 1.0,
     "xtick.labelsize": 7.0,
     "ytick.labelsize": 7.0,
     "legend.fontsize": 7.0,
@@ -93,18 +94,25 @@ def new(width_mm, height_mm):
 
 
 def legend_above(figure, axes, columns=5):
-    """One legend above all panels, so that it covers no data, in as few rows of `columns` as it takes; each label
-    once.
-    """
+    """One legend above all panels, where it covers no data, in as few rows of `columns` as it takes."""
     entries = _entries(axes)
     rows = max(-(-len(entries) // columns), 1)
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside upper center",
-        ncols=max(-(-len(entries) // rows), 1),
-        columnspacing=1.4,
-    )
+    place = {"loc": "outside upper center", "ncols": max(-(-len(entries) // rows), 1), "columnspacing": 1.4}
+    figure.legend(entries.values(), entries.keys(), **place)
+
+
+def panel_grid(count, row_mm, above_mm=14.0, each=1, **options):
+    """A figure with `each` axes side by side per panel, two panels a row: the figure and the axes (count, each) in use.
+
+    row_mm, above_mm: heights of a row of panels and of what stands above them; one panel makes a narrow figure.
+    """
+    columns = min(count, 2)
+    rows = -(-count // columns)
+    figure = new(DOUBLE_MM if columns > 1 else SINGLE_MM, above_mm + row_mm * rows)
+    panels = figure.subplots(rows, each * columns, squeeze=False, **options).reshape(-1, each)
+    for axes in panels[count:].ravel():
+        axes.set_axis_off()
+    return figure, panels[:count]
 
 
 def legend_inside(place, axes):
@@ -125,9 +133,7 @@ def _entries(axes):
 
 
 def magnification(deviation_mm, span_mm, share=0.16):
-    """Round factor (1, 2, 5, 10, ...) that makes the largest deviation about `share` of the span; 1 where there is
-    none.
-    """
+    """Round factor (1, 2, 5, 10, ...) that makes the largest deviation about `share` of the span; 1 without any."""
     sizes = np.abs(np.asarray(deviation_mm, dtype=float))
     largest = sizes[np.isfinite(sizes)].max(initial=0.0)
     if largest <= 0.0 or not span_mm > 0.0:

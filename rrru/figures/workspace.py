@@ -1,5 +1,7 @@
 """Where in the workspace the trajectories lie, and how far from both kinds of singularity."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
@@ -12,6 +14,7 @@ _SLICES = {"xz": ("x", "z", "y"), "xy": ("x", "y", "z")}
 # finer towards a singularity, which is what matters
 _LEVELS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 1.0)
 _NEAR = {"color": style.VERMILION, "linestyle": "none", "marker": "o", "markersize": 2.6, "markerfacecolor": "white"}
+_PATH = {"color": "black", "linewidth": 0.8}
 _MEASURES = {"translational_measure": "translational measure", "constraint_measure": "constraint measure"}
 
 
@@ -26,43 +29,58 @@ def workspace(tables, options):
     if not slices:
         raise ConfigError(f"workspace: campaign {campaign!r} has none of the slices {', '.join(_SLICES)}")
     points = _points(tables, campaign)
-    shapes = {name: _grid(grid_rows[grid_rows["slice"] == name], name) for name in slices}
-    ratios = [np.ptp(shape[1]) / np.ptp(shape[0]) for shape in shapes.values()]
+    grids = [_slice(grid_rows[grid_rows["slice"] == name], name) for name in slices]
+    ratios = [np.ptp(grid.up_mm) / np.ptp(grid.across_mm) for grid in grids]
     figure = style.new(style.DOUBLE_MM, 32.0 + 75.0 * sum(ratios) + 14.0 * len(slices))
     panels = figure.subplots(len(slices), 2, squeeze=False, sharey="row", sharex="row", height_ratios=ratios)
     marks = iter("abcdef")
-    for row, (name, shape) in zip(panels, shapes.items(), strict=True):
-        for axes, measure in zip(row, _MEASURES, strict=True):
-            image = _panel(axes, shape, measure)
-            _trajectories(axes, points, name)
-            axes.set_title(f"({next(marks)}) {_MEASURES[measure]}, {shape[3]}")
-        _axis_labels(row, name, options["z_down"])
-    bar = figure.colorbar(
-        image, ax=list(panels.ravel()), location="bottom", aspect=60, fraction=0.03, spacing="uniform"
-    )
+    for row, grid in zip(panels, grids, strict=True):
+        for axes, (measure, meaning) in zip(row, _MEASURES.items(), strict=True):
+            image = _panel(axes, grid, measure)
+            _trajectories(axes, points, grid)
+            axes.set_title(f"({next(marks)}) {meaning}, {grid.place}")
+            axes.set_xlabel(f"{grid.across} (mm)")
+        if grid.up == "z":
+            style.height_axis(row[0], options["z_down"])
+        else:
+            row[0].set_ylabel(f"{grid.up} (mm)")
+    place = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
+    bar = figure.colorbar(image, ax=list(panels.ravel()), **place)
     bar.set_label("singularity measure: 0 at a singularity, 1 at best")
     figure.legend(handles=_legend(points), loc="outside upper center", ncols=3, columnspacing=1.4)
     return figure
 
 
-def _grid(rows, name):
-    """Horizontal and vertical coordinates of a slice, its fields (vertical, horizontal) by name, and where it lies as
-    text.
-    """
+@dataclass(frozen=True)
+class _Slice:
+    """Names and coordinates of a slice's two axes, its fields (vertical, horizontal) by name, its place as text."""
+
+    across: str
+    up: str
+    across_mm: np.ndarray
+    up_mm: np.ndarray
+    fields: dict
+    place: str
+
+
+def _slice(rows, name):
+    """A slice from its rows of `workspace`; what the robot cannot reach is shown as a margin only."""
     across, up, normal = _SLICES[name]
-    # what the robot cannot reach is shown as a margin only
+    reachable = rows["reachable"].astype(bool)
     for axis in (across, up):
-        place = rows[f"{axis}_mm"]
-        reached = place[rows["reachable"].astype(bool)]
+        position = rows[f"{axis}_mm"]
+        reached = position[reachable.loc[rows.index]]
         margin = 0.04 * np.ptp(reached) if len(reached) else np.inf
-        rows = rows[place.between(reached.min() - margin, reached.max() + margin)] if len(reached) else rows
-    fields = {}
-    for field in ("translational_measure", "constraint_measure", "constraint_determinant"):
-        masked = rows[field].where(rows["reachable"].astype(bool))
-        table = rows.assign(value=masked).pivot(index=f"{up}_mm", columns=f"{across}_mm", values="value")
-        fields[field] = table.to_numpy(dtype=float)
-    place = rows[f"{normal}_mm"].iloc[0]
-    return table.columns.to_numpy(), table.index.to_numpy(), fields, f"{normal} = {place:g} mm"
+        rows = rows[position.between(reached.min() - margin, reached.max() + margin)] if len(reached) else rows
+    tables = {
+        field: rows.assign(value=rows[field].where(reachable)).pivot(
+            index=f"{up}_mm", columns=f"{across}_mm", values="value"
+        )
+        for field in (*_MEASURES, "constraint_determinant")
+    }
+    fields = {field: table.to_numpy(dtype=float) for field, table in tables.items()}
+    grid, place = tables["constraint_determinant"], f"{normal} = {rows[f'{normal}_mm'].iloc[0]:g} mm"
+    return _Slice(across, up, grid.columns.to_numpy(), grid.index.to_numpy(), fields, place)
 
 
 def _points(tables, campaign):
@@ -72,57 +90,42 @@ def _points(tables, campaign):
     return paths.merge(singular, on=["run", "point"], how="left", validate="one_to_one")
 
 
-def _panel(axes, shape, measure):
-    """One measure over a slice, hatched where the robot cannot reach, with the zero line of the constraint
-    determinant.
-    """
-    across, up, fields, _ = shape
+def _panel(axes, grid, measure):
+    """One measure over a slice, hatched out of reach, with the zero line of the constraint determinant."""
+    across, up = grid.across_mm, grid.up_mm
     half = [np.diff(values).mean() / 2.0 for values in (across, up)]
-    extent = (across[0] - half[0], across[-1] + half[0], up[0] - half[1], up[-1] + half[1])
     axes.patch.set(facecolor="white", edgecolor="#cccccc", hatch="////", linewidth=0.0)
     image = axes.imshow(
-        np.ma.masked_invalid(fields[measure]),
-        extent=extent,
+        np.ma.masked_invalid(grid.fields[measure]),
+        extent=(across[0] - half[0], across[-1] + half[0], up[0] - half[1], up[-1] + half[1]),
         origin="lower",
         cmap=style.MEASURE,
         norm=BoundaryNorm(_LEVELS, 256),
         interpolation="none",
         aspect="equal",
     )
-    determinant = np.ma.masked_invalid(fields["constraint_determinant"])
+    determinant = np.ma.masked_invalid(grid.fields["constraint_determinant"])
     if determinant.count() and determinant.min() < 0.0 < determinant.max():
         for color, width in (("white", 2.2), (style.VERMILION, 1.2)):
             axes.contour(across, up, determinant, levels=[0.0], colors=[color], linewidths=width)
     return image
 
 
-def _trajectories(axes, points, name):
+def _trajectories(axes, points, grid):
     """Every trajectory's first pass as a line, the points near a singularity marked."""
-    across, up, _ = _SLICES[name]
-    columns = [f"command_{across}_mm", f"command_{up}_mm"]
+    across, up = f"command_{grid.across}_mm", f"command_{grid.up}_mm"
     for _, part in points.groupby("trajectory", sort=False):
         first = part[part["run"] == part["run"].iloc[0]].sort_values("point")
-        axes.plot(first[columns[0]], first[columns[1]], color="white", linewidth=1.8, zorder=3)
-        axes.plot(first[columns[0]], first[columns[1]], color="black", linewidth=0.8, zorder=4)
+        for look in ({"color": "white", "linewidth": 1.8, "zorder": 3}, {**_PATH, "zorder": 4}):
+            axes.plot(first[across], first[up], **look)
     near = points[points["status"] == "near_singularity"]
-    axes.plot(near[columns[0]], near[columns[1]], **_NEAR, zorder=5)
-
-
-def _axis_labels(row, name, z_down):
-    """Labels of a row of panels."""
-    across, up, _ = _SLICES[name]
-    for axes in row:
-        axes.set_xlabel(f"{across} (mm)")
-    if up == "z":
-        style.height_axis(row[0], z_down)
-    else:
-        row[0].set_ylabel(f"{up} (mm)")
+    axes.plot(near[across], near[up], **_NEAR, zorder=5)
 
 
 def _legend(points):
     """What the lines and marks are."""
     handles = [
-        Line2D([], [], color="black", linewidth=0.8, label="commanded paths (projected)"),
+        Line2D([], [], **_PATH, label="commanded paths (projected)"),
         Line2D([], [], color=style.VERMILION, linewidth=1.2, label="constraint determinant = 0"),
     ]
     if (points["status"] == "near_singularity").any():
