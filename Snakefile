@@ -24,6 +24,7 @@ for study in sorted(Path(workflow.basedir, "workflow/rules/studies").glob("*.smk
 
 include: "workflow/rules/pipeline/published.smk"
 include: "workflow/rules/pipeline/gap.smk"
+include: "workflow/rules/pipeline/figures.smk"
 
 
 # what is refused is refused before anything runs

@@ -8,6 +8,8 @@ CAMPAIGNS = sorted(config["campaigns"])
 DIAGNOSED = dict(config["campaigns"])
 # what `snakemake` makes; every study adds its own
 TARGETS = []
+# figures {name: ("module:function", tables)} by study; every study adds its own
+FIGURES = {}
 # functions that refuse a configuration; every study adds its own
 CHECKS = ["rrru.studies.config:check"]
 # what a study has of a paper's numbers, by the paper's letter: its package with `published` and `audit`, the tables

@@ -16,6 +16,7 @@ DELTA_FIGURES = {
     "delta_errors": (f"{_DELTA}:delta_errors", ["delta_points", "delta_calibrations", "delta_draws"]),
     "delta_observability": (f"{_DELTA}:delta_observability", ["delta_observability"]),
 }
+FIGURES["delta"] = DELTA_FIGURES
 PAPERS["C"] = {
     "study": "rrru.studies.delta",
     "tables": ["delta_points", "delta_camera", "delta_draws"],
@@ -87,20 +88,6 @@ rule delta_twin:
         code=code("delta_twin"),
     script:
         "../../scripts/delta_twin.py"
-
-
-rule delta_figures:
-    input:
-        **named(shown(DELTA_FIGURES)),
-    output:
-        **drawn(DELTA_FIGURES),
-    log:
-        f"{RESULTS}/logs/figures/delta.log",
-    params:
-        settings={"figures": DELTA_FIGURES, "options": {}},
-        code=code("figure", DELTA_FIGURES),
-    script:
-        "../../scripts/figure.py"
 
 
 rule delta:

@@ -1,6 +1,7 @@
 METHOD_TABLES = ["methods", "method_points"]
 METHOD_ROBOTS = sorted(config["methods"]["regions"])
 METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TABLES)}
+FIGURES["method"] = METHOD_FIGURES
 
 
 def method_part(name, robot="{robot}"):
@@ -50,20 +51,6 @@ use rule gather as gather_methods with:
         **named(METHOD_TABLES),
     log:
         f"{RESULTS}/logs/gather_methods.log",
-
-
-rule method_figures:
-    input:
-        **named(shown(METHOD_FIGURES)),
-    output:
-        **drawn(METHOD_FIGURES),
-    log:
-        f"{RESULTS}/logs/figures/methods.log",
-    params:
-        settings={"figures": METHOD_FIGURES, "options": {}},
-        code=code("figure", METHOD_FIGURES),
-    script:
-        "../../scripts/figure.py"
 
 
 rule methods:

@@ -4,6 +4,7 @@ from rrru.errors import ConfigError
 
 PRINTER_TABLES = ["printers", "printer_parameters", "printer_readings", "printer_causes"]
 PRINTER_FIGURES = {"printers": ("rrru.studies.printers.figures:printers", ["printers"])}
+FIGURES["printer"] = PRINTER_FIGURES
 
 if not Path(config["printers"]["file"]).is_file():
     raise ConfigError(f"printers.file: there is no file {config['printers']['file']}")
@@ -21,20 +22,6 @@ rule calibrate_printers:
         code=code("printers"),
     script:
         "../../scripts/printers.py"
-
-
-rule printer_figures:
-    input:
-        **named(shown(PRINTER_FIGURES)),
-    output:
-        **drawn(PRINTER_FIGURES),
-    log:
-        f"{RESULTS}/logs/figures/printers.log",
-    params:
-        settings={"figures": PRINTER_FIGURES, "options": {}},
-        code=code("figure", PRINTER_FIGURES),
-    script:
-        "../../scripts/figure.py"
 
 
 rule printers:

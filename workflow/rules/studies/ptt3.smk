@@ -25,6 +25,7 @@ PTT_FIGURES = {
     "ptt_benefit": (f"{_PTT}.learning:ptt_benefit", ["ptt_benefit", "ptt_start"]),
     "ptt_extrapolation": (f"{_PTT}.learning:ptt_extrapolation", ["ptt_extrapolation"]),
 }
+FIGURES["ptt"] = PTT_FIGURES
 # they are diagnosed as every campaign is
 DIAGNOSED |= {
     name: {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
@@ -78,20 +79,6 @@ rule ptt_compensate:
         code=code("ptt_compensate"),
     script:
         "../../scripts/ptt_compensate.py"
-
-
-rule ptt_figures:
-    input:
-        **named(shown(PTT_FIGURES)),
-    output:
-        **drawn(PTT_FIGURES),
-    log:
-        f"{RESULTS}/logs/figures/ptt.log",
-    params:
-        settings={"figures": PTT_FIGURES, "options": {}},
-        code=code("figure", PTT_FIGURES),
-    script:
-        "../../scripts/figure.py"
 
 
 rule ptt:

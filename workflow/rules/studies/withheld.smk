@@ -11,6 +11,7 @@ WITHHELD_TABLES = [
     "withheld_confusion",
 ]
 WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
+FIGURES["withheld"] = WITHHELD_FIGURES
 
 
 wildcard_constraints:
@@ -91,20 +92,6 @@ rule withheld_summary:
         code=code("withheld_summary"),
     script:
         "../../scripts/withheld_summary.py"
-
-
-rule withheld_figures:
-    input:
-        **named(shown(WITHHELD_FIGURES)),
-    output:
-        **drawn(WITHHELD_FIGURES),
-    log:
-        f"{RESULTS}/logs/figures/withheld.log",
-    params:
-        settings={"figures": WITHHELD_FIGURES, "options": {}},
-        code=code("figure", WITHHELD_FIGURES),
-    script:
-        "../../scripts/figure.py"
 
 
 # not part of the default run
