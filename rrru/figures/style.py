@@ -11,6 +11,8 @@ from textwrap import fill
 
 import numpy as np
 from matplotlib import style
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -176,7 +178,10 @@ def save(figure, pdf, png, caption=""):
                 figure.set_layout_engine(None)
             for kind, (path, metadata) in formats.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
-                figure.savefig(partial[kind], format=kind, dpi=_DPI, metadata=metadata)
+                # straight to the canvas: savefig would draw everything a second time to arrange it
+                figure.set_dpi(_DPI)
+                canvas = FigureCanvasPdf(figure) if kind == "pdf" else FigureCanvasAgg(figure)
+                getattr(canvas, f"print_{kind}")(partial[kind], metadata=metadata)
         for kind, (path, _) in formats.items():
             partial[kind].replace(path)
     finally:

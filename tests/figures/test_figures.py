@@ -5,9 +5,11 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from rrru.errors import ConfigError, RrruError
@@ -145,14 +147,16 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
     figure = draw("fig12", frames)
     pdf, png = tmp_path / "a.pdf", tmp_path / "a.png"
     pdf.write_text("old"), png.write_text("old")
-    whole = figure.savefig
+    whole = FigureCanvasAgg.print_png
 
-    def fail_on_the_second(path, format, **options):
-        if format == "png":
+    def fail(canvas, path, **options):
+        # the arrangement before asks for a canvas of no file
+        if isinstance(path, Path):
+            assert [one.name for one in tmp_path.glob(".*")] == [".a.pdf.partial"]
             raise OSError("disk full")
-        whole(path, format=format, **options)
+        return whole(canvas, path, **options)
 
-    monkeypatch.setattr(figure, "savefig", fail_on_the_second)
+    monkeypatch.setattr(FigureCanvasAgg, "print_png", fail)
     with pytest.raises(OSError, match="disk full"):
         style.save(figure, pdf, png)
     assert (pdf.read_text(), png.read_text()) == ("old", "old")
