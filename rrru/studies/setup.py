@@ -61,6 +61,12 @@ class VirtualCampaign:
         return measurements.assign(**dict(zip(columns, wanted[index].T, strict=True))), truth
 
 
+def real_robot(nominal, section):
+    """The virtual robot that an entry of `virtual_robots:` makes of a nominal one; see `virtual_campaign`."""
+    kind = virtual_robot if nominal["name"] == "rrru3" else virtual_tripod
+    return kind.from_config(mechanism(nominal), section)
+
+
 def virtual_campaign(nominal, virtual):
     """The virtual campaign of its parts; raises ConfigError where a number or a name of the robot is not allowed."""
     motion = virtual["motion"]
@@ -71,9 +77,7 @@ def virtual_campaign(nominal, virtual):
         motion["acceleration_mm_s2"],
         motion["dwell_s"],
     )
-    robot = mechanism(nominal)
-    kind = virtual_robot if nominal["name"] == "rrru3" else virtual_tripod
-    real = kind.from_config(robot, virtual["robot"])
+    real = real_robot(nominal, virtual["robot"])
     origin = virtual.get("origin", "campaign")
     return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
 

@@ -1,32 +1,33 @@
 """Every method on one robot."""
 
-import numpy as np
-
+from rrru.campaign.measurements import vectors
+from rrru.genetic.campaign_runs import settings_from_config
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.delta.virtual_delta import Poses
-from rrru.studies.methods import benches, compare
+from rrru.studies.methods.compare import compare, measuring_time_s
+from rrru.studies.methods.learners import Network
+from rrru.studies.methods.regions import trial
 from rrru.studies.methods.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
     """Write the robot's rows of the comparison, of its learning curves and of the computing times."""
-    robot = settings["robot"]
-    bench = benches.bench(settings, robot)
-    offsets = _from_images(settings, bench, tables.read(inputs["calibrations"])) if inputs.get("calibrations") else None
-    methods, curve, timings = compare.compare(bench, settings, offsets)
-    frames = {"methods": methods, "method_points": curve, "method_timings": timings}
-    tables.write_all(TABLES, {name: frame.assign(robot=robot) for name, frame in frames.items()}, outputs)
+    one, offsets = trial(settings), None
+    if inputs.get("calibrations"):
+        offsets = _from_images(one, tables.read(inputs["calibrations"]), tables.read(inputs["poses"]))
+    network, genetic = Network(**settings["network"]), settings_from_config(settings["genetic"])
+    names = ("methods", "method_points", "method_timings")
+    frames = dict(zip(names, compare(one, settings["points"], network, genetic, offsets), strict=True))
+    tables.write_all(TABLES, {name: frame.assign(robot=one.name) for name, frame in frames.items()}, outputs)
 
 
-def _from_images(config, bench, calibrations):
+def _from_images(one, calibrations, poses):
     """What the Delta's study found from its images by the paper's way, and the time of its poses."""
     found = calibrations.set_index("variant").loc["paper"]
-    planes, poses = Poses(**config["delta"]["poses"]).commands()
     return {
-        "dtheta_rad": np.array([found[f"dtheta{leg}_found_rad"] for leg in (1, 2, 3)]),
+        "dtheta_rad": found[[f"dtheta{leg}_found_rad" for leg in (1, 2, 3)]].to_numpy(dtype=float),
         "poses": int(found["poses"]),
-        "measuring_time_s": compare.measuring_time_s(bench, poses[planes == "first"]),
+        "measuring_time_s": measuring_time_s(one, vectors(poses[poses["plane"] == "first"], "command")),
     }
 
 

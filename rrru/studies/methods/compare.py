@@ -1,6 +1,4 @@
-"""Every method on one robot: true errors of the driven robot before and after, how many points it takes, how long.
-Lengths in mm, times in s.
-"""
+"""Every method on one robot: true errors of the driven robot before and after, points and times it takes. mm, s."""
 
 from dataclasses import replace
 from time import perf_counter
@@ -11,124 +9,121 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.seeds import run_seed
 from rrru.studies.methods import learners
-from rrru.studies.methods.benches import TESTS
+from rrru.studies.methods.regions import TESTS
 
 # a method has enough points where all that more of them bring is this share of its mean error, or the tracker's noise
 _ENOUGH = 0.1
 
 
-def compare(bench, config, image_offsets=None):
+class Judge:
+    """Drives a trial's targets with what methods learned and keeps the rows of `method_points` and `method_timings`."""
+
+    def __init__(self, trial):
+        self.trial = trial
+        self.plans = {test: trial.plan(points) for test, points in trial.tests_mm.items()}
+        self.before = {test: self.errors(test) for test in self.plans}
+        self.rows, self.timings = [], []
+
+    def errors(self, test, controller=None):
+        """Distances (m,) between the targets of a test and where the robot truly goes; NaN where it cannot."""
+        _, truth = self.trial.run(self.plans[test], test, controller)
+        return np.linalg.norm(rows.vectors(truth, "true") - self.plans[test].targets(), axis=1)
+
+    def learn(self, method, count, learn):
+        """What a method learns from a number of points, its time kept."""
+        start = perf_counter()
+        learned = learn()
+        self.timings.append({"method": method, "points": count, "seconds": perf_counter() - start})
+        return learned
+
+    def judge(self, method, count, time_s, learned, tests=TESTS):
+        """Add the rows of what a method learned from a number of points that took so long to measure."""
+        for test in tests:
+            before, after = self.before[test], self.errors(test, learned.controller)
+            self.rows.append(
+                {
+                    "method": method,
+                    "test": test,
+                    "points": count,
+                    "before_mean_mm": np.nanmean(before),
+                    "before_max_mm": np.nanmax(before),
+                    "after_mean_mm": np.nanmean(after),
+                    "after_max_mm": np.nanmax(after),
+                    "numbers": learned.numbers,
+                    "measuring_time_s": time_s,
+                    "evaluations": learned.evaluations,
+                }
+            )
+
+
+def compare(trial, counts, network, genetic_settings, image_offsets=None):
     """Frames of one robot, without its name: rows of `methods`, `method_points` and `method_timings`.
 
-    image_offsets: mapping with dtheta_rad (3,) found from images, poses and measuring_time_s, or None where the robot
-    has no camera.
+    counts: numbers of points to learn from; image_offsets: mapping with dtheta_rad (3,) found from images, poses and
+    measuring_time_s, or None where the robot has no camera.
     """
-    plans = {test: bench.plan(points) for test, points in bench.tests.items()}
-    before = {test: _errors(bench, plan, test) for test, plan in plans.items()}
-    curve, timings = [], []
-    for count in config["methods"]["points"]:
-        measured, time = _campaign(bench, count)
-        seed = run_seed(bench.seed, "methods", bench.name, "genetic", count)
-        for name, learn in learners.position_methods(measured, config, bench.generator, seed).items():
-            start = perf_counter()
-            learned = learn()
-            timings.append({"method": name, "points": count, "seconds": perf_counter() - start})
-            for test, plan in plans.items():
-                curve.append(
-                    _row(name, test, count, time, learned, before[test], _errors(bench, plan, test, learned.controller))
-                )
-    for test, plan in plans.items():
-        learned, time, seconds = _step(bench, plan, test)
-        timings.append({"method": "jacobian_step", "points": len(plan.targets()), "seconds": seconds})
-        curve.append(
-            _row(
-                "jacobian_step",
-                test,
-                len(plan.targets()),
-                time,
-                learned,
-                before[test],
-                _errors(bench, plan, test, learned.controller),
-            )
-        )
+    judge, mechanism = Judge(trial), trial.robot.mechanism
+    for count in counts:
+        plan = trial.plan(trial.train_mm[:count])
+        points = learners.Points.of(mechanism, trial.run(plan, "train")[0])
+        seed = run_seed(trial.seed, "methods", trial.name, "genetic", count)
+        methods = learners.position_methods(points, network, genetic_settings, trial.generator, seed)
+        for name, learn in methods.items():
+            judge.judge(name, count, _duration_s(plan), judge.learn(name, count, learn))
+    for test, plan in judge.plans.items():
+        count, time_s = len(plan.targets()), _duration_s(plan)
+        judge.judge("jacobian_step", count, time_s, _step(judge, test), [test])
     if image_offsets is not None:
-        learned = learners.offsets(bench.robot.mechanism, image_offsets["dtheta_rad"])
-        for test, plan in plans.items():
-            after = _errors(bench, plan, test, learned.controller)
-            time, poses = image_offsets["measuring_time_s"], image_offsets["poses"]
-            curve.append(_row("zero_offsets_images", test, poses, time, learned, before[test], after))
-    curve = pd.DataFrame(curve)
-    return _methods(curve, bench.noise_mm), curve, pd.DataFrame(timings).drop_duplicates(["method", "points"])
+        learned = learners.offsets(mechanism, image_offsets["dtheta_rad"])
+        judge.judge("zero_offsets_images", image_offsets["poses"], image_offsets["measuring_time_s"], learned)
+    curve, timings = pd.DataFrame(judge.rows), pd.DataFrame(judge.timings).drop_duplicates(["method", "points"])
+    return summary(curve, trial.noise_mm), curve, timings
 
 
-def measuring_time_s(bench, points_mm):
+def measuring_time_s(trial, points_mm):
     """Time in s that the robot takes to stop at points (n, 3) for a measurement."""
-    return float(bench.plan(points_mm).time_s()[-1])
+    return _duration_s(trial.plan(points_mm))
 
 
-def _campaign(bench, count):
-    """The first `count` points to learn from, as measured, and the time that takes."""
-    plan = bench.plan(bench.train[:count])
-    measurements, _ = bench.run(plan, "train")
-    return learners.points_of(bench.robot.mechanism, measurements), float(plan.time_s()[-1])
+def _duration_s(plan):
+    """When the last point of a plan is measured."""
+    return float(plan.time_s()[-1])
 
 
-def _step(bench, plan, test):
-    """The Jacobian's step on the targets of a test, the time to measure them and the seconds to compute it."""
-    measurements, _ = bench.run(plan, f"{test} first")
-    found = learners.points_of(bench.robot.mechanism, measurements)
+def _step(judge, test):
+    """The Jacobian's step on the targets of a test."""
+    plan = judge.plans[test]
+    measurements, _ = judge.trial.run(plan, f"{test} first")
+    points = learners.Points.of(judge.trial.robot.mechanism, measurements)
+    path, index = plan.path()
     # where a target was not measured nothing is known of its error
-    known = rows.usable(measurements)
-    start = perf_counter()
-    index = plan.path()[1][known]
-    learned = learners.jacobian_step(bench.robot.mechanism, index, found)
-    learned.controller(plan.path()[0])
-    return replace(learned, evaluations=len(index)), float(plan.time_s()[-1]), perf_counter() - start
+    index = index[rows.usable(measurements)]
+
+    def learn():
+        learned = learners.jacobian_step(points, index)
+        learned.controller(path)
+        return replace(learned, evaluations=len(index))
+
+    return judge.learn("jacobian_step", len(plan.targets()), learn)
 
 
-def _errors(bench, plan, test, controller=None):
-    """Distances (m,) between the targets of a plan and where the robot truly goes; NaN where it cannot."""
-    _, truth = bench.run(plan, test, controller)
-    return np.linalg.norm(truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy() - plan.targets(), axis=1)
-
-
-def _row(method, test, count, time, learned, before, after):
-    """A row of `method_points`."""
-    return {
-        "method": method,
-        "test": test,
-        "points": count,
-        "before_mean_mm": np.nanmean(before),
-        "before_max_mm": np.nanmax(before),
-        "after_mean_mm": np.nanmean(after),
-        "after_max_mm": np.nanmax(after),
-        "numbers": learned.numbers,
-        "measuring_time_s": time,
-        "evaluations": learned.evaluations,
-    }
-
-
-def _methods(curve, noise_mm):
-    """Rows of `methods`: each method with all its points, and the fewest points from which on more bring next to
-    nothing inside the region.
-    """
+def summary(curve, noise_mm):
+    """Rows of `methods`: each method with all its points, and the fewest after which more bring next to nothing."""
     result = []
     for method, part in curve.groupby("method", sort=False):
         inside = part[part["test"] == "inside"].sort_values("points")
         last = inside["after_mean_mm"].iloc[-1]
         short = np.flatnonzero(inside["after_mean_mm"] > max((1.0 + _ENOUGH) * last, last + noise_mm))
         enough = inside.iloc[short[-1] + 1 if short.size else 0]
-        for test in TESTS:
-            row = part[
-                (part["test"] == test) & (part["points"] == part.loc[part["test"] == test, "points"].max())
-            ].iloc[0]
-            result.append(
-                row.to_dict()
-                | {
-                    "removed_share": 1.0 - row["after_mean_mm"] / row["before_mean_mm"],
-                    "points_needed": int(enough["points"]),
-                    "needed_time_s": float(enough["measuring_time_s"]),
-                    "needs": learners.NEEDS[method],
-                }
+        most = part.sort_values("points", kind="stable").drop_duplicates("test", keep="last").set_index("test")
+        result.append(
+            most.loc[list(TESTS)]
+            .reset_index()
+            .assign(
+                removed_share=lambda frame: 1.0 - frame["after_mean_mm"] / frame["before_mean_mm"],
+                points_needed=int(enough["points"]),
+                needed_time_s=float(enough["measuring_time_s"]),
+                needs=learners.NEEDS[method],
             )
-    return pd.DataFrame(result)
+        )
+    return pd.concat(result, ignore_index=True)

@@ -1,5 +1,6 @@
-"""The methods: each learns from measured points and becomes a controller, positions in the order driven to actuator
-values. Lengths in mm.
+"""The methods: each learns from measured points and becomes a controller, positions in the order driven to actuators.
+
+Lengths in mm.
 """
 
 from dataclasses import dataclass, replace
@@ -11,11 +12,10 @@ from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.compensate.rbf import fit, grow, make_folds, validation_mse
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.genetic.algorithm import minimise
-from rrru.genetic.campaign_runs import settings_from_config
-from rrru.studies.methods.benches import FULL
 
-# what each method fits or learns, how many numbers, and what it needs to measure
+# the richest set of parameters that positions identify
+FULL = {"rrru3": "identifiable", "ptt3": "rails", "delta": "legs"}
+# what each method needs to measure
 NEEDS = {
     "zero_offsets": "positions, or anything that shows them: distances, heights, images",
     "least_squares": "positions",
@@ -38,6 +38,15 @@ class Learned:
 
 
 @dataclass(frozen=True)
+class Network:
+    """How networks are chosen: folds of the cross-validation, most neurons, spreads in units of the points' spacing."""
+
+    folds: int
+    neurons: int
+    spreads: tuple
+
+
+@dataclass(frozen=True)
 class Points:
     """What was measured: mechanism and commanded, actuator and measured values (n, 3) each."""
 
@@ -46,79 +55,69 @@ class Points:
     actuators: np.ndarray
     measured_mm: np.ndarray
 
+    @classmethod
+    def of(cls, mechanism, measurements):
+        """The usable points of a measurement table."""
+        frame = measurements[rows.usable(measurements)]
+        return cls(mechanism, rows.command(frame), rows.actuators(frame), rows.measured(frame))
+
     def residuals(self, parameter_set):
-        """Residuals of the points for a set of error parameters."""
-        return Residuals(
-            replace(self.mechanism, parameter_set=parameter_set), self.actuators, self.measured_mm, self.command_mm
-        )
+        """Residuals of the points for a set of parameters."""
+        mechanism = replace(self.mechanism, parameter_set=parameter_set)
+        return Residuals(mechanism, self.actuators, self.measured_mm, self.command_mm)
 
 
-def points_of(mechanism, measurements):
-    """The usable points of a measurement table."""
-    frame = measurements[rows.usable(measurements)]
-    return Points(mechanism, rows.command(frame), rows.actuators(frame), rows.measured(frame))
+def _calibrated(residuals, result):
+    """What a search for deviations has learned."""
+    mechanism, deviations = residuals.mechanism, result.deviations
+    controller = lambda path: mechanism.inverse(path, deviations)  # noqa: E731
+    return Learned(controller, len(deviations), result.evaluations * len(residuals))
 
 
 def parameters(points, parameter_set):
-    """Least squares of a set of error parameters, their bounds those of the mechanism."""
+    """Least squares of a set of parameters, their bounds those of the mechanism."""
     residuals = points.residuals(parameter_set)
-    found = least_squares(residuals)
-    mechanism = residuals.mechanism
-    return Learned(
-        lambda path: mechanism.inverse(path, found.deviations),
-        len(found.deviations),
-        found.evaluations * len(residuals),
-    )
+    return _calibrated(residuals, least_squares(residuals))
 
 
-def genetic(points, config, seed):
-    """The genetic algorithm of the configuration's `genetic` section on the identifiable error parameters."""
+def genetic(points, settings, seed):
+    """The genetic algorithm with GeneticSettings on the parameters that tracked positions identify."""
+    from rrru.genetic.algorithm import minimise
+
     residuals = points.residuals(points.mechanism.TRACKED)
-    mechanism = residuals.mechanism
-    found = minimise(
-        residuals.mean_distance,
-        mechanism.parameters.low,
-        mechanism.parameters.high,
-        settings_from_config(config["genetic"]),
-        seed,
-    )
-    return Learned(
-        lambda path: mechanism.inverse(path, found.deviations),
-        len(found.deviations),
-        found.evaluations * len(residuals),
-    )
+    bounds = residuals.mechanism.parameters
+    return _calibrated(residuals, minimise(residuals.mean_distance, bounds.low, bounds.high, settings, seed))
 
 
-def rbf_map(points, section, generator):
+def rbf_map(points, network, generator):
     """A network for the position error, through the exact inverse kinematics (paper B, eq. 11)."""
-    network, numbers = _network(points.command_mm, points.measured_mm - points.command_mm, section, generator)
-    return Learned(lambda path: through_inverse(points.mechanism, path, network(path)), numbers, 0)
+    answers, numbers = _trained(points.command_mm, points.measured_mm - points.command_mm, network, generator)
+    return Learned(lambda path: through_inverse(points.mechanism, path, answers(path)), numbers, 0)
 
 
-def rbf_after_parameters(points, section, generator):
+def rbf_after_parameters(points, network, generator):
     """Least squares first, then a network for what it leaves."""
     residuals = points.residuals(points.mechanism.TRACKED)
-    found, mechanism = least_squares(residuals), residuals.mechanism
-    network, numbers = _network(points.command_mm, residuals.residual(found.deviations), section, generator)
+    found = least_squares(residuals)
+    answers, numbers = _trained(points.command_mm, residuals.residual(found.deviations), network, generator)
     return Learned(
-        lambda path: through_inverse(mechanism, path, network(path), found.deviations),
+        lambda path: through_inverse(residuals.mechanism, path, answers(path), found.deviations),
         numbers + len(found.deviations),
         found.evaluations * len(residuals),
     )
 
 
-def jacobian_step(mechanism, path_index, points):
-    """One step of q - J dp at every target by itself, its own error having been measured (paper B, eq. 12 without a
-    network).
+def jacobian_step(points, path_index):
+    """One step of q - J dp at every target by its own measured error (paper B, eq. 12 without a network).
 
     path_index (m,): rows of the targets in the path that the controller is given; between them the correction is
     interpolated.
     """
+    error = points.measured_mm - points.command_mm
 
     def controller(path):
-        error = points.measured_mm - points.command_mm
         along = np.stack([np.interp(np.arange(len(path)), path_index, error[:, axis]) for axis in range(3)], axis=-1)
-        return through_jacobian(mechanism, path, along)
+        return through_jacobian(points.mechanism, path, along)
 
     return Learned(controller, 3 * len(path_index), len(path_index))
 
@@ -129,32 +128,27 @@ def offsets(mechanism, values):
     return Learned(lambda path: zero.inverse(path, np.asarray(values, dtype=float)), 3, 0)
 
 
-def position_methods(points, config, generator, seed):
+def position_methods(points, network, genetic_settings, generator, seed):
     """Every method that learns from measured positions, as functions without arguments, by name."""
-    section, mechanism = config["methods"]["network"], points.mechanism
-    return {
+    tracked, full = points.mechanism.TRACKED, FULL[points.mechanism.name]
+    methods = {
         "zero_offsets": lambda: parameters(points, "zero"),
-        "least_squares": lambda: parameters(points, mechanism.TRACKED),
-        **(
-            {"least_squares_full": lambda: parameters(points, FULL[mechanism.name])}
-            if FULL[mechanism.name] != mechanism.TRACKED
-            else {}
-        ),
-        "genetic": lambda: genetic(points, config, seed),
-        "rbf_map": lambda: rbf_map(points, section, generator("folds")),
-        "rbf_after_parameters": lambda: rbf_after_parameters(points, section, generator("folds")),
+        "least_squares": lambda: parameters(points, tracked),
+        "least_squares_full": lambda: parameters(points, full),
+        "genetic": lambda: genetic(points, genetic_settings, seed),
+        "rbf_map": lambda: rbf_map(points, network, generator("folds")),
+        "rbf_after_parameters": lambda: rbf_after_parameters(points, network, generator("folds")),
     }
+    return {name: learn for name, learn in methods.items() if full != tracked or name != "least_squares_full"}
 
 
-def _network(command_mm, targets, section, generator):
-    """Network with the spread and the number of neurons of least cross-validated error, and the count of its weights
-    and thresholds.
-    """
-    folds = make_folds(len(command_mm), section["folds"], generator)
+def _trained(command_mm, targets, network, generator):
+    """Network of the least cross-validated error, and the count of its weights and thresholds."""
+    folds = make_folds(len(command_mm), network.folds, generator)
     # candidates in units of the distance that evenly spread points have
     spacing = (np.prod(np.ptp(command_mm, axis=0)) / len(command_mm)) ** (1.0 / 3.0)
-    spreads = [share * spacing for share in section["spreads"]]
-    most = min(section["neurons"], len(command_mm) - len(command_mm) // section["folds"] - 1)
+    spreads = [share * spacing for share in network.spreads]
+    most = min(network.neurons, len(command_mm) - len(command_mm) // network.folds - 1)
     curves = np.array([validation_mse(command_mm, targets, spread, most, folds) for spread in spreads])
     best, neurons = np.unravel_index(curves.argmin(), curves.shape)
     order = grow(command_mm, targets, spreads[best], int(neurons)).order

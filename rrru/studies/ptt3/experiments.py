@@ -14,8 +14,8 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.compensate.backlash import compensated
-from rrru.errors import ConfigError
 from rrru.studies import setup
+from rrru.studies.ptt3.parts import campaign_section
 
 
 @dataclass(frozen=True)
@@ -87,39 +87,6 @@ class Experiment:
         """Tracker noise (n, 3) of the curve's points, each the mean over the repeats, from the stream of the labels."""
         scale = self.campaign.noise_mm / np.sqrt(self.repeats)
         return scale * self.campaign.generator(*labels).standard_normal((self.curve.points, 3))
-
-
-def check(config):
-    """Raise ConfigError where the `ptt` section does not fit together, before anything runs."""
-    section = config["ptt"]
-    known, joint = section["experiments"], section["joint"]
-    for name, members in joint.items():
-        for member in members:
-            if member not in known:
-                raise ConfigError(f"ptt.joint.{name}: no experiment {member!r}; known: {', '.join(known)}")
-    for name in (*known, *joint):
-        if name in config["campaigns"] or (name in known and name in joint):
-            allowed = "names that no campaign and no other experiment has"
-            raise ConfigError(f"ptt: {name!r} names two things; allowed: {allowed}")
-    points, train = section["curve"]["points"], section["network"]["train"]
-    if not train < points:
-        raise ConfigError(f"ptt.network.train is {train}; allowed: below ptt.curve.points, which is {points}")
-    travel, reach = section["bench"]["turns"] * section["bench"]["lead_mm"], section["bench"]["range_mm"]
-    if travel > reach:
-        raise ConfigError(f"ptt.bench: turns times lead_mm is {travel:g} mm; allowed: up to range_mm, {reach:g} mm")
-    experiment(config, next(iter(known)))
-
-
-def campaign_section(settings, name):
-    """What an entry of `campaigns` would say of an experiment, or of experiments that are diagnosed together."""
-    section = settings["ptt"]
-    loads = [section["experiments"][member]["payload_kg"] for member in section["joint"].get(name, [name])]
-    return {
-        "robot": "ptt3",
-        "passes": [{"payload_kg": load, "reverse": False} for load in loads for _ in range(section["repeats"])],
-        "noise_mm": section["noise_mm"],
-        "errors": section["parameters"],
-    }
 
 
 def nominal(settings):

@@ -1,7 +1,6 @@
 """The comparison of methods: each against what it must do on a robot whose truth is known."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -10,28 +9,55 @@ import yaml
 from snakemake.utils import validate
 
 from rrru.errors import ConfigError
+from rrru.genetic.algorithm import GeneticSettings
 from rrru.plant.virtual_tripod import VirtualTripod
-from rrru.studies.methods import benches, compare, learners
+from rrru.studies.methods import compare, learners, parts, regions
+from tests.places import ROOT
 from tests.schemas import check
-from tests.workflow.folder import ROOT
 
-CONFIG = yaml.safe_load((ROOT / "config.yaml").read_text())
-validate(CONFIG, str(ROOT / "workflow/schemas/config.schema.yaml"))
-SHORT = CONFIG | {
-    "methods": CONFIG["methods"] | {"points": [20, 60], "test_points": 20},
-    "genetic": CONFIG["genetic"] | {"generations": 60},
+_LOADS = {"platform_mass_kg": 3.0, "forearm_mass_kg": 1.2, "arm_mass_kg": 2.0}
+_BOUNDS = {"angle_rad": 0.025, "length_mm": 3.0}
+_COMMON = {
+    "seed": 3,
+    "points": [20, 60],
+    "test_points": 20,
+    "outside_factor": 1.5,
+    "motion": {"speed_mm_s": 80.0, "acceleration_mm_s2": 400.0, "settle_s": 2.0},
 }
+_DELTA_ERRORS = {"dtheta1": -0.006, "dtheta2": -0.0055, "dtheta3": 0.004} | {
+    f"{kind}_{leg}": value
+    for kind, values in {"dl1": (0.4, -0.3, 0.2), "dl2": (-0.5, 0.6, 0.3), "da": (0.2, 0.1, -0.3)}.items()
+    for leg, value in zip((1, 2, 3), values, strict=True)
+}
+_DELTA_EFFECTS = {
+    "backlash": {"width1": 1.0e-4, "width2": 0.8e-4, "width3": 1.2e-4},
+    "drive_compliance": {"compliance1": 2.0e-8, "compliance2": 2.5e-8, "compliance3": 1.5e-8},
+}
+DELTA = _COMMON | {
+    "robot": "delta",
+    "nominal": {"name": "delta", "dimensions": {"l1_mm": 375.0, "l2_mm": 900.0, "a_mm": 125.0}, "bounds": _BOUNDS},
+    "real": {"errors": _DELTA_ERRORS, "effects": _DELTA_EFFECTS} | _LOADS,
+    "region": {"centre_mm": [0.0, 0.0], "radius_mm": 230.0, "z_mm": [-80.0, 80.0], "noise_mm": 0.015},
+}
+PTT3 = _COMMON | {
+    "robot": "ptt3",
+    "nominal": {"name": "ptt3", "dimensions": {"L_mm": 350.0, "R_mm": 300.0, "r_mm": 60.0}, "bounds": _BOUNDS},
+    "real": {"errors": {}, "effects": {}} | _LOADS,
+    "region": {"centre_mm": [0.0, 0.0], "radius_mm": 80.0, "z_mm": [-275.0, -215.0], "noise_mm": 0.005},
+}
+NETWORK = learners.Network(folds=3, neurons=20, spreads=(2.0, 8.0))
+GENETIC = GeneticSettings(generations=60)
 
 
 @pytest.fixture(scope="module")
 def delta():
-    bench = benches.bench(SHORT, "delta")
+    one = regions.trial(DELTA)
     offsets = {
-        "dtheta_rad": [bench.robot.deviations[f"dtheta{k}"] for k in (1, 2, 3)],
+        "dtheta_rad": [_DELTA_ERRORS[f"dtheta{leg}"] for leg in (1, 2, 3)],
         "poses": 20,
         "measuring_time_s": 60.0,
     }
-    return bench, *compare.compare(bench, SHORT, offsets)
+    return one, *compare.compare(one, DELTA["points"], NETWORK, GENETIC, offsets)
 
 
 def test_the_tables_fit_their_schemas(delta):
@@ -58,82 +84,65 @@ def test_the_richer_the_model_the_less_is_left(delta):
 
 def test_before_is_the_distance_of_the_nominal_controllers_points(delta):
     """The kinematic part of it: without play and compliance, which move the platform by some hundredths only."""
-    bench, methods = delta[0], delta[1]
-    for test in benches.TESTS:
-        targets = bench.plan(bench.tests[test]).targets()
-        true = bench.robot.geometry.mechanism.forward(
-            bench.robot.mechanism.inverse(targets),
-            bench.robot.geometry.mechanism.parameters.vector(bench.robot.deviations),
-        )
-        expected = np.linalg.norm(true - targets, axis=1)
+    one, methods = delta[0], delta[1]
+    rich = replace(one.robot.mechanism, parameter_set="legs")
+    plain = compare.Judge(replace(one, robot=replace(one.robot, effects=())))
+    for test in regions.TESTS:
+        targets = one.plan(one.tests_mm[test]).targets()
+        sent = one.robot.mechanism.inverse(targets)
+        expected = np.linalg.norm(rich.forward(sent, rich.parameters.vector(_DELTA_ERRORS)) - targets, axis=1)
         row = methods.query("test == @test").iloc[0]
         assert abs(row["before_mean_mm"] - expected.mean()) < 0.1
-        errors = compare._errors(
-            replace(bench, robot=replace(bench.robot, effects=())), bench.plan(bench.tests[test]), test
-        )
-        np.testing.assert_allclose(errors, expected, atol=1e-9)
         assert row["before_max_mm"] == pytest.approx(expected.max(), abs=0.1)
+        np.testing.assert_allclose(plain.before[test], expected, atol=1e-9)
 
 
 @pytest.mark.parametrize(("noise_mm", "needed"), [(0.0, 80), (0.02, 20), (0.5, 10)])
 def test_the_points_needed_are_the_fewest_from_which_on_more_bring_next_to_nothing(noise_mm, needed):
-    label = {
-        "before_mean_mm": 1.0,
-        "before_max_mm": 2.0,
-        "after_max_mm": 1.0,
-        "numbers": 3,
-        "evaluations": 1,
-        "method": "genetic",
-    }
+    sizes = {"before_mean_mm": 1.0, "before_max_mm": 2.0, "after_max_mm": 1.0, "numbers": 3, "evaluations": 1}
     curve = pd.DataFrame(
         [
-            label | {"test": test, "points": points, "after_mean_mm": after, "measuring_time_s": float(points)}
-            for test in benches.TESTS
+            sizes
+            | {"method": "genetic", "test": test, "points": points}
+            | {"after_mean_mm": after, "measuring_time_s": float(points)}
+            for test in regions.TESTS
             for points, after in ((10, 0.5), (20, 0.109), (40, 0.111), (80, 0.1))
         ]
     )
-    found = compare._methods(curve, noise_mm)
+    found = compare.summary(curve, noise_mm)
     # 40 points are worse than a tenth above the last, so that 20 were lucky
-    assert (
-        (found["points"] == 80).all()
-        and (found["points_needed"] == needed).all()
-        and (found["needed_time_s"] == needed).all()
-    )
+    assert found["test"].tolist() == list(regions.TESTS) and (found["points"] == 80).all()
+    assert (found["points_needed"] == needed).all() and (found["needed_time_s"] == needed).all()
     assert found["removed_share"].to_numpy() == pytest.approx(0.9)
 
 
 def test_a_perfect_robot_is_left_as_it_is():
     """Without errors and noise no method may move the robot off its targets."""
-    bench = benches.bench(SHORT, "ptt3")
-    ideal = VirtualTripod(bench.robot.mechanism)
-    still = SimpleNamespace(**{**bench.__dict__, "robot": ideal, "noise_mm": 0.0})
-    still.generator = bench.generator
-    still.plan = bench.plan
-    still.run = lambda plan, label, controller=None: ideal.run(plan, 0.0, bench.generator("run", label), controller)
-    quiet = SHORT | {"methods": SHORT["methods"] | {"points": [60]}}
-    _, curve, _ = compare.compare(still, quiet)
+    one = regions.trial(PTT3)
+    still = replace(one, robot=VirtualTripod(one.robot.mechanism), noise_mm=0.0)
+    _, curve, _ = compare.compare(still, [60], NETWORK, GENETIC)
     after = curve.groupby("method")["after_max_mm"].max()
     # the genetic algorithm comes near, never there
     assert after.drop("genetic").max() < 1e-6 < after["genetic"]
 
 
-def test_points_outside_lie_around_the_region_and_all_are_reachable():
-    for robot in benches.ROBOTS:
-        bench, region = benches.bench(SHORT, robot), SHORT["methods"]["regions"][robot]
+@pytest.mark.parametrize("robot", ["rrru3", "ptt3", "delta"])
+def test_points_outside_lie_around_the_configured_region_and_all_are_reachable(robot):
+    config = yaml.safe_load((ROOT / "config.yaml").read_text())
+    validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    settings = parts.settings(config, robot) | {"test_points": 20}
+    one, region = regions.trial(settings), settings["region"]
 
-        def within(points, region=region):
-            near = np.hypot(*(points[:, :2] - region["centre_mm"]).T) <= region["radius_mm"] * (1.0 + 1e-12)
-            return near & (points[:, 2] >= min(region["z_mm"])) & (points[:, 2] <= max(region["z_mm"]))
+    def within(points):
+        near = np.hypot(*(points[:, :2] - region["centre_mm"]).T) <= region["radius_mm"] * (1.0 + 1e-12)
+        return near & (points[:, 2] >= min(region["z_mm"])) & (points[:, 2] <= max(region["z_mm"]))
 
-        assert (
-            within(bench.train).all()
-            and within(bench.tests["inside"]).all()
-            and not within(bench.tests["outside"]).any()
-        )
-        assert len(bench.tests["outside"]) == len(bench.tests["inside"]) == 20
+    assert within(one.train_mm).all() and len(one.train_mm) == max(settings["points"])
+    assert within(one.tests_mm["inside"]).all() and not within(one.tests_mm["outside"]).any()
+    assert len(one.tests_mm["outside"]) == len(one.tests_mm["inside"]) == 20
 
 
 def test_a_region_out_of_reach_is_refused():
-    far = {"ptt3": {"centre_mm": [0.0, 0.0], "radius_mm": 80.0, "z_mm": [-500.0, -400.0], "noise_mm": 0.0}}
+    far = PTT3["region"] | {"z_mm": [-500.0, -400.0]}
     with pytest.raises(ConfigError, match=r"methods.regions.ptt3: 60 of 60 points are out of reach"):
-        benches.bench(SHORT | {"methods": SHORT["methods"] | {"regions": SHORT["methods"]["regions"] | far}}, "ptt3")
+        regions.trial(PTT3 | {"region": far})

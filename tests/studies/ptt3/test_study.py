@@ -9,7 +9,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.robots.protocol import make_mechanism
-from rrru.studies.ptt3 import bench, driving, experiments, results
+from rrru.studies.ptt3 import bench, driving, experiments, parts, results
 from rrru.studies.ptt3.learning import METHODS, learning
 
 TRUE_MM = np.array([0.06, 0.045, 0.075])
@@ -93,18 +93,16 @@ def taught():
     ],
 )
 def test_what_does_not_fit_together_is_refused(sections, word):
-    experiments.check(SETTINGS)
+    parts.check(SETTINGS)
     with pytest.raises(ConfigError, match=word):
-        experiments.check(changed(**sections))
+        parts.check(changed(**sections))
 
 
 def test_an_experiment_is_a_campaign_like_any_other():
-    section = experiments.campaign_section(SETTINGS, "heavy")
+    section = parts.campaign_section(SETTINGS, "heavy")
     assert (section["robot"], section["noise_mm"], section["errors"]) == ("ptt3", 0.004, "rails")
     assert section["passes"] == 4 * [{"payload_kg": 8.0, "reverse": False}]
-    assert [one["payload_kg"] for one in experiments.campaign_section(SETTINGS, "both")["passes"]] == 4 * [0.0] + 4 * [
-        8.0
-    ]
+    assert [one["payload_kg"] for one in parts.campaign_section(SETTINGS, "both")["passes"]] == 4 * [0.0] + 4 * [8.0]
 
 
 def test_the_curve_has_its_points_and_a_run_up_at_both_ends():

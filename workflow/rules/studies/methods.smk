@@ -1,3 +1,5 @@
+from rrru.studies.methods import parts as method_parts
+
 METHOD_TABLES = ["methods", "method_points"]
 METHOD_ROBOTS = sorted(config["methods"]["regions"])
 METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TABLES)}
@@ -13,6 +15,7 @@ def method_part(name, robot="{robot}"):
 rule compare_methods:
     input:
         calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],
+        poses=lambda wildcards: table("delta_poses") if wildcards.robot == "delta" else [],
     output:
         **named(METHOD_TABLES, method_part),
         method_timings=f"{RESULTS}/timings/methods_{{robot}}.parquet",
@@ -21,24 +24,7 @@ rule compare_methods:
     wildcard_constraints:
         robot="|".join(METHOD_ROBOTS),
     params:
-        settings=lambda wildcards: {
-            "robot": wildcards.robot,
-            **reads(
-                "seed",
-                "robots",
-                "motion",
-                "trajectories",
-                "virtual_robots",
-                "campaigns",
-                "calibration",
-                "genetic",
-                "reproduce",
-                "loads",
-                "ptt",
-                "delta",
-                "methods",
-            ),
-        },
+        settings=lambda wildcards: method_parts.settings(config, wildcards.robot),
         code=code("methods"),
     script:
         "../../scripts/methods.py"

@@ -1,4 +1,6 @@
-CHECKS.append("rrru.studies.ptt3.experiments:check")
+from rrru.studies.ptt3 import parts as ptt_parts
+
+CHECKS.append("rrru.studies.ptt3.parts:check")
 
 PTT_EXPERIMENTS = sorted(config["ptt"]["experiments"])
 # experiments that are diagnosed together, as one campaign
@@ -27,10 +29,7 @@ PTT_FIGURES = {
 }
 FIGURES["ptt"] = PTT_FIGURES
 # they are diagnosed as every campaign is
-DIAGNOSED |= {
-    name: {"robot": "ptt3", "noise_mm": config["ptt"]["noise_mm"], "errors": config["ptt"]["parameters"]}
-    for name in (*PTT_EXPERIMENTS, *PTT_JOINT)
-}
+DIAGNOSED |= {name: ptt_parts.campaign_section(config, name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)}
 PAPERS["B"] = {
     "study": "rrru.studies.ptt3",
     "tables": ["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"],

@@ -1,0 +1,39 @@
+"""Paper B's part of the configuration: whether it fits together, and its experiments as campaigns. Light to import."""
+
+from rrru.errors import ConfigError
+
+
+def check(config):
+    """Raise ConfigError where the `ptt` section does not fit together, before anything runs."""
+    section = config["ptt"]
+    known, joint = section["experiments"], section["joint"]
+    for name, members in joint.items():
+        for member in members:
+            if member not in known:
+                raise ConfigError(f"ptt.joint.{name}: no experiment {member!r}; known: {', '.join(known)}")
+    for name in (*known, *joint):
+        if name in config["campaigns"] or (name in known and name in joint):
+            allowed = "names that no campaign and no other experiment has"
+            raise ConfigError(f"ptt: {name!r} names two things; allowed: {allowed}")
+    points, train = section["curve"]["points"], section["network"]["train"]
+    if not train < points:
+        raise ConfigError(f"ptt.network.train is {train}; allowed: below ptt.curve.points, which is {points}")
+    travel, reach = section["bench"]["turns"] * section["bench"]["lead_mm"], section["bench"]["range_mm"]
+    if travel > reach:
+        raise ConfigError(f"ptt.bench: turns times lead_mm is {travel:g} mm; allowed: up to range_mm, {reach:g} mm")
+    # not at the top: it imports all that a robot needs
+    from rrru.studies.ptt3.experiments import experiment
+
+    experiment(config, next(iter(known)))
+
+
+def campaign_section(settings, name):
+    """What an entry of `campaigns` would say of an experiment, or of experiments that are diagnosed together."""
+    section = settings["ptt"]
+    loads = [section["experiments"][member]["payload_kg"] for member in section["joint"].get(name, [name])]
+    return {
+        "robot": "ptt3",
+        "passes": [{"payload_kg": load, "reverse": False} for load in loads for _ in range(section["repeats"])],
+        "noise_mm": section["noise_mm"],
+        "errors": section["parameters"],
+    }
