@@ -38,17 +38,16 @@ def withheld(tables, options):
     if scores.empty:
         raise ConfigError("withheld: table withheld_scores has no robot")
     checks = [name for name in _CHECKS if (scores["check"] == name).any()]
-    counts = {name: _counts(confusion, name) for name in checks[:2]}
-    names = _singles(confusion)
-    rows = {name: _rows(table, names) for name, table in counts.items()}
-    upper = 4.4 * max(len(labels) for labels in rows.values()) + 38.0
+    cells = _cells(confusion)
+    names = sorted({*cells["row"], *cells["column"]} - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
+    maps = [_map(cells[cells["check"] == name], names) for name in checks[:2]]
+    upper = 4.4 * max(len(counts) for counts in maps) + 38.0
     figure = style.new(style.DOUBLE_MM, upper + 62.0)
     parts = figure.add_gridspec(2, 1, height_ratios=[upper, 62.0])
     marks = iter("abcdefg")
-    maps = parts[0].subgridspec(1, len(counts))
-    for place, (name, table) in enumerate(counts.items()):
-        axes = figure.add_subplot(maps[place])
-        _confusion(axes, table, rows[name], [*names, UNEXPLAINED, NONE, SEVERAL], name == "effect")
+    for place, name, counts in zip(parts[0].subgridspec(1, len(maps)), checks, maps, strict=False):
+        axes = figure.add_subplot(place)
+        _confusion(axes, counts, name == "effect")
         axes.set_title(f"({next(marks)}) robots, {_CHECKS[name][0]}")
     panels = [figure.add_subplot(part) for part in parts[1].subgridspec(1, 3)]
     for axes, draw in zip(panels, (_reliability, _strength, _closed), strict=True):
@@ -72,70 +71,58 @@ def _verdict(verdict):
     return UNEXPLAINED if UNEXPLAINED in names else SEVERAL if len(names) > 1 else verdict
 
 
-def _counts(confusion, check):
-    """Robots by row and column of a check's confusion table."""
-    rows = confusion[confusion["check"] == check]
-    truth = rows["truth"].map(lambda name: _truth(name, check))
-    verdict = rows["verdict"].map(_verdict)
-    return rows["robots"].groupby([truth, verdict]).sum()
+def _cells(confusion):
+    """The confusion table with the row and the column of the figure that each entry counts in."""
+    pairs = zip(confusion["truth"], confusion["check"], strict=True)
+    return confusion.assign(row=[_truth(*pair) for pair in pairs], column=confusion["verdict"].map(_verdict))
 
 
-def _singles(confusion):
-    """Names of all single effects in truths and verdicts."""
-    seen = {_truth(truth, check) for check, truth in zip(confusion["check"], confusion["truth"], strict=True)}
-    return sorted((seen | set(confusion["verdict"].map(_verdict))) - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
+def _map(cells, names):
+    """Robots by row and column of one check, single effects first."""
+    counts = cells.pivot_table("robots", "row", "column", "sum", fill_value=0)
+    rows = [name for name in (*names, OUTSIDE, NONE, SEVERAL) if name in counts.index]
+    return counts.reindex(index=rows, columns=[*names, UNEXPLAINED, NONE, SEVERAL], fill_value=0)
 
 
-def _rows(counts, names):
-    """Truths of a confusion table in the order of its columns."""
-    present = set(counts.index.get_level_values(0))
-    return [name for name in (*names, OUTSIDE, NONE, SEVERAL) if name in present]
-
-
-def _confusion(axes, counts, rows, columns, withheld_effect):
+def _confusion(axes, counts, withheld_effect):
     """Confusion table as a heat map of each row's shares, counts written; the right answers are framed."""
-    table = counts.unstack(fill_value=0).reindex(index=rows, columns=columns, fill_value=0).to_numpy()
+    table, rows, columns = counts.to_numpy(), list(counts.index), list(counts.columns)
     share = table / np.maximum(table.sum(axis=1, keepdims=True), 1)
     axes.imshow(share, cmap=style.SEQUENTIAL, norm=PowerNorm(0.6, 0.0, 1.0), aspect="auto", interpolation="none")
     for (row, column), count in np.ndenumerate(table):
         if count:
             color = "white" if share[row, column] > 0.45 else "black"
             axes.text(column, row, f"{count}", ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
-    axes.set_xticks(range(len(columns)), [_named(name) for name in columns], rotation=90)
-    axes.set_yticks(range(len(rows)), [_named(name) for name in rows])
+    axes.set_xticks(range(len(columns)), [name.replace("_", " ") for name in columns], rotation=90)
+    axes.set_yticks(range(len(rows)), [name.replace("_", " ") for name in rows])
     axes.tick_params(length=0.0)
     axes.set(xlabel="verdict", ylabel="truth")
     axes.axvline(len(columns) - 3.5, color=style.GREY, linewidth=0.6)
     for row, name in enumerate(rows):
         right = UNEXPLAINED if withheld_effect or name == OUTSIDE else name
         if right != SEVERAL:
-            axes.add_patch(
-                Rectangle((columns.index(right) - 0.5, row - 0.5), 1.0, 1.0, clip_on=False, zorder=3, **_FRAME)
-            )
+            corner = (columns.index(right) - 0.5, row - 0.5)
+            axes.add_patch(Rectangle(corner, 1.0, 1.0, clip_on=False, zorder=3, **_FRAME))
 
 
 def _reliability(axes, scores, checks):
     """How often the diagnosis is right against how sure it is."""
     axes.plot([0.0, 1.0], [0.0, 1.0], **_EVEN)
     for name in checks:
-        label, look = _CHECKS[name]
-        rows = scores[scores["check"] == name]
-        _shares(axes, rows["probability"], rows["right"], _PROBABILITY_EDGES, look, label)
+        _shares(axes, scores[scores["check"] == name], ("probability", "right"), _PROBABILITY_EDGES, *_CHECKS[name])
     axes.set(xlabel="stated probability", ylabel="share of robots", xlim=(-0.02, 1.03), ylim=(-0.03, 1.03))
     axes.set_title("right, by stated probability")
 
 
 def _strength(axes, scores, checks):
     """How often the diagnosis is right, and whether the effect could be seen at all, against the gap over the noise."""
+    scores = scores[scores["strength"] > 0.0]
     for name in checks:
-        rows = scores[(scores["check"] == name) & (scores["strength"] > 0.0)]
-        label, look = _CHECKS[name]
-        _shares(axes, rows["strength"], rows["right"], _STRENGTH_EDGES, look, label)
+        _shares(axes, scores[scores["check"] == name], ("strength", "right"), _STRENGTH_EDGES, *_CHECKS[name])
     if checks[0] != "field":
         # of a field campaign nobody knows the law
-        rows = scores[(scores["check"] == checks[0]) & (scores["strength"] > 0.0)]
-        label = f"detected by the true law, {_CHECKS[checks[0]][0]}"
-        _shares(axes, rows["strength"], rows["oracle_detects"], _STRENGTH_EDGES, _ORACLE, label)
+        rows, label = scores[scores["check"] == checks[0]], f"detected by the true law, {_CHECKS[checks[0]][0]}"
+        _shares(axes, rows, ("strength", "oracle_detects"), _STRENGTH_EDGES, label, _ORACLE)
     axes.set(xscale="log", xlabel="gap over noise, rms", ylabel="share of robots", ylim=(-0.03, 1.03))
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
     style.plain_log(axes.xaxis)
@@ -157,20 +144,13 @@ def _closed(axes, scores, checks):
     axes.set_title("share of the gap closed")
 
 
-def _shares(axes, value, hit, edges, look, label):
-    """Share of hits in each bin at the bin's mean value, with its 95 % Wilson interval."""
-    value, hit = value.to_numpy(dtype=float), hit.to_numpy(dtype=bool)
-    place = np.clip(np.digitize(value, edges) - 1, 0, len(edges) - 2)
-    bins = [place == number for number in range(len(edges) - 1) if (place == number).any()]
-    if not bins:
+def _shares(axes, rows, columns, edges, label, look):
+    """Share of hits in each bin at the bin's mean value, with its 95 % Wilson interval; columns: value and hit."""
+    value, hit = columns
+    bins = rows.groupby(np.clip(np.digitize(rows[value], edges) - 1, 0, len(edges) - 2))
+    if not len(bins):
         return
-    x = np.array([value[inside].mean() for inside in bins])
-    share = np.array([hit[inside].mean() for inside in bins])
-    low, high = np.transpose([wilson(hit[inside].sum(), inside.sum()) for inside in bins])
+    x, hits = bins[value].mean(), bins[hit].agg(["sum", "count"])
+    low, high = np.transpose([wilson(*counted) for counted in hits.to_numpy()])
     axes.vlines(x, low, high, color=look["color"], linewidth=0.7)
-    axes.plot(x, share, label=label, **(look | {"markersize": 3.6}))
-
-
-def _named(name):
-    """A name for reading."""
-    return name.replace("_", " ")
+    axes.plot(x, hits["sum"] / hits["count"], label=label, **(look | {"markersize": 3.6}))

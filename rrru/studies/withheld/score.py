@@ -21,7 +21,7 @@ def score_chunk(answers, measurements, verdicts, states, conditions, library=EFF
 
     library: effects by name that the diagnosis knew.
     """
-    told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot", suffixes=("", "_state"))
+    told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
     points = dict(list(measurements.groupby("robot")))
     measured = [_measured(row, points[row["robot"]], conditions, library) for row in told.to_dict("records")]
     told = told.assign(**pd.DataFrame(measured, index=told.index))
@@ -31,7 +31,7 @@ def score_chunk(answers, measurements, verdicts, states, conditions, library=EFF
 def _measured(row, points, conditions, library):
     """What is computed from a robot itself: its limits and the share of its gap that is truly closed."""
     robot = Robot.from_json(row["drawn"])
-    calibrated, state = state_of(row | {"effects": row["effects_state"]})
+    calibrated, state = state_of(row)
     case = _case(points.reset_index(drop=True), conditions, with_truth(library, robot.acting))
     names = [effect for effect in library if not (row["check"] == "effect" and effect == row["truth"])]
     share = true_share(robot, conditions, calibrated, state, library)

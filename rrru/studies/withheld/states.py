@@ -17,13 +17,13 @@ def state_row(robot, calibrated, state):
         "robot": robot,
         "calibrated": json.dumps(np.asarray(calibrated).tolist()),
         "deviations": json.dumps(np.asarray(state.deviations).tolist()),
-        "effects": json.dumps(effects),
+        "fitted_effects": json.dumps(effects),
         "shapes": json.dumps(state.shape_values, sort_keys=True),
     }
 
 
 def state_of(row):
     """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`."""
-    told = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "effects", "shapes")}
-    effects = {(name, shape): np.array(value) for name, shape, value in told["effects"]}
+    told = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "fitted_effects", "shapes")}
+    effects = {(name, shape): np.array(value) for name, shape, value in told["fitted_effects"]}
     return np.array(told["calibrated"]), State(np.array(told["deviations"]), effects, told["shapes"])
