@@ -40,7 +40,7 @@ def virtual(config, name):
     return {
         "name": name,
         "seed": config["seed"],
-        "robot": config["virtual_robots"][section["virtual"]],
+        "robot": config["loads"] | config["virtual_robots"][section["virtual"]],
         "trajectories": config["trajectories"][section["trajectories"]],
         "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
         "motion": config["motion"],
