@@ -1,6 +1,7 @@
 """Least squares on the residuals of a calibration, with everything that says how far to trust the answer."""
 
 from dataclasses import dataclass
+from functools import wraps
 
 import numpy as np
 
@@ -19,6 +20,20 @@ _DERIVATIVES = {
     "cauchy": lambda z: (1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2),
 }
 LOSSES = tuple(_DERIVATIVES)
+
+
+def last_kept(method):
+    """A method of deviations (p,) that keeps its last answer: a search wants slopes where it just wanted residuals."""
+    name = f"_last_{method.__name__}"
+
+    @wraps(method)
+    def kept(self, deviations):
+        asked = np.asarray(deviations, dtype=float).tobytes()
+        if self.__dict__.get(name, (None,))[0] != asked:
+            self.__dict__[name] = asked, method(self, deviations)
+        return self.__dict__[name][1]
+
+    return kept
 
 
 @dataclass(frozen=True)
@@ -51,14 +66,22 @@ class Fit:
 
 
 def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
-    """Fit within the parameters' bounds that minimises the sum of squares of the signed residuals.
+    """Fit within the parameters' bounds that minimises the sum of squares of the signed residuals; see `minimise`.
 
     noise_mm: known noise per axis; None estimates it from the residuals, and so does a value that the residuals clearly
-    exceed, since standard errors from the instrument alone would then promise too much. loss: one of LOSSES, with the
-    residual size `loss_scale_mm` at which a robust loss begins to bend; its noise is the median absolute residual's and
-    its standard errors are those of an M-estimator (Huber, Robust Statistics, 1981, section 7.6). The fit moves only
-    along directions that the points see; the others keep their nominal value. Raises FitError, carrying scipy's result,
-    where there are fewer equations than parameters or the search fails.
+    exceed, since standard errors from the instrument alone would then promise too much. Under a robust loss the noise
+    is the median absolute residual's and standard errors are those of an M-estimator (Huber, Robust Statistics, 1981,
+    section 7.6).
+    """
+    return make_fit(residuals, *minimise(residuals, loss, loss_scale_mm), noise_mm, loss, loss_scale_mm)
+
+
+def minimise(residuals, loss="linear", loss_scale_mm=0.1):
+    """Deviations (p,) within the bounds of the least sum of squares, and how many evaluations the search took.
+
+    loss: one of LOSSES, with the residual size `loss_scale_mm` at which a robust loss begins to bend. The search moves
+    only along directions that the points see; the others keep their nominal value. Raises FitError, carrying scipy's
+    result, where there are fewer equations than parameters or the search fails.
     """
     parameters = residuals.mechanism.parameters
     equations = residuals.residual(parameters.nominal).size
@@ -81,7 +104,7 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
         deviations, evaluations = solution.x, evaluations + int(solution.nfev)
     if not (solution.success and np.isfinite(deviations).all()):
         raise FitError(f"least squares did not converge: {solution.message}", solution)
-    return make_fit(residuals, deviations, evaluations, noise_mm, loss, loss_scale_mm)
+    return deviations, evaluations
 
 
 def _search(residuals, origin, directions, start, scale, **options):

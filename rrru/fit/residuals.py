@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import FitError
+from rrru.fit.least_squares import last_kept
 from rrru.robots import rrru3_kernels as kernels
 from rrru.robots.rrru3 import Rrru3
 
@@ -47,6 +48,7 @@ class Residuals:
         arrays = (np.cos(self.actuators), np.sin(self.actuators), self.nominal_mm, slope, self.measured_mm)
         return (self.mechanism.azimuth_cos_sin, *(np.ascontiguousarray(array.T) for array in arrays))
 
+    @last_kept
     def model(self, deviations):
         """Model positions (n, 3) in mm under deviations (p,)."""
         return self.mechanism.forward(self.actuators, deviations, self.nominal_mm)

@@ -5,6 +5,7 @@ from rrru.store.job import run
 from rrru.studies.delta import draws, fits, spread, views
 from rrru.studies.delta.centres import pose_errors
 from rrru.studies.delta.schemas import TABLES
+from rrru.studies.delta.variants import Seen
 from rrru.studies.delta.virtual_delta import twin
 
 
@@ -15,7 +16,7 @@ def main(settings, inputs, outputs):
     others = spread.Spread(**section["spread"])
     noise = draws.centre_noise_px(settings, truth, tables.read(inputs["delta_dots"]))
     errors = draws.drawn_errors(settings, truth, noise, others.draws, "draws")
-    calibrations, observability, points = fits.study(robot, centres, truth, section["length_error_mm"])
+    calibrations, observability, points = fits.study(robot, Seen.of_tables(centres, truth), section["length_error_mm"])
     frames = {
         "delta_camera": tables.read(inputs["delta_lens"]).assign(true=views.true_camera(settings)),
         "delta_calibrations": calibrations,

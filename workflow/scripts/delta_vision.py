@@ -28,7 +28,7 @@ def main(settings, inputs, outputs):
     started.append(time.perf_counter())
     found, _ = centres.find_centres(poses[first], planes[first], command[first], model, lattice)
     started.append(time.perf_counter())
-    PAPER.fit(twin(settings).mechanism, command[first], vectors(found, "centre"))
+    PAPER.zero_errors(twin(settings).mechanism, command[first], vectors(found, "centre"))
     started.append(time.perf_counter())
     steps = {"step": ["camera", "centres", "zero_errors"], "images": [len(tilted), int(first.sum()), 0]}
     found, dots = centres.find_centres(poses, planes, command, model, lattice)

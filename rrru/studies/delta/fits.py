@@ -12,17 +12,18 @@ _SCALE_ERROR = 1e-4
 _BEFORE = {"variant": "none", "source": "none", "measure": "none", "planes": "none", "poses": 0}
 
 
-def study(twin, centres, truth, length_error_mm):
+def study(twin, seen, length_error_mm):
     """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before any.
 
-    length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zero errors.
+    seen: `Seen`; length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zero errors.
     """
     points, directions = [_points(twin, "none", None)], []
     calibrations = [_BEFORE | _sizes(points[0])]
     for variant in VARIANTS:
-        command, seen = variant.places(twin, centres, truth)
-        result, covariance, fitted = variant.fit(twin.mechanism, command, seen)
-        legs = variant.residuals(twin.truth, command, fitted.actuators, seen)
+        command, places = variant.places(twin, seen)
+        actuators = twin.mechanism.require_reachable(command)
+        fitted, legs = (variant.residuals(robot, command, actuators, places) for robot in (twin.mechanism, twin.truth))
+        result, covariance = variant.fit(fitted)
         # a longer arm changes the model, which the fit sees as measured less model with the other sign
         lengths = taken_for_errors(fitted, -legs.jacobian(twin.truth.parameters.nominal)[..., 3:])
         points.append(_points(twin, variant.name, result.deviations))

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.measurements import vector_columns, vectors
-from rrru.studies.delta.variants import VARIANTS
+from rrru.campaign.measurements import vectors
+from rrru.studies.delta.variants import VARIANTS, Seen
 
 _SIZES = ("plane_mean", "plane_max", "base_mean", "base_max")
 
@@ -27,8 +27,9 @@ def other_draws(twin, truth, errors):
     truth: the table `delta_truth`; errors: those of the optical centres in every draw, see `draws.drawn_errors`. Plate,
     views and the noise of camera and tracker are drawn anew, the robot stays.
     """
+    poses = truth["plane"].to_numpy(), vectors(truth, "command")
     measured = [
-        plane_sizes(replace(twin, labels=("draws", number)), truth, draw) for number, draw in enumerate(errors, 1)
+        plane_sizes(replace(twin, labels=("draws", number)), *poses, draw) for number, draw in enumerate(errors, 1)
     ]
     rows = []
     for name in measured[0]:
@@ -45,14 +46,14 @@ def other_robots(twin, truth, errors, spread):
     truth, errors: as in `other_draws`; the robots take the draws in turn, since their cameras see nearly the same dots.
     Every size of length errors has the same zero errors, directions and noise.
     """
-    rows = []
+    poses, rows = (truth["plane"].to_numpy(), vectors(truth, "command")), []
     for length in spread.lengths_mm:
         measured = []
         for number in range(spread.robots):
             own = replace(twin, labels=("robots", number))
             unit = own.generator().standard_normal(len(twin.deviations))
             own = replace(own, deviations=unit * np.where(np.arange(len(unit)) < 3, spread.zero_rad, length))
-            measured.append(plane_sizes(own, truth, errors[number % len(errors)]))
+            measured.append(plane_sizes(own, *poses, errors[number % len(errors)]))
         for name in measured[0]:
             median, high = np.percentile([sizes[name] for sizes in measured], [50.0, 90.0], axis=0)
             columns = {"plane_median_mm": median[0], "plane_high_mm": high[0]}
@@ -61,17 +62,16 @@ def other_robots(twin, truth, errors, spread):
     return pd.DataFrame(rows)
 
 
-def plane_sizes(twin, truth, draw):
+def plane_sizes(twin, planes, command_mm, draw):
     """Sizes (4,), as in `_SIZES`, of a robot's errors on the plane before ("none") and after every variant, by name.
 
     draw: errors (n, 3) of the optical centres by how they are found.
     """
-    places = twin.drive(vectors(truth, "command"))
-    centres = pd.DataFrame({k: v for name, off in draw.items() for k, v in vector_columns(name, places + off).items()})
-    truth = truth.assign(**vector_columns("true", places))
+    places = twin.drive(command_mm)
+    seen = Seen(planes, command_mm, places + draw["centre"], places + draw["one_rotation"], places)
     zero_rad = {"none": None}
     for variant in VARIANTS:
-        zero_rad[variant.name] = variant.fit(twin.mechanism, *variant.places(twin, centres, truth))[0].deviations
+        zero_rad[variant.name] = variant.zero_errors(twin.mechanism, *variant.places(twin, seen))
     sizes = {}
     for name, fed_back in zero_rad.items():
         plane, base = (np.linalg.norm(e, axis=1) for e in twin.plane_errors(fed_back, twin.generator("plane", name)))

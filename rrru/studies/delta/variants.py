@@ -5,10 +5,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.campaign.measurements import vectors
-from rrru.fit.least_squares import least_squares
+from rrru.fit.least_squares import least_squares, minimise
 from rrru.fit.residuals import Residuals
 from rrru.plant.tracker import measure
-from rrru.studies.delta.zero_offset import Distances, Heights, Shape, step_fit
+from rrru.studies.delta.zero_offset import Distances, Heights, Shape, one_step, step_fit
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Poses: planes' names (n,), commands (n, 3), and optical centres (n, 3) by the sources of variants."""
+
+    planes: np.ndarray
+    command_mm: np.ndarray
+    images_mm: np.ndarray
+    one_rotation_mm: np.ndarray
+    true_centres_mm: np.ndarray
+
+    @classmethod
+    def of_tables(cls, centres, truth):
+        """From `delta_centres` and `delta_truth`."""
+        names = ((truth, "command"), (centres, "centre"), (centres, "one_rotation"), (truth, "true"))
+        return cls(truth["plane"].to_numpy(), *(vectors(table, name) for table, name in names))
 
 
 @dataclass(frozen=True)
@@ -31,15 +48,13 @@ class Variant:
         first = planes == "first"
         return first if self.planes == "one" else ~first | (np.cumsum(first) % 2 == 1)
 
-    def places(self, twin, centres, truth):
-        """Commands (n, 3) and places (n, 3) that it is given of `delta_centres` or `delta_truth`, in its own frame."""
-        used = self.used(truth["plane"].to_numpy())
-        command = vectors(truth, "command")[used]
+    def places(self, twin, seen):
+        """Commands (n, 3) and places (n, 3) that it is given of what was `Seen`, in its source's frame."""
+        used = self.used(seen.planes)
+        command = seen.command_mm[used]
         if self.source == "tracker":
             return command, measure(twin.drive(command), twin.tracker_noise_mm, twin.generator("tracker", self.name))
-        if self.source == "true_centres":
-            return command, vectors(truth, "true")[used]
-        return command, vectors(centres, "centre" if self.source == "images" else "one_rotation")[used]
+        return command, getattr(seen, f"{self.source}_mm")[used]
 
     def residuals(self, mechanism, command_mm, actuators, places_mm):
         """What it fits: residuals of the mechanism at actuators (n, 3) for places (n, 3)."""
@@ -50,13 +65,17 @@ class Variant:
         kind = Heights if self.measure == "heights" else Residuals
         return kind(mechanism, actuators, places_mm, command_mm)
 
-    def fit(self, mechanism, command_mm, places_mm):
-        """Fit to places (n, 3) for commands (n, 3), the covariance (3, 3) of its deviations in rad^2, its residuals."""
+    def zero_errors(self, mechanism, command_mm, places_mm):
+        """Zero errors (3,) in rad for commands (n, 3) and places (n, 3)."""
         points = self.residuals(mechanism, command_mm, mechanism.require_reachable(command_mm), places_mm)
+        return one_step(points) if self.step else minimise(points)[0]
+
+    def fit(self, points):
+        """Fit of its residuals, and the covariance (3, 3) of its deviations in rad^2."""
         if self.step:
-            return *step_fit(points), points
+            return step_fit(points)
         result = least_squares(points)
-        return result, result.identifiability.covariance(result.noise_mm), points
+        return result, result.identifiability.covariance(result.noise_mm)
 
 
 VARIANTS = (

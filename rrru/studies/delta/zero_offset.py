@@ -1,8 +1,7 @@
-"""Zero errors of the drives from places that are known up to a rigid motion: distances (paper C, eqs. 8 to 15), shapes,
-heights.
+"""Zero errors of the drives from places that are known up to a rigid motion: distances (paper C, eqs. 8 to 15), shapes.
 
 The robot stood at n actuator triples and its places were seen in a frame of which nothing is known. With l_cj the seen
-distance of place j from the first and l_j the model's, u_j the direction between them and J_j the error Jacobian,
+distance of place j from the first and l_j the model's, u_j the direction between them and J_j the Jacobian,
 
     l_cj - l_j = u_j . (J_j - J_1) dtheta,   j = 2 .. n
     (eqs. 9, 13, 14)
@@ -19,7 +18,7 @@ from scipy import linalg
 from scipy.spatial.transform import Rotation
 
 from rrru.fit.identifiability import analyse
-from rrru.fit.least_squares import make_fit
+from rrru.fit.least_squares import last_kept, make_fit
 from rrru.fit.residuals import Residuals
 
 
@@ -42,10 +41,8 @@ class Distances:
 
     @cached_property
     def covariance(self):
-        """Covariance (n-1, n-1) of the distances for unit noise of every axis: I + U U', U (n-1, 3) the directions from
-        the first place.
-        """
-        direction = _apart(self.measured_mm)[1]
+        """Covariance (n-1, n-1) of the distances for unit noise of every axis: I + U U', U the directions."""
+        direction = _from_first(self.measured_mm)[1]
         return np.eye(len(self)) + direction @ direction.T
 
     @cached_property
@@ -53,16 +50,21 @@ class Distances:
         """Inverse Cholesky factor (n-1, n-1) of the covariance, or the unit matrix where all count alike."""
         return np.eye(len(self)) if self.alike else np.linalg.inv(np.linalg.cholesky(self.covariance))
 
+    @last_kept
+    def _model(self, deviations):
+        """Model places (n, 3)."""
+        return self.mechanism.forward(self.actuators, deviations)
+
     def residual(self, deviations):
         """Measured less model distances (n-1, 1) in mm, whitened."""
-        difference = _apart(self.measured_mm)[0] - _apart(self.mechanism.forward(self.actuators, deviations))[0]
+        difference = _from_first(self.measured_mm)[0] - _from_first(self._model(deviations))[0]
         return (self.whitener @ difference)[:, None]
 
     def jacobian(self, deviations):
         """Derivative (n-1, 1, p) of the residual."""
-        places = self.mechanism.forward(self.actuators, deviations)
+        places = self._model(deviations)
         slope = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
-        rows = np.einsum("na,nap->np", _apart(places)[1], slope[1:] - slope[0])
+        rows = np.einsum("na,nap->np", _from_first(places)[1], slope[1:] - slope[0])
         return -(self.whitener @ rows)[:, None]
 
 
@@ -88,6 +90,7 @@ class Shape:
         motions = np.concatenate([np.tile(np.eye(3), (len(self), 1, 1)), turned], axis=1)
         return linalg.null_space(motions.transpose(1, 0, 2).reshape(6, -1)).T
 
+    @last_kept
     def _turned(self, deviations):
         """Model places (n, 3) moved onto the measured ones, the rotation (3, 3) of it and the places before."""
         places = self.mechanism.forward(self.actuators, deviations)
@@ -101,9 +104,7 @@ class Shape:
         return (self._rest @ (self.measured_mm - moved).ravel())[:, None]
 
     def jacobian(self, deviations):
-        """Derivative (3n - 6, 1, p) of the residual, but for the part by which the best rotation follows, which `_rest`
-        takes away.
-        """
+        """Derivative (3n - 6, 1, p) of the residual; how the best rotation follows is what `_rest` takes away."""
         _, turn, places = self._turned(deviations)
         slope = turn @ self.mechanism.parameter_jacobian(places, self.actuators, deviations)
         return -(self._rest @ slope.reshape(-1, slope.shape[-1]))[:, None]
@@ -123,16 +124,13 @@ class Heights(Residuals):
 
 
 def one_step(residuals):
-    """Errors (p,) by one linear step from the nominal robot: on `Distances` that count alike it is the paper's answer
-    (eq. 15).
-    """
+    """Deviations (p,) by one linear step from the nominal robot: the paper's on `Distances` that count alike (eq. 15)."""
     nominal = residuals.mechanism.parameters.nominal
     return nominal + taken_for_errors(residuals, residuals.residual(nominal)[..., None])[:, 0]
 
 
 def step_fit(distances):
-    """Fit of the paper's step on `Distances` that count alike, and the covariance (p, p) of its errors, in squares of
-    their units.
+    """Fit of the paper's step on `Distances` that count alike, and the covariance (p, p) of its deviations.
 
     With J' J in place of the best weights the covariance is s^2 J^+ C J^+', C that of the distances, and s^2 the sum of
     squared residuals over the trace of (I - J J^+) C. Singular values are those of the whitened distances, as in every
@@ -146,22 +144,22 @@ def step_fit(distances):
     noise = np.sqrt((plain.residual_mm**2).sum() / np.trace(left))
     covariance = noise**2 * inverse @ distances.covariance @ inverse.T
     seen = analyse(distances.mechanism, replace(distances, alike=False).jacobian(deviations))
-    deviation = np.sqrt(np.diag(covariance))
-    return replace(plain, noise_mm=float(noise), standard_errors=deviation, identifiability=seen), covariance
+    errors = np.sqrt(np.diag(covariance))
+    return replace(plain, noise_mm=float(noise), standard_errors=errors, identifiability=seen), covariance
 
 
 def taken_for_errors(residuals, changes):
-    """Errors (p, q) by which a fit answers to changes of its residuals (m, k, q) that it does not know, to first order.
+    """Deviations (p, q) by which a fit answers to changes of its residuals (m, k, q) that it does not know.
 
-    Changes are derivatives of measured less model values: of the model by other errors, or of the measurement by an
-    instrument's.
+    To first order. Changes are derivatives of measured less model values: of the model by other deviations, or of the
+    measurement by an instrument's.
     """
     jacobian = residuals.jacobian(residuals.mechanism.parameters.nominal)
     flat = jacobian.reshape(-1, jacobian.shape[-1])
     return -np.linalg.lstsq(flat, np.asarray(changes).reshape(len(flat), -1), rcond=None)[0]
 
 
-def _apart(places_mm):
+def _from_first(places_mm):
     """Distances (n-1,) of places (n, 3) from the first, and the unit directions (n-1, 3)."""
     step = places_mm[1:] - places_mm[0]
     distance = np.linalg.norm(step, axis=1)

@@ -33,7 +33,7 @@ def cause_columns(result):
     """
     residuals, deviations = result.residuals, result.fit.deviations
     n, m = len(residuals.height_mm), len(residuals.distance_mm)
-    places = residuals.mechanism.forward(residuals.actuators, deviations)
+    places = residuals.places(deviations)
     gradient = residuals.gradient(places)
     moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, deviations)
     by_leg = np.einsum("rna,nalc->rlc", gradient, moved)

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import FitError
+from rrru.fit.least_squares import last_kept
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,15 @@ class HeightResiduals:
         """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
         return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
 
+    @last_kept
+    def places(self, deviations):
+        """Where the robot stands, (n + 2 m, 3), at `actuators` under deviations (p,)."""
+        return self.mechanism.forward(self.actuators, deviations)
+
     def predicted_mm(self, deviations):
         """Readings (n + m,) of the robot under deviations (p,)."""
         n, m = len(self.height_mm), len(self.distance_mm)
-        places = self.mechanism.forward(self.actuators, deviations)
+        places = self.places(deviations)
         return np.concatenate([places[:n, 2], np.linalg.norm(places[n : n + m] - places[n + m :], axis=1)])
 
     def gradient(self, places):
@@ -76,7 +82,7 @@ class HeightResiduals:
 
     def jacobian(self, deviations):
         """Derivative (n + m, 1, p) of the residual by the deviations."""
-        places = self.mechanism.forward(self.actuators, deviations)
+        places = self.places(deviations)
         moved = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
         return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self.gradient(places), moved)[:, None]
 
