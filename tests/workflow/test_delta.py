@@ -1,15 +1,12 @@
 """The Delta's study from images to errors on the plane, as a user runs it with fewer images, and its twin."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from scipy.spatial.transform import Rotation
 
-from rrru.errors import ConfigError
 from rrru.robots.delta import Delta
 from rrru.studies.delta import draws, robot_search, views, virtual_delta, vision
 from rrru.studies.delta.variants import VARIANTS
@@ -125,51 +122,6 @@ def test_dots_that_are_projected_are_those_of_the_rendered_images(results, confi
     )
 
 
-def test_draws_differ_and_the_same_label_gives_the_same(config):
-    config = config | {"delta": config["delta"] | {"tilted_views": {"count": 5, "tilt_deg": 25.0}}}
-    truth = views.true_poses(config).head(4)
-    first, again = (draws.drawn_errors(config, truth, 0.006, 2, "a") for _ in range(2))
-    other = draws.drawn_errors(config, truth, 0.006, 1, "b")
-    np.testing.assert_array_equal(first[1]["centre"], again[1]["centre"])
-    for one in (first[1], other[0]):
-        assert np.abs(one["centre"] - first[0]["centre"]).max() > 1e-3
-    exact = {"target": config["delta"]["target"] | {"dot_error_mm": 0.0}}
-    none = draws.drawn_errors(config | {"delta": config["delta"] | exact}, truth, 0.0, 1, "a")[0]
-    # an exact plate without noise leaves what single precision does to the lens; under one rotation the origin may
-    # shift
-    assert np.abs(none["centre"]).max() < 1e-4
-    assert np.ptp(none["one_rotation"], axis=0).max() < 1e-4
-
-
-def test_every_robot_has_its_own_tracker_noise(config):
-    one = virtual_delta.twin(config)
-    runs = [
-        replace(one, labels=("robots", k)).generator("tracker", "tracker_heights").standard_normal(50) for k in range(2)
-    ]
-    assert abs(np.corrcoef(runs)[0, 1]) < 4.0 / np.sqrt(50)
-
-
-def test_an_own_frame_has_its_axes_where_the_robot_went():
-    turn = Rotation.from_rotvec([0.1, -0.2, 0.3])
-    places = np.random.default_rng(1).normal(size=(6, 3))
-    axes = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.4, 3.0, 0.0]])
-    np.testing.assert_allclose(
-        virtual_delta.in_own_frame(turn.apply(axes) + 5.0, turn.apply(places) + 5.0), places, atol=1e-12
-    )
-
-
-def test_poses_are_spread_evenly_and_steps_stay_short(config):
-    planes, command = virtual_delta.Poses(**config["delta"]["poses"]).commands()
-    first = command[planes == "first"]
-    assert len(first) == 20 and (first[:, 2] == 100.0).all() and (command[planes == "second"][:, 2] == 0.0).all()
-    assert len(np.unique(first, axis=0)) == 20
-    np.testing.assert_allclose(first.mean(axis=0), [0.0, 0.0, 100.0])
-    # joined by whole pitches: the target's turn over a step stays below half a pitch
-    assert np.linalg.norm(np.diff(command[:, :2], axis=0), axis=1).max() <= 200.0
-    two = next(variant for variant in VARIANTS if variant.planes == "two")
-    assert two.used(planes).sum() == 20
-
-
 def test_the_vision_job_is_given_images_only(shared):
     job = re.search(r"rule delta_vision:\n    input: (.*)\n", (shared / "output").read_text())
     assert job[1] == "build/minimal/delta/images.npz"
@@ -194,9 +146,3 @@ def test_a_step_of_the_search_stays_near_the_configured_robot(results, config):
     here = robot_search.numbers(virtual_delta.twin(small), _columns(truth, "command")[first], drawn)
     published = np.array([0.932, 1.442, 0.211, 0.374])
     assert misfit == pytest.approx(np.sqrt(np.mean((here / published - 1.0) ** 2)), abs=2e-4)
-
-
-def test_a_plane_out_of_reach_is_named(config):
-    far = config | {"delta": config["delta"] | {"plane": {"z_mm": 0.0, "radius_mm": 2000.0, "step_mm": 500.0}}}
-    with pytest.raises(ConfigError, match=r"delta\.plane: a point is out of the robot's reach"):
-        virtual_delta.twin(far)
