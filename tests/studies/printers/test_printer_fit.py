@@ -196,23 +196,3 @@ def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():
         and row["verdict"] == "does not belong"
     )
     assert f"distance 8 being {DISTANCES.distance_mm[7]:.3f} mm" in row["reason"]
-
-
-def test_printers_that_share_readings_are_one_piece_of_evidence():
-    """The file by hand: 18, 22, 23 and 24 have the same twelve distances, 19 the heights of 18; 06, 08, 09 (10), 29 and
-    31 stand alone.
-    """
-    frames = printer_tables.tables(list(PRINTERS.values()), SETTINGS)
-    printers = frames["printers"].set_index("printer")
-    for name in ("printer_22", "printer_23", "printer_24"):
-        assert (PRINTERS[name].distance_mm == PRINTERS["printer_18"].distance_mm).all()
-    shared = {name: first for name, first in printers["evidence"].items() if name != first}
-    assert shared == {f"printer_{k}": "printer_18" for k in (19, 22, 23, 24)} | {
-        "printer_10": "printer_09",
-        "printer_11": "printer_09",
-    }
-    causes = frames["printer_causes"].merge(printers["distances"], left_on="printer", right_index=True)
-    # a bad reading is its own file's matter
-    pieces = np.where(causes["cause"] == "bad_reading", 1.0, 6.0)
-    np.testing.assert_allclose(causes["limit"], 0.05 / pieces / np.where(causes["distances"] > 0, 6.0, 4.0))
-    assert set(printers["cause"]) == {"none found", "not decidable"} and not frames["printer_readings"]["flagged"].any()
