@@ -16,6 +16,28 @@ def log_ndtr(x):
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _with_positive(total, low, half, inverse, positive, first):
+    """A log evidence with the positive coefficients' halves; rows of the factor's inverse before the first stand."""
+    k = len(half)
+    for c in range(k):
+        if not positive[c]:
+            continue
+        if c >= first:
+            inverse[c, c] = 1.0 / low[c, c]
+        for r in range(max(c + 1, first), k):
+            entry = 0.0
+            for q in range(c, r):
+                entry -= low[r, q] * inverse[q, c]
+            inverse[r, c] = entry / low[r, r]
+        mean, variance = 0.0, 0.0
+        for r in range(c, k):
+            mean += inverse[r, c] * half[r]
+            variance += inverse[r, c] * inverse[r, c]
+        total += log_ndtr(mean / math.sqrt(variance)) + math.log(2.0)
+    return total
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def log_evidence(gram, moment, scale, positive):
     """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
 
@@ -27,11 +49,14 @@ def log_evidence(gram, moment, scale, positive):
     m = scale.shape[0]
     result = np.empty((v, m))
     low, inverse = np.zeros((k, k)), np.zeros((k, k))
-    half = np.empty(k)
+    half, gained = np.empty(k), np.zeros(k + 1)
     for level in range(v):
         for j in range(m):
-            total = 0.0
-            for r in range(k):
+            # rows of the factor stand as long as no scale up to them changes
+            first = 0
+            while j > 0 and first < k and scale[j, first] == scale[j - 1, first]:
+                first += 1
+            for r in range(first, k):
                 for c in range(r + 1):
                     entry = scale[j, r] * scale[j, c] * gram[level, r, c]
                     if r == c:
@@ -44,20 +69,6 @@ def log_evidence(gram, moment, scale, positive):
                 for q in range(r):
                     entry -= low[r, q] * half[q]
                 half[r] = entry / low[r, r]
-                total += 0.5 * half[r] * half[r] - math.log(low[r, r])
-            for c in range(k):
-                if not positive[c]:
-                    continue
-                inverse[c, c] = 1.0 / low[c, c]
-                for r in range(c + 1, k):
-                    entry = 0.0
-                    for q in range(c, r):
-                        entry -= low[r, q] * inverse[q, c]
-                    inverse[r, c] = entry / low[r, r]
-                mean, variance = 0.0, 0.0
-                for r in range(c, k):
-                    mean += inverse[r, c] * half[r]
-                    variance += inverse[r, c] * inverse[r, c]
-                total += log_ndtr(mean / math.sqrt(variance)) + math.log(2.0)
-            result[level, j] = total
+                gained[r + 1] = gained[r] + (0.5 * half[r] * half[r] - math.log(low[r, r]))
+            result[level, j] = _with_positive(gained[k], low, half, inverse, positive, first)
     return result
