@@ -10,7 +10,8 @@ import numpy as np
 import pygad
 
 from rrru.fit.residuals import Residuals
-from rrru.genetic.algorithm import GeneticSettings, minimise
+from rrru.genetic.algorithm import minimise
+from rrru.genetic.settings import GeneticSettings
 from rrru.robots.rrru3 import Rrru3
 
 TABLE_5_RAD = {"dtheta1": 0.0012, "dtheta2": -0.0003, "dtheta3": 0.0003}

@@ -7,8 +7,6 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import last_kept
-from rrru.robots import rrru3_kernels as kernels
-from rrru.robots.rrru3 import Rrru3
 
 
 @dataclass(frozen=True)
@@ -41,13 +39,6 @@ class Residuals:
         """Model positions (n, 3) without deviations."""
         return self.mechanism.forward(self.actuators, guess_mm=self.start_mm)
 
-    @cached_property
-    def _kernel_arguments(self):
-        """Arrays of the 3-RRRU's compiled objective that do not change with the deviations, component first."""
-        slope = self.mechanism.parameter_jacobian(self.nominal_mm, self.actuators)
-        arrays = (np.cos(self.actuators), np.sin(self.actuators), self.nominal_mm, slope, self.measured_mm)
-        return (self.mechanism.azimuth_cos_sin, *(np.ascontiguousarray(array.T) for array in arrays))
-
     @last_kept
     def model(self, deviations):
         """Model positions (n, 3) in mm under deviations (p,)."""
@@ -61,11 +52,10 @@ class Residuals:
         """Derivative (n, 3, p) of the residual by the deviations."""
         return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
 
-    def mean_distance(self, deviations):
-        """Paper A, eq. (11): mean distance (m,) in mm for deviations (m, p); inf where the model leaves the reach."""
-        deviations = np.ascontiguousarray(deviations, dtype=float)
-        legs = self.mechanism.legs(deviations)
-        if isinstance(self.mechanism, Rrru3):
-            return kernels.mean_distance(deviations, legs, *self._kernel_arguments)
-        ends, links = self.mechanism.ends(self.actuators, legs[:, None]), legs[..., self.mechanism.LINK]
-        return kernels.tripod_mean_distance(*map(np.ascontiguousarray, (ends, links, self.measured_mm)))
+    @cached_property
+    def mean_distance(self):
+        """Objective of paper A, eq. (11): callable, deviations (m, p) to mean distances (m,) in mm, inf out of reach.
+
+        Where the mechanism offers it, a CompiledObjective.
+        """
+        return self.mechanism.mean_distance(self.actuators, self.nominal_mm, self.measured_mm)

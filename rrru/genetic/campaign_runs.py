@@ -8,18 +8,10 @@ import pandas as pd
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
-from rrru.genetic.algorithm import GeneticSettings, minimise
+from rrru.genetic.algorithm import minimise
 from rrru.genetic.sweep import kept_generations
 from rrru.robots.protocol import identifiable_truth
 from rrru.seeds import run_seed
-
-SETTING_KEYS = tuple(GeneticSettings.__dataclass_fields__)
-
-
-def settings_from_config(section, **changes):
-    """GeneticSettings of the configuration's `genetic` section with some values replaced."""
-    values = {key: section[key] for key in SETTING_KEYS if key in section} | changes
-    return GeneticSettings(**values | {"populations": tuple(values["populations"])})
 
 
 def study_set(

@@ -1,48 +1,38 @@
-"""Operators of the genetic algorithm that the paper used (MATLAB `ga`), as pure array functions.
+"""Operators of the genetic algorithm that the paper used (MATLAB `ga`) as array functions, and its loop.
 
 Scores are minimised; `inf` marks an infeasible individual. Genes lie in 0..1. Random numbers are drawn outside and
-handed in, so that the same numbers give the same children. Sources: Global Optimization Toolbox, "Genetic Algorithm
-Options" and "How the Genetic Algorithm Works"; J. E. Baker, "Reducing bias and inefficiency in the selection
-algorithm", ICGA 1987 (stochastic uniform selection).
+handed in, so that the same numbers give the same children. All islands of a population lie in one array, one after the
+other; see `plan.make_plan` for `plan`. What is compiled stands in this one file, since numba's cache does not see
+changes of another. Sources: Global Optimization Toolbox, "Genetic Algorithm Options" and "How the Genetic Algorithm
+Works"; J. E. Baker, "Reducing bias and inefficiency in the selection algorithm", ICGA 1987 (stochastic uniform).
 """
-
-import math
 
 import numba
 import numpy as np
 
-SURVIVAL_RATE = (
-    2.0  # expected number of the best individual's places over the average's ("shift linear" scaling's default)
-)
+# expected number of the best individual's places over the average's ("shift linear" scaling's default)
+SURVIVAL_RATE = 2.0
 
 _compiled = numba.njit(cache=True, error_model="numpy")
 
 
-def elite_count(size, share):
-    """Number of elites in a population of `size` individuals: ceil(share size), float noise in the product removed."""
-    return math.ceil(round(share * size, 9))
-
-
-def child_counts(size, elites, crossover_fraction):
-    """Numbers of children by crossover (the fraction, rounded half up, of the places that the elites leave) and by
-    mutation (the rest).
-    """
-    places = size - elites
-    crossed = math.floor(round(crossover_fraction * places, 9) + 0.5)
-    return crossed, places - crossed
+def draws_needed(plan, genes):
+    """Numbers of uniform and of normal random numbers that `next_population` takes for individuals of `genes` genes."""
+    crossed = plan[:, 3]
+    mutated = plan[:, 1] - plan[:, 0] - plan[:, 2] - crossed
+    return int((1 + 2 * crossed + mutated + crossed * genes).sum()), int((mutated * genes).sum())
 
 
 @_compiled
 def shift_linear(score, parents):
-    """Expected numbers of places, shape (n,), of individuals with scores (n,) among `parents` parents ("shift linear"
-    scaling).
+    """Expected numbers of places (n,) of individuals with scores (n,) among `parents` parents ("shift linear" scaling).
 
     Affine in the score, with mean d = parents / n over the feasible individuals; the best gets SURVIVAL_RATE d, unless
     the worst would fall below zero: then the worst gets zero. Where all scores are equal, or none is finite, everyone
     gets the same.
     """
-    # ASSUME an infeasible individual (score not finite) gets no place as long as anyone is feasible, and does not enter
-    # mean and extremes.
+    # ASSUME an infeasible individual (score not finite) gets no place while anyone is feasible, and does not enter mean
+    # and extremes.
     n = score.size
     feasible = 0
     best, worst = np.inf, -np.inf
@@ -52,8 +42,7 @@ def shift_linear(score, parents):
             best, worst = min(best, value), max(worst, value)
     if feasible == 0:
         return np.full(n, parents / n)
-    # differences to the best are exact for close scores, so that a population about to become equal keeps meaningful
-    # expectations
+    # differences to the best are exact for close scores, so that a population about to become equal keeps its order
     mean = 0.0
     for value in score:
         if np.isfinite(value):
@@ -116,9 +105,7 @@ def scattered(population, parents, coin):
 
 @_compiled
 def gaussian(population, parents, step):
-    """Mutants (k, p) of the parents' indices (k,) in a population (n, p), every gene moved by step (k, p) and folded
-    back into 0..1.
-    """
+    """Mutants (k, p) of the parents' indices (k,) in a population (n, p), moved by step (k, p) and folded to 0..1."""
     # ASSUME the paper names neither its mutation nor its bounds. MATLAB's Gaussian mutation knows no bounds, and its
     # default with bounds ("adaptive feasible") is another operator. Genes are reflected at the bounds: with steps of
     # one range, clipping would put nearly two of three mutated genes exactly onto a bound, finds worse minima, and
@@ -131,30 +118,32 @@ def gaussian(population, parents, step):
     return children
 
 
-def mutation_sigma(generation, generations, scale, shrink):
-    """Standard deviation of the mutation, in units of the range, in generation g = 1..generations: scale (1 - shrink g
-    / generations).
-    """
-    return scale * (1.0 - shrink * generation / generations)
+@_compiled
+def migrate(population, score, plan, migrants):
+    """Population (n, p) and scores (n,) after the best of each island were copied over the worst of the next.
 
-
-def draws_needed(plan, genes):
-    """Numbers of uniform and of normal random numbers that `next_population` takes for a plan (islands, 4) and `genes`
-    genes.
+    migrants: (islands,), see `plan.migrants_of`; they also stay where they were. Of equal scores the earlier is better.
     """
-    crossed = plan[:, 3]
-    mutated = plan[:, 1] - plan[:, 0] - plan[:, 2] - crossed
-    return int((1 + 2 * crossed + mutated + crossed * genes).sum()), int((mutated * genes).sum())
+    # ASSUME all migrants leave before any arrives, so that nothing travels further than one island at a time.
+    arrived, arrived_score = population.copy(), score.copy()
+    islands = len(plan)
+    for source in range(islands if islands > 1 else 0):
+        target = (source + 1) % islands
+        first, beyond = plan[target, 0], plan[target, 1]
+        best = np.argsort(score[plan[source, 0] : plan[source, 1]], kind="mergesort")
+        worst = np.argsort(score[first:beyond], kind="mergesort")[beyond - first - migrants[source] :]
+        for k in range(migrants[source]):
+            arrived[first + worst[k]] = population[plan[source, 0] + best[k]]
+            arrived_score[first + worst[k]] = score[plan[source, 0] + best[k]]
+    return arrived, arrived_score
 
 
 @_compiled
 def next_population(population, score, plan, uniform, normal, sigma):
     """Next population (n, p) and what is known of its scores (n,): the elites' scores, NaN for the children.
 
-    population: (n, p), islands one after the other; score: (n,); plan: (islands, 4) whole numbers, first row, row after
-    the last, elites, children by crossover; uniform, normal: random numbers, see `draws_needed`; sigma: of the
-    mutation. Each island's rows are its elites (best first), its crossover children, its mutants; all parents are
-    selected at once, shuffled, and the first taken in pairs.
+    uniform, normal: random numbers, see `draws_needed`; sigma: of the mutation. Each island's rows are its elites (best
+    first), its crossover children, its mutants; all parents are selected at once, shuffled, the first taken in pairs.
     """
     genes = population.shape[1]
     children = np.empty(population.shape)
@@ -164,21 +153,80 @@ def next_population(population, score, plan, uniform, normal, sigma):
         start, stop, elites, crossed = plan[island]
         mutated = stop - start - elites - crossed
         count = 2 * crossed + mutated
-        here, here_score = population[start:stop], score[start:stop]
-        if elites > 0:
-            rank = np.argsort(here_score, kind="mergesort")
-            for i in range(elites):
-                children[start + i] = here[rank[i]]
-                known[start + i] = here_score[rank[i]]
-        if count > 0:
-            parents = shuffled(
-                stochastic_uniform(shift_linear(here_score, count), count, uniform[u]), uniform[u + 1 : u + 1 + count]
-            )
-            u += 1 + count
-            coin = uniform[u : u + crossed * genes].reshape(crossed, genes)
-            u += crossed * genes
-            children[start + elites : start + elites + crossed] = scattered(here, parents, coin)
-            step = sigma * normal[g : g + mutated * genes].reshape(mutated, genes)
-            g += mutated * genes
-            children[start + elites + crossed : stop] = gaussian(here, parents[2 * crossed :], step)
+        own, own_score = population[start:stop], score[start:stop]
+        rank = np.argsort(own_score, kind="mergesort")
+        for i in range(elites):
+            children[start + i] = own[rank[i]]
+            known[start + i] = own_score[rank[i]]
+        chosen = stochastic_uniform(shift_linear(own_score, count), count, uniform[u])
+        parents = shuffled(chosen, uniform[u + 1 : u + 1 + count])
+        u += 1 + count
+        coin = uniform[u : u + crossed * genes].reshape(crossed, genes)
+        u += crossed * genes
+        children[start + elites : start + elites + crossed] = scattered(own, parents, coin)
+        step = sigma * normal[g : g + mutated * genes].reshape(mutated, genes)
+        g += mutated * genes
+        children[start + elites + crossed : stop] = gaussian(own, parents[2 * crossed :], step)
     return children, known
+
+
+@_compiled
+def look_up(children, known, population, score):
+    """Give children that equal an individual of the population (n, p) its score, in place."""
+    for i in range(len(children)):
+        k = 0
+        while np.isnan(known[i]) and k < len(population):
+            q = 0
+            while q < children.shape[1] and children[i, q] == population[k, q]:
+                q += 1
+            if q == children.shape[1]:
+                known[i] = score[k]
+            k += 1
+
+
+@_compiled
+def decoded(genes, box):
+    """Parameters of genes in 0..1; rounding must not lead beyond the upper bound."""
+    return np.minimum(box.low + genes * (box.high - box.low), box.high)
+
+
+@_compiled
+def has_stalled(best, stall_generations, tolerance):
+    """Whether the best objective's average relative change over the last `stall_generations` = S is <= tolerance.
+
+    best: best objective of the initial population and after each of g generations. With f_k after generation k the
+    test is (1 / S) sum over k = g - S + 1 .. g of |f_k - f_(k-1)| / max(1, |f_g|) <= tolerance, g >= S > 0. Elites
+    survive, so the sum is f_(g-S) - f_g. MATLAB stops (since R2014a) on the "average relative change in the best
+    fitness function value over MaxStallGenerations"; older versions weighted the changes by powers of 1/2.
+    """
+    # ASSUME "relative" is to max(1, |f_g|), as in MATLAB's other relative tolerances: absolute, in mm, below 1 mm.
+    if stall_generations == 0 or best.size - 1 < stall_generations:
+        return False
+    before, now = best[-1 - stall_generations], best[-1]
+    return (before - now) / stall_generations <= tolerance * max(1.0, abs(now))
+
+
+@_compiled
+def advance(objective, legs, points, box, rules, draws, done, populations, scores, best):
+    """Breed and rate len(sigma) generations, fewer where the run stalls; returns their number.
+
+    objective: writes the values (m,) of parameters (m, p), see `rrru.robots.compiled`; box, rules: see `plan`; draws:
+    uniform (k, u), normal (k, v) and sigma (k,) of each generation; done: generations before. populations (k + 1, n, p)
+    and scores (k + 1, n) start with the last generation, best (all generations + 1,) is written behind `done`.
+    """
+    uniform, normal, sigma = draws
+    for k in range(len(sigma)):
+        population, score, generation = populations[k], scores[k], done + k
+        if generation > 0 and generation % rules.migration_interval == 0:
+            population, score = migrate(population, score, rules.plan, rules.migrants)
+        children, known = next_population(population, score, rules.plan, uniform[k], normal[k], sigma[k])
+        if rules.looks_up:
+            look_up(children, known, population, score)
+        unknown = np.flatnonzero(np.isnan(known))
+        values = np.empty(len(unknown))
+        objective(decoded(children[unknown], box), legs, points, values)
+        known[unknown] = values
+        populations[k + 1], scores[k + 1], best[generation + 1] = children, known, known.min()
+        if has_stalled(best[: generation + 2], rules.stall_generations, rules.stall_tolerance):
+            return k + 1
+    return len(sigma)

@@ -1,5 +1,6 @@
 """What every mechanism offers to calibration and plant, and the mechanisms by name. Lengths in mm, angles in rad."""
 
+from collections.abc import Callable
 from dataclasses import fields
 from typing import Protocol
 
@@ -37,6 +38,9 @@ class Mechanism(Protocol):
 
     def forward_batch(self, actuators: Array, deviations: Array, guess_mm: Array | None = None) -> Array:
         """Positions (m, n, 3) for n actuator triples under m vectors of deviations (m, p)."""
+
+    def mean_distance(self, actuators: Array, nominal_mm: Array, measured_mm: Array) -> Callable:
+        """Mean distances (m,) to measured positions (n, 3) of deviations (m, p); a CompiledObjective if it has one."""
 
     def actuator_jacobian(self, position_mm: Array, actuators: Array, deviations: Array | None = None) -> Array:
         """Derivative (n, 3, k) of the position by the actuator values."""

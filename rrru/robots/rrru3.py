@@ -18,6 +18,8 @@ import numpy as np
 
 from rrru.parameters import LEGS
 from rrru.robots import rrru3_kernels as kernels
+from rrru.robots import rrru3_objective
+from rrru.robots.compiled import CompiledObjective
 from rrru.robots.three_legs import Deviation, ThreeLegs, of_each_leg, points
 
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
@@ -148,6 +150,11 @@ class Rrru3(ThreeLegs):
             np.ascontiguousarray(start.T),
         )
         return solved.transpose(0, 2, 1)
+
+    def mean_distance(self, theta_rad, nominal_mm, measured_mm):
+        """CompiledObjective: mean distance from measured positions (n, 3) in mm, near the nominal ones (n, 3)."""
+        arrays = rrru3_objective.arrays(self, points(theta_rad), nominal_mm, measured_mm)
+        return CompiledObjective(rrru3_objective.kernel(), *arrays)
 
     def closure(self, position_mm, theta_rad, deviations=None):
         """Left sides (n, 3) of eq. (8) in mm^2, zero where position and drive angles fit."""

@@ -141,39 +141,6 @@ def forward(legs, turn, cosine, sine, start):
 
 
 @_compiled
-def mean_distance(deviations, legs, turn, cosine, sine, start, slope, measured):
-    """Mean distance between model and measured positions (eq. 11) for m error vectors.
-
-    errors: (m, p); legs: (m, 3, 5), the same errors applied to the legs; start: (3, n) positions without errors; slope:
-    (p, 3, n) derivative of the position with respect to each error, used for the first guess; measured: (3, n). Returns
-    (m,), inf where a point left the reach.
-    """
-    m, n = legs.shape[0], start.shape[1]
-    position = np.empty((3, n))
-    work = np.empty(n)
-    result = np.empty(m)
-    for k in range(m):
-        for axis in range(3):
-            for j in range(n):
-                position[axis, j] = start[axis, j]
-            for q in range(slope.shape[0]):
-                error = deviations[k, q]
-                for j in range(n):
-                    position[axis, j] += error * slope[q, axis, j]
-        _solve(legs[k], turn, cosine, sine, position, work)
-        for j in range(n):
-            dx = position[0, j] - measured[0, j]
-            dy = position[1, j] - measured[1, j]
-            dz = position[2, j] - measured[2, j]
-            work[j] = np.sqrt(dx * dx + dy * dy + dz * dz)
-        total = 0.0
-        for j in range(n):
-            total += work[j]
-        result[k] = total / n if np.isfinite(total) else np.inf
-    return result
-
-
-@_compiled
 def tripod_mean_distance(ends, radii, measured):
     """Mean distance (m,) in mm between measured points (n, 3) and the lower intersections of three spheres; inf where
     there are none.

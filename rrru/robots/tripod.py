@@ -10,6 +10,7 @@ z points up and the platform hangs below. Lengths in mm, angles in rad.
 
 import numpy as np
 
+from rrru.robots.rrru3_kernels import tripod_mean_distance
 from rrru.robots.spheres import lower_intersection
 from rrru.robots.three_legs import ThreeLegs, points
 
@@ -61,6 +62,17 @@ class Tripod(ThreeLegs):
         if self.ARM is not None:
             legs[..., self.ARM] += change_mm[..., 1]
         return legs
+
+    def mean_distance(self, actuators, _nominal_mm, measured_mm):
+        """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
+        measured_mm = np.ascontiguousarray(measured_mm, dtype=float)
+
+        def evaluate(deviations):
+            legs = self.legs(deviations)
+            ends = np.ascontiguousarray(self.ends(points(actuators), legs[:, None]))
+            return tripod_mean_distance(ends, np.ascontiguousarray(legs[..., self.LINK]), measured_mm)
+
+        return evaluate
 
     def closure(self, position_mm, actuators, deviations=None):
         """Left sides (n, 3) of the closures in mm^2, zero where position and actuator values fit."""

@@ -8,9 +8,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from rrru.errors import ConfigError, FitError
+from rrru.fit.residuals import Residuals
 from rrru.genetic import algorithm as genetic
-from rrru.genetic.algorithm import GeneticSettings, has_stalled, minimise
-from rrru.robots import rrru3_kernels as kernels
+from rrru.genetic.algorithm import BLOCK, minimise
+from rrru.genetic.operators import has_stalled
+from rrru.genetic.settings import GeneticSettings
 from rrru.robots.rrru3 import Rrru3
 from tests.places import ROOT
 
@@ -39,15 +41,13 @@ class Lines:
         self.truth = self.robot.parameters.vector(TABLE_5_RAD | TABLE_5_MM)
         noise = np.random.default_rng(5).normal(0.0, 0.3, self.commanded.shape)
         self.measured = self.robot.forward(self.theta, self.truth, self.commanded) + noise
-        slope = self.robot.parameter_jacobian(self.commanded, self.theta).transpose(2, 1, 0)
-        arrays = np.cos(self.theta).T, np.sin(self.theta).T, self.commanded.T, slope, self.measured.T
-        self._arrays = tuple(np.ascontiguousarray(array) for array in arrays)
+        self.compiled = Residuals(self.robot, self.theta, self.measured, self.commanded).mean_distance
         self.seen = []
 
     def __call__(self, deviations):
         """Objective (m,) in mm of errors (m, 8)."""
         self.seen.append(deviations.copy())
-        return kernels.mean_distance(deviations, self.robot.legs(deviations), self.robot.azimuth_cos_sin, *self._arrays)
+        return self.compiled(deviations)
 
     def best_possible(self):
         """Objective at the least-squares solution, which is within noise of the mean distance's own minimum."""
@@ -251,17 +251,35 @@ def test_the_first_population_is_spread_over_the_whole_box(lines):
 
 
 def test_the_stall_test_is_the_documented_mean_of_relative_changes():
-    history = [9.0, 4.0, 3.5, 3.0, 3.0]
+    history = np.array([9.0, 4.0, 3.5, 3.0, 3.0])
     for tolerance, expected in ((0.25 / 3.0 - 1e-9, False), (0.25 / 3.0 + 1e-9, True)):
         # the last two changes are 0.5 and 0 at a value of 3: their relative mean is 0.25 / 3
         assert has_stalled(history[:-1], 2, 0.5 / 3.0 + 1e-9)
         assert has_stalled(history, 2, tolerance) is expected
     # below one the change counts as it is
-    assert has_stalled([0.5, 0.4, 0.3], 2, 0.1 + 1e-9)
-    assert not has_stalled([0.5, 0.4, 0.3], 2, 0.1 - 1e-9)
-    assert not has_stalled([1.0, 1.0], 2, 1.0)
-    assert not has_stalled([1.0] * 500, 0, 1.0)
-    assert not has_stalled([np.inf] * 500, 50, 1e-6)
+    assert has_stalled(np.array([0.5, 0.4, 0.3]), 2, 0.1 + 1e-9)
+    assert not has_stalled(np.array([0.5, 0.4, 0.3]), 2, 0.1 - 1e-9)
+    assert not has_stalled(np.ones(2), 2, 1.0)
+    assert not has_stalled(np.ones(500), 0, 1.0)
+    assert not has_stalled(np.full(500, np.inf), 50, 1e-6)
+
+
+@pytest.mark.parametrize("stall_generations", [1, BLOCK - 1, BLOCK, BLOCK + 1])
+def test_a_run_may_stall_anywhere_in_a_block(lines, stall_generations):
+    for objective in (lambda deviations: np.full(len(deviations), 0.5), lines.compiled):
+        settings = GeneticSettings(1.0, stall_generations=stall_generations, generations=4 * BLOCK, stall_tolerance=1.0)
+        result = minimise(objective, lines.low, lines.high, settings, 1)
+        assert (result.stopped, result.generations) == ("stalled", stall_generations)
+        assert len(result.best_history) == len(result.mean_history) == stall_generations + 1
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"populations": ISLANDS}, {"crossover_fraction": 1.0, "stall_generations": 0}]
+)
+def test_a_compiled_objective_gives_the_bytes_of_a_python_callable(lines, settings):
+    settings = GeneticSettings(**{"generations": 2 * BLOCK + 30} | settings)
+    found = [minimise(objective, lines.low, lines.high, settings, 3) for objective in (lines, lines.compiled)]
+    assert same_bytes(*found)
 
 
 def test_a_stalled_run_stops_where_the_rule_says_first(lines):

@@ -6,7 +6,7 @@ import itertools
 import numpy as np
 import pytest
 
-from rrru.genetic import operators
+from rrru.genetic import operators, plan
 from tests.places import ROOT
 
 _SPEC = importlib.util.spec_from_file_location("matlab_ga", ROOT / "tests" / "reference" / "matlab_ga.py")
@@ -32,18 +32,18 @@ SCORES = {
 
 def test_counts_are_those_that_matlab_makes_of_thirty():
     # Toolbox documentation: elites ceil(0.05 size), crossover children round(fraction (size - elites))
-    assert operators.elite_count(30, 0.05) == 2
-    crossed = [operators.child_counts(30, 2, tenths / 10)[0] for tenths in range(1, 11)]
+    assert plan.elite_count(30, 0.05) == 2
+    crossed = [plan.child_counts(30, 2, tenths / 10)[0] for tenths in range(1, 11)]
     assert crossed == [3, 6, 8, 11, 14, 17, 20, 22, 25, 28]
-    assert operators.child_counts(30, 2, 1.0) == (28, 0)
+    assert plan.child_counts(30, 2, 1.0) == (28, 0)
 
 
 @pytest.mark.parametrize("size", [2, 7, 10, 20, 30, 60, 140, 1001])
 def test_counts_have_no_float_noise(size):
     for hundredths in range(101):
         elites, crossed, mutated = matlab_ga.counts(size, hundredths / 100)
-        assert operators.elite_count(size, 0.05) == elites
-        assert operators.child_counts(size, elites, hundredths / 100) == (crossed, mutated)
+        assert plan.elite_count(size, 0.05) == elites
+        assert plan.child_counts(size, elites, hundredths / 100) == (crossed, mutated)
 
 
 @pytest.mark.parametrize("scores", SCORES.values(), ids=SCORES)
@@ -161,9 +161,9 @@ def test_reflection_keeps_an_even_spread_even_where_clipping_would_pile_up():
 
 
 def test_mutation_shrinks_to_nothing_in_the_last_generation():
-    assert operators.mutation_sigma(1400, 1400, 1.0, 1.0) == 0.0
-    assert operators.mutation_sigma(700, 1400, 0.8, 0.5) == pytest.approx(0.6)
-    assert operators.mutation_sigma(1400, 1400, 0.3, 0.0) == 0.3
+    assert plan.mutation_sigma(1400, 1400, 1.0, 1.0) == 0.0
+    assert plan.mutation_sigma(700, 1400, 0.8, 0.5) == pytest.approx(0.6)
+    assert plan.mutation_sigma(1400, 1400, 0.3, 0.0) == 0.3
 
 
 @pytest.mark.parametrize("crossover_fraction", [0.0, 0.5, 0.8, 1.0])
@@ -173,17 +173,17 @@ def test_a_generation_equals_the_loop(crossover_fraction, sizes):
     population, score = random.uniform(size=(sum(sizes), 8)), random.uniform(0.5, 9.0, sum(sizes))
     score[::5] = np.inf
     ends = np.cumsum(sizes)
-    plan = np.array(
+    rows = np.array(
         [
             (end - size, end, *matlab_ga.counts(size, crossover_fraction)[:2])
             for size, end in zip(sizes, ends, strict=True)
         ]
     )
-    uniforms, normals = (int(number) for number in operators.draws_needed(plan, 8))
+    uniforms, normals = (int(number) for number in operators.draws_needed(rows, 8))
     uniform, normal = random.uniform(size=uniforms), random.normal(size=normals)
-    after, known = operators.next_population(population, score, plan, uniform, normal, 0.7)
+    after, known = operators.next_population(population, score, rows, uniform, normal, 0.7)
     one_by_one, steps = iter(uniform.tolist()), iter(normal.tolist())
-    for start, stop, _, _ in plan:
+    for start, stop, _, _ in rows:
         people, scores = matlab_ga.generation(
             population[start:stop].tolist(),
             score[start:stop].tolist(),

@@ -8,7 +8,8 @@ import pytest
 
 from rrru.errors import ConfigError
 from rrru.genetic import sweep
-from rrru.genetic.algorithm import GeneticSettings, minimise
+from rrru.genetic.algorithm import minimise
+from rrru.genetic.settings import GeneticSettings
 from rrru.seeds import run_seed
 
 LOW, HIGH, NAMES = [-1.0, -2.0], [1.0, 2.0], ("a_mm", "b_rad")

@@ -5,6 +5,7 @@ from tqdm import tqdm
 
 from rrru.genetic import campaign_runs
 from rrru.genetic.schemas import TABLES
+from rrru.genetic.settings import GeneticSettings
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
@@ -23,7 +24,7 @@ def main(settings, inputs, outputs):
             identifiable,
             label,
             patterns,
-            campaign_runs.settings_from_config(settings["genetic"]),
+            GeneticSettings.from_config(settings["genetic"]),
             settings["genetic"]["seeds"],
             settings["seed"],
             (name,),

@@ -5,8 +5,8 @@ from tqdm import tqdm
 
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
-from rrru.genetic.campaign_runs import settings_from_config
 from rrru.genetic.schemas import TABLES
+from rrru.genetic.settings import GeneticSettings
 from rrru.genetic.sweep import run_sweep
 from rrru.store import tables
 from rrru.store.job import run
@@ -21,7 +21,7 @@ def main(settings, inputs, outputs):
     residuals = select(measurements, mechanism, patterns, settings["calibration"]["use_near_singularity"])
     if residuals is None:
         raise ConfigError(f"sweep: too few points on the trajectories {', '.join(patterns)}")
-    genetic = settings_from_config(settings["genetic"], populations=section["populations"][population])
+    genetic = GeneticSettings.from_config(settings["genetic"], populations=section["populations"][population])
     swept = [
         run_sweep(
             residuals.mean_distance,

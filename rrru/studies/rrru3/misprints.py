@@ -9,7 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.fit.residuals import Residuals
-from rrru.genetic.algorithm import GeneticSettings, minimise
+from rrru.genetic.algorithm import minimise
+from rrru.genetic.settings import GeneticSettings
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.robots.rrru3 import Rrru3

@@ -9,7 +9,7 @@ import yaml
 from snakemake.utils import validate
 
 from rrru.errors import ConfigError
-from rrru.genetic.algorithm import GeneticSettings
+from rrru.genetic.settings import GeneticSettings
 from rrru.plant.virtual_tripod import VirtualTripod
 from rrru.studies.methods import compare, learners, parts, regions
 from tests.places import ROOT
