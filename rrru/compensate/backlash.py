@@ -1,6 +1,4 @@
-"""Backlash of screws: measured, compensated, and what that does to the repeatability (paper B, 3.1.1). Lengths in
-mm.
-"""
+"""Backlash of screws: measured and compensated, and the repeatability (paper B, 3.1.1). Lengths in mm."""
 
 from dataclasses import dataclass
 
@@ -9,9 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Width:
-    """A screw's backlash: the mean, the two differences of directions that it is the mean of, and its standard error,
-    all in mm.
-    """
+    """A screw's backlash: the mean of two differences of directions, these, and its standard error."""
 
     mean_mm: float
     first_mm: float
@@ -27,9 +23,8 @@ def measured_width(record, lead_mm):
     mean(y_reverse - y_forward_2) over the places of the passes, e = (e_1 + e_2) / 2. Places within one turn of a
     turning point are left out: the play is being taken up there.
     """
-    places = record.pivot_table(
-        index=record["commanded_mm"].round(6), columns="pass", values="encoder_mm", aggfunc="first"
-    ).dropna()
+    place = record["commanded_mm"].round(6)
+    places = record.pivot_table(index=place, columns="pass", values="encoder_mm", aggfunc="first").dropna()
     at = places.index.to_numpy()
     inner = places[(at > at.min() + lead_mm) & (at < at.max() - lead_mm)]
     differences = [(inner["reverse"] - inner[name]).to_numpy() for name in ("forward_1", "forward_2")]
@@ -39,8 +34,7 @@ def measured_width(record, lead_mm):
 
 
 def compensated(values_mm, widths_mm):
-    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: half the play ahead, jumping by all of it
-    at a reversal.
+    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: half the play ahead, all at a reversal.
 
     A slider that stands keeps the side it came from; before its first move, the side of that move.
     """
@@ -56,8 +50,7 @@ def compensated(values_mm, widths_mm):
 
 
 def repeatability(values_mm):
-    """Scatter (3,) in mm of slider positions (k repeats, n places, 3) about each place's mean, 1 sigma, and the travel
-    K (3,) they cover.
+    """Scatter (3,), 1 sigma, of slider positions (k repeats, n places, 3) about each place's mean, and travel (3,).
 
     # ASSUME eq. (20) and Fig. 8 are lost: sigma is the standard deviation over the repeats pooled over the places, K
     the stretch between the slider's outermost places; the paper's measure is their ratio.

@@ -5,17 +5,14 @@ forth: all of these are the robot's. A broken beam gives one to three points tha
 """
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
 _LONGEST = 3
 _WINDOW = 2 * _LONGEST + 1
-# Median length of a vector of three independent normal numbers of unit variance: from the median of lengths to one
-# sigma per axis.
+# from the median length of a vector of three independent normal numbers to one sigma per axis
 _MEDIAN_OF_CHI3 = 1.5382
 # ASSUME the robot's own single spikes stay below threshold x 0.1 mm; below threshold x 0.5 and x 0.75 mm where a loose
-# joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends (at the default
-# threshold 0.6, 3 and 4.5 mm).
+# joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends.
 _SPIKE_MM, _FLIP_MM, _END_MM = 0.1, 0.5, 0.75
 # ASSUME at most one block of bad points among ten points: a run that jumps more often has a loose joint, and twice its
 # usual jump is allowed, up to threshold x 1.5 mm: no joint is looser.
@@ -50,8 +47,7 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
 
 
 def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
-    """Which marked points (n,) another run came back to: a broken beam does not repeat itself, a spike near a
-    singularity does.
+    """Which marked points (n,) another run came back to: the robot repeats a spike near a singularity, a beam does not.
 
     Compares deviations (n, 3) in mm at the same commanded position (n, 3) in another run (n,); they repeat within
     `tolerance_mm`.
@@ -69,16 +65,17 @@ def _bad_points(place, deviation, noise_mm, threshold):
 
     A good point beside bad ones can be taken with them: each is put back once to see whether it fits the good ones.
     """
+
+    def worst(rows):
+        return _worst_block(place[rows], deviation[rows], noise_mm, threshold) if len(rows) >= _WINDOW else None
+
     kept, bad = np.arange(len(deviation)), []
-    while (
-        len(kept) >= _WINDOW and (block := _worst_block(place[kept], deviation[kept], noise_mm, threshold)) is not None
-    ):
+    while (block := worst(kept)) is not None:
         bad.extend(kept[block])
         kept = np.delete(kept, block)
     for one in sorted(bad) if len(kept) >= _WINDOW else ():
         again = np.sort(np.append(kept, one))
-        if _worst_block(place[again], deviation[again], noise_mm, threshold) is None:
-            kept = again
+        kept = again if worst(again) is None else kept
     return np.setdiff1d(np.arange(len(deviation)), kept)
 
 
@@ -87,24 +84,20 @@ def _worst_block(place, deviation, noise_mm, threshold):
     jump = np.linalg.norm(np.diff(deviation, axis=0), axis=1)
     usual = np.sort(jump)[::-1][min(2 * max(1, round(_BAD_SHARE * len(place))), len(jump) - 1)]
     loose = min(_JUMP_FACTOR * usual, threshold * max(_LOOSEST_MM, noise_mm))
-    inner, end = (
-        max(
-            ((off, block) for off, limit, block in found if off > max(limit, loose)),
-            key=lambda one: one[0],
-            default=(0.0, None),
-        )
-        for found in (
-            _inner_blocks(place, deviation, noise_mm, threshold),
-            _end_blocks(place, deviation, jump, noise_mm, threshold),
-        )
-    )
+
+    def farthest(blocks):
+        beyond = [(off, block) for off, limit, block in blocks if off > max(limit, loose)]
+        return max(beyond, key=lambda one: one[0], default=(0.0, None))
+
+    inner = farthest(_inner_blocks(place, deviation, noise_mm, threshold))
+    end = farthest(_end_blocks(place, deviation, jump, noise_mm, threshold))
     return end[1] if end[0] > _END_PREFERENCE * inner[0] else inner[1]
 
 
 def _inner_blocks(place, deviation, noise_mm, threshold):
-    """Per length of block: the worst block's least distance from its neighbours' curve, the limit for it, its
-    indices.
-    """
+    """Per length of block: the worst block's least distance from its neighbours' curve, its limit, its indices."""
+    from scipy.ndimage import median_filter
+
     off_median = np.linalg.norm(deviation - median_filter(deviation, size=(_WINDOW, 1), mode="nearest"), axis=1)
     for length in range(1, _LONGEST + 1):
         floor = max(noise_mm, _SPIKE_MM if length == 1 else _FLIP_MM)
@@ -117,9 +110,7 @@ def _inner_blocks(place, deviation, noise_mm, threshold):
 
 
 def _off_curve(place, deviation, blocks, nodes):
-    """Distances (m, length) of blocks (m, length) from the polynomials through nodes (k, m); nodes beyond the run's
-    ends are left out.
-    """
+    """Distances (m, length) of blocks (m, length) from the polynomials through nodes (k, m) within the run."""
     there = (nodes >= 0) & (nodes < len(place))
     nodes = np.clip(nodes, 0, len(place) - 1)
     predicted = np.zeros((*blocks.shape, 3))
@@ -134,8 +125,7 @@ def _off_curve(place, deviation, blocks, nodes):
 
 
 def _end_blocks(place, deviation, jump, noise_mm, threshold):
-    """Per end and length of block: the block's least distance from what the next points foretell, the limit for it, its
-    indices.
+    """Per end and length: the block's least distance from what the next points foretell, its limit, its indices.
 
     Foretold are the next point, the line through two and the parabola through three. Errors grow fast towards a
     singularity, where runs often end: twice the growth between the next two points is allowed.
