@@ -16,6 +16,7 @@ lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow/rules
+	$(BIN)/mypy
 	-$(BIN)/snakemake --lint # asks for conda environments; the environment is .venv, see README
 
 .venv/ready: requirements.lock pyproject.toml

@@ -1,5 +1,7 @@
 """Errors that a user can meet; each says what, where, the value and what is allowed."""
 
+from collections.abc import Iterable
+
 
 class RrruError(Exception):
     """Base of every error that rrru raises on purpose."""
@@ -16,7 +18,7 @@ class IngestError(RrruError):
     data row, counted from 1 below the header, or None where the whole file or column is meant.
     """
 
-    def __init__(self, problems):
+    def __init__(self, problems: Iterable[dict]) -> None:
         self.problems = tuple(problems)
         super().__init__("\n".join(_problem_text(p) for p in self.problems))
 
@@ -28,7 +30,7 @@ class UnreachableError(RrruError):
 class FitError(RrruError):
     """A fit failed; `result` carries what it had reached."""
 
-    def __init__(self, message, result=None):
+    def __init__(self, message: str, result: object = None) -> None:
         super().__init__(message)
         self.result = result
 
@@ -37,7 +39,7 @@ class TableError(RrruError):
     """A result table does not fit its schema."""
 
 
-def _problem_text(problem):
+def _problem_text(problem: dict) -> str:
     """One line: file, row, column, value, allowed."""
     where = [str(problem["file"])]
     if problem.get("row") is not None:

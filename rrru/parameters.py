@@ -1,8 +1,10 @@
 """Named parameters and the map between names and vectors."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import ConfigError
 
@@ -21,7 +23,7 @@ class Parameter:
     source: str = ""
     leg: int = 0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high:
             bounds = f"[{self.low}, {self.high}]"
             raise ConfigError(
@@ -35,79 +37,79 @@ class ParameterSet:
 
     parameters: tuple[Parameter, ...]
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if len(set(self.names)) != len(self.names):
             raise ConfigError(f"parameter names are not unique: {self.names}")
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.parameters)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Parameter]:
         return iter(self.parameters)
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> Parameter:
         return self.parameters[self.index(name)]
 
     @property
-    def names(self):
+    def names(self) -> tuple[str, ...]:
         """Names in the order of the vector."""
         return tuple(p.name for p in self.parameters)
 
     @property
-    def units(self):
+    def units(self) -> tuple[str, ...]:
         """Units in the order of the vector."""
         return tuple(p.unit for p in self.parameters)
 
     @property
-    def legs(self):
+    def legs(self) -> np.ndarray:
         """Legs (p,) that the parameters belong to: 1 to 3, 0 for all."""
         return np.array([p.leg for p in self.parameters])
 
     @property
-    def nominal(self):
+    def nominal(self) -> np.ndarray:
         """Nominal values, shape (p,)."""
         return np.array([p.nominal for p in self.parameters], dtype=float)
 
     @property
-    def low(self):
+    def low(self) -> np.ndarray:
         """Lower bounds, shape (p,)."""
         return np.array([p.low for p in self.parameters], dtype=float)
 
     @property
-    def high(self):
+    def high(self) -> np.ndarray:
         """Upper bounds, shape (p,)."""
         return np.array([p.high for p in self.parameters], dtype=float)
 
-    def index(self, name):
+    def index(self, name: str) -> int:
         """Position of a name in the vector; raises ConfigError for an unknown name."""
         if name not in self.names:
             raise ConfigError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
         return self.names.index(name)
 
-    def vector(self, values=None):
+    def vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
         """Vector, shape (p,), from a mapping of names to values; absent names are nominal."""
         result = self.nominal
         for name, value in dict(values or {}).items():
             result[self.index(name)] = value
         return result
 
-    def mapping(self, vector):
+    def mapping(self, vector: npt.ArrayLike) -> dict[str, float]:
         """Dict of names to values from a vector of shape (p,)."""
         vector = np.asarray(vector, dtype=float)
         if vector.shape != (len(self),):
             raise ConfigError(f"expected {len(self)} values for {', '.join(self.names)}, got shape {vector.shape}")
         return dict(zip(self.names, vector.tolist(), strict=True))
 
-    def hold(self, vector):
+    def hold(self, vector: np.ndarray) -> bool:
         """Whether a vector (p,) lies within the bounds."""
         return bool(((vector >= self.low) & (vector <= self.high)).all())
 
-    def inside(self, vector, margin=1e-6):
+    def inside(self, vector: np.ndarray, margin: float = 1e-6) -> np.ndarray:
         """Nearest vector (p,) within the bounds, off them by a share `margin` of their width."""
         inset = margin * (self.high - self.low)
         return np.clip(vector, self.low + inset, self.high - inset)
 
-    def at_bound(self, vector, share=1e-6):
+    def at_bound(self, vector: np.ndarray, share: float = 1e-6) -> np.ndarray:
         """Flags (p,) of entries that lie at a bound, or beyond it, within a share of the bounds' width."""
         inset = share * (self.high - self.low)
         return (vector <= self.low + inset) | (vector >= self.high - inset)

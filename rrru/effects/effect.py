@@ -1,8 +1,10 @@
 """What an effect is: a physical law that knows the motion and says what it changes, and where. mm, rad, N, s."""
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.parameters import LEGS, Parameter, ParameterSet
 
@@ -37,7 +39,7 @@ class Motion:
     drive_load: np.ndarray
     lengths_mm: np.ndarray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.drive)
 
 
@@ -57,7 +59,7 @@ class Contribution:
     displacement: np.ndarray | float = 0.0
     frame: np.ndarray | float = 0.0
 
-    def __add__(self, other):
+    def __add__(self, other: "Contribution") -> "Contribution":
         return Contribution(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
 
 
@@ -74,15 +76,15 @@ class Coordinates:
     typical: np.ndarray
     legs: np.ndarray
     positive: np.ndarray
-    to_values: object
-    shapes: tuple = ({},)
+    to_values: Callable[[np.ndarray, Mapping[str, float]], np.ndarray]
+    shapes: tuple[Mapping[str, float], ...] = ({},)
     most: np.ndarray | float = np.inf
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.typical)
 
 
-def base_displacement(shift_mm, turn_rad):
+def base_displacement(shift_mm: np.ndarray, turn_rad: np.ndarray) -> np.ndarray:
     """Contribution.displacement (3 legs, 6 places, 6) of shifts and rotation vectors (3, 3) of the feet, leg frame."""
     result = np.zeros((3, len(PLACES), 6))
     result[:, PLACES.index("base"), :3] = shift_mm
@@ -90,21 +92,23 @@ def base_displacement(shift_mm, turn_rad):
     return result
 
 
-def leg_parameters(source, *kinds):
+def leg_parameters(source: str, *kinds: tuple[str, str, float, float]) -> tuple[Parameter, ...]:
     """Parameters of every leg, those of leg 1 first; kinds: (name, unit, low, high), the leg's number is added."""
     return tuple(
         Parameter(f"{name}{leg}", unit, 0.0, low, high, source, leg) for leg in LEGS for name, unit, low, high in kinds
     )
 
 
-def plain_coordinates(parameters, typical, shapes=({},)):
+def plain_coordinates(
+    parameters: ParameterSet, typical: npt.ArrayLike, shapes: tuple[Mapping[str, float], ...] = ({},)
+) -> Coordinates:
     """Coordinates that are the parameters themselves, but for those that the shapes fix; a low of zero makes positive.
 
     typical: one size for all coordinates or one each.
     """
     free = [p for p in parameters if p.name not in shapes[0]]
 
-    def to_values(coordinates, shape):
+    def to_values(coordinates: np.ndarray, shape: Mapping[str, float]) -> np.ndarray:
         return parameters.vector(dict(shape) | {p.name: value for p, value in zip(free, coordinates, strict=True)})
 
     return Coordinates(
@@ -128,11 +132,11 @@ class Effect:
     name: str
     parameters: ParameterSet
     coordinates: Coordinates
-    law: object
-    needs: tuple = ()
-    drives: tuple = ("rad", "mm")
+    law: Callable[[Motion, np.ndarray], Contribution]
+    needs: tuple[str, ...] = ()
+    drives: tuple[str, ...] = ("rad", "mm")
 
-    def contribute(self, motion, values):
+    def contribute(self, motion: Motion, values: npt.ArrayLike) -> Contribution:
         """Changes at the points of a motion under parameter values (p,)."""
         return self.law(motion, np.asarray(values, dtype=float))
 
@@ -144,11 +148,11 @@ class ActiveEffect:
     effect: Effect
     values: dict = field(default_factory=dict)
 
-    def contribute(self, motion):
+    def contribute(self, motion: Motion) -> Contribution:
         """Changes at the points of a motion."""
         return self.effect.contribute(motion, self.effect.parameters.vector(self.values))
 
 
-def together(effects, motion):
+def together(effects: Iterable[ActiveEffect], motion: Motion) -> Contribution:
     """Contribution of active effects together at the points of a motion."""
     return sum((effect.contribute(motion) for effect in effects), Contribution())

@@ -1,8 +1,8 @@
 """What every mechanism offers to calibration and plant, and the mechanisms by name. Lengths in mm, angles in rad."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Mechanism(Protocol):
 MECHANISMS = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
 
 
-def identifiable_truth(mechanism, values):
+def identifiable_truth(mechanism: Any, values: Mapping[str, float]) -> dict[str, float]:
     """Mapping of the mechanism's parameters, no two of which act alike, from values of any of its DEVIATIONS.
 
     Absent ones are zero; NaN for a number that stands for all legs where theirs differ.
@@ -71,7 +71,7 @@ def identifiable_truth(mechanism, values):
     return result
 
 
-def make_mechanism(name, section, **options):
+def make_mechanism(name: str, section: Mapping[str, float], **options: Any) -> Mechanism:
     """The mechanism of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key.
 
     Angles of the entry are in degrees, with keys that end in _deg.

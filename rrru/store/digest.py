@@ -1,4 +1,4 @@
-"""What a workflow script depends on: the import closure of its code, computed, so that an edit reruns what it changes."""
+"""What a workflow script depends on: the import closure of its code, so that an edit reruns what it changes."""
 
 import hashlib
 import re
@@ -11,13 +11,14 @@ _FROM = re.compile(r"^[ \t]*from[ \t]+(rrru[\w.]*)[ \t]+import[ \t]+(\([^)]*\)|[
 _IMPORT = re.compile(r"^[ \t]*import[ \t]+(rrru[\w.]*)", re.MULTILINE)
 
 
-def closure(*modules):
+def closure(*modules: str) -> list[Path]:
     """Files that the given ones import, by themselves or through others, themselves included, sorted.
 
     modules: paths of Python files below the project's root, or dotted names such as "rrru.figures.gap". Packages other
     than this one do not count: they are the lock's.
     """
-    waiting, found = [_start(module) for module in modules], set()
+    waiting = [_start(module) for module in modules]
+    found: set[Path] = set()
     while waiting:
         file = waiting.pop()
         if file not in found:
@@ -27,7 +28,7 @@ def closure(*modules):
 
 
 @cache
-def code_digest(*modules):
+def code_digest(*modules: str) -> str:
     """Digest (16 hex digits) of all files of the `closure` of modules."""
     digest = hashlib.sha256()
     for file in closure(*modules):
@@ -36,13 +37,16 @@ def code_digest(*modules):
     return digest.hexdigest()[:16]
 
 
-def _start(module):
+def _start(module: str) -> Path:
     """The file that a path or a dotted name stands for."""
-    return ROOT / module if module.endswith(".py") else _file(module)
+    file = ROOT / module if module.endswith(".py") else _file(module)
+    if file is None:
+        raise ModuleNotFoundError(f"{module} is no module of this project")
+    return file
 
 
 @cache
-def _imported(file):
+def _imported(file: Path) -> tuple[Path, ...]:
     """Files of the package that a file imports, the `__init__.py` of every folder on the way included."""
     text = file.read_text()
     names = set(_IMPORT.findall(text))
@@ -55,7 +59,7 @@ def _imported(file):
 
 
 @cache
-def _file(name):
+def _file(name: str) -> Path | None:
     """The file of a dotted name, None where the name is no module."""
     place = ROOT.joinpath(*name.split("."))
     candidates = (place.with_suffix(".py"), place / "__init__.py")

@@ -2,12 +2,14 @@
 
 import logging
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rrru.errors import RrruError
 
 
-def run(main, snakemake):
+def run(main: Callable[[dict, dict, dict], None], snakemake: Any) -> None:
     """Call main(settings, inputs, outputs) with a job's part of the configuration and its files by name.
 
     It logs to the job's file; an RrruError ends the process with its message instead of a traceback.
@@ -26,7 +28,7 @@ def run(main, snakemake):
         raise
 
 
-def tell(message):
+def tell(message: str) -> None:
     """A remark for the user: into the log and onto the screen."""
     logging.warning(message)
     print(message, file=sys.stderr)

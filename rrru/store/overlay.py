@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 
 
-def write(values, misfit, path):
+def write(values: dict, misfit: float, path: str | Path) -> None:
     """Write nested values as YAML with the misfit in its first line, as a whole or not at all."""
     logging.info("misfit %.4f", misfit)
     partial = Path(f"{path}.partial")

@@ -1,7 +1,9 @@
 """What a schema is made of, and how it is read from rows of text."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 _KINDS = {"int": "int64", "float": "float64", "str": "str", "bool": "bool"}
 # name, kind, description, {allowed values}
@@ -30,15 +32,15 @@ class Table:
     key: tuple[str, ...]
 
     @property
-    def names(self):
+    def names(self) -> list[str]:
         """The columns' names in order."""
         return [column.name for column in self.columns]
 
-    def pandera(self):
+    def pandera(self) -> Any:
         """Pandera schema: exactly these columns, typed, null only where allowed, key unique."""
         import pandera.pandas as pa
 
-        def checked(column):
+        def checked(column: Column) -> Any:
             values = pa.Check.isin(column.allowed) if column.allowed else None
             return pa.Column(column.kind, checks=values, nullable=column.nullable)
 
@@ -46,7 +48,7 @@ class Table:
         return pa.DataFrameSchema(columns, strict=True, coerce=True, unique=list(self.key) or None)
 
 
-def read_tables(text):
+def read_tables(text: str) -> tuple[Table, ...]:
     """Tables out of rows of text, in blocks that blank lines separate.
 
     A block that begins with "## name | path | key" is a table: lines that describe it, "--", then its columns. A column
@@ -54,7 +56,8 @@ def read_tables(text):
     where it may be null; {xyz} in its name makes one for each axis. A block without a heading holds columns that tables
     share: there a line of their names stands for them.
     """
-    shared, tables = {}, []
+    shared: dict[str, tuple[Column, ...]] = {}
+    tables = []
     for block in text.strip().split("\n\n"):
         if not block.startswith("## "):
             shared |= {line.split()[0]: tuple(_columns(line, {})) for line in _lines(block)}
@@ -67,7 +70,7 @@ def read_tables(text):
     return tuple(tables)
 
 
-def _columns(text, shared):
+def _columns(text: str, shared: dict[str, tuple[Column, ...]]) -> Iterator[Column]:
     """Columns of the lines of a block."""
     for line in _lines(text):
         row = _ROW.match(line)
@@ -84,6 +87,6 @@ def _columns(text, shared):
             yield replace(column, name=name.replace("{xyz}", axis), description=f"{description}, {axis}")
 
 
-def _lines(text):
+def _lines(text: str) -> list[str]:
     """Lines of a block, those that are continued in one."""
     return re.sub(r"\n {2,}", " ", text).splitlines()

@@ -1,16 +1,19 @@
 """Result tables on disk: parquet with a schema that is checked on writing; a table is either whole or absent."""
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+import pandas as pd
 import pyarrow as arrow
 import pyarrow.parquet as parquet
 
 from rrru.errors import TableError
+from rrru.store.schema import Table
 
 _ARROW = {"int64": arrow.int64(), "float64": arrow.float64(), "str": arrow.string(), "bool": arrow.bool_()}
 
 
-def check(table, frame):
+def check(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with its columns in the order of a `Table`; raises TableError naming what does not fit."""
     import pandera.errors
 
@@ -22,7 +25,7 @@ def check(table, frame):
     return checked[table.names].reset_index(drop=True)
 
 
-def write(table, frame, path):
+def write(table: Table, frame: pd.DataFrame, path: str | Path) -> None:
     """Write a frame as a `Table`: checked, typed, to a temporary file first and then moved into place."""
     frame = check(table, frame)
     schema = arrow.schema([arrow.field(c.name, _ARROW[c.kind], c.nullable) for c in table.columns])
@@ -30,24 +33,24 @@ def write(table, frame, path):
     _write(data, path)
 
 
-def write_all(tables, frames, paths):
+def write_all(tables: Iterable[Table], frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
     """Write frames by table name, each to paths[name], as the ones of the `tables` with these names."""
     known = {table.name: table for table in tables}
     for name, frame in frames.items():
         write(known[name], frame, paths[name])
 
 
-def read(path):
+def read(path: str | Path) -> pd.DataFrame:
     """The table at a path as a frame."""
     return parquet.read_table(path).to_pandas()
 
 
-def gather(paths, path):
+def gather(paths: Iterable[str | Path], path: str | Path) -> None:
     """Write the tables of one schema at paths as one table, one below the other."""
     _write(arrow.concat_tables([parquet.read_table(part) for part in paths]).combine_chunks(), path)
 
 
-def _write(data, path):
+def _write(data: arrow.Table, path: str | Path) -> None:
     """Write an Arrow table so that the file is there as a whole or not at all."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
