@@ -45,6 +45,11 @@ def natural(name):
     return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", name)]
 
 
+def where(frame, **values):
+    """Rows of a table whose columns have the given values."""
+    return frame[np.logical_and.reduce([frame[name] == value for name, value in values.items()])]
+
+
 def trajectories(paths, pattern, figure):
     """Names of a campaign's trajectories that fit a pattern, in natural order; raises ConfigError where none does."""
     present = sorted(paths["trajectory"].unique(), key=natural)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rrru.campaign.measurements import vectors
 from rrru.figures import style
 
 AXES = "xyz"
@@ -11,14 +12,9 @@ _COLOURS = dict(zip(AXES, (style.BLUE, style.VERMILION, style.GREY), strict=True
 _TEST = {"linestyle": "none", "marker": "o", "markersize": 2.4, "markerfacecolor": "white"}
 
 
-def experiments(frame):
-    """Names of the experiments of a table in order, with the rows of each."""
-    return [(name, rows.sort_values("point")) for name, rows in frame.groupby("experiment", sort=True)]
-
-
-def columns(rows, prefix):
-    """Three columns (n, 3) of a part of `ptt_points`."""
-    return rows[[f"{prefix}_{axis}_mm" for axis in AXES]].to_numpy()
+def experiments(frame, by="point"):
+    """Names of the experiments of a table in order, with the rows of each, sorted."""
+    return [(name, rows.sort_values(by)) for name, rows in frame.groupby("experiment", sort=True)]
 
 
 @style.printed
@@ -30,17 +26,15 @@ def ptt_path(tables, options):
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 88.0)
     panels = figure.subplots(2, len(parts), squeeze=False, sharex="row", sharey="row", height_ratios=(1.0, 0.8))
-    deviations = np.concatenate([columns(rows, "before") for _, rows in parts])
-    span = np.ptp(columns(parts[0][1], "command"), axis=0)
-    factors = [
-        style.magnification(deviations[:, :2], span[0], 0.2),
-        style.magnification(deviations[:, 2], max(span[2], 1.0), 0.2),
-    ]
+    deviations = np.concatenate([vectors(rows, "before") for _, rows in parts])
+    span = np.ptp(vectors(parts[0][1], "command"), axis=0)
+    across = style.magnification(deviations[:, :2], span[0], 0.2)
+    upwards = style.magnification(deviations[:, 2], max(span[2], 1.0), 0.2)
     for column, (name, rows) in enumerate(parts):
-        command = columns(rows, "command")
+        command = vectors(rows, "command")
         above, height = panels[:, column]
         for label, prefix, look in (("before compensation", "before", _BEFORE), ("driven again", "after", _AFTER)):
-            moved = command + columns(rows, prefix) * np.array([factors[0], factors[0], factors[1]])
+            moved = command + vectors(rows, prefix) * np.array([across, across, upwards])
             above.plot(moved[:, 0], moved[:, 1], label=label, **look)
             height.plot(rows["point"], moved[:, 2], **look)
         above.plot(command[:, 0], command[:, 1], label="commanded", color=style.ORANGE, linewidth=2.4, zorder=0)
@@ -48,8 +42,8 @@ def ptt_path(tables, options):
         above.set(aspect="equal", xlabel="x (mm)")
         above.set_title(name, loc="center")
         height.set_xlabel("point")
-    panels[0, 0].set_ylabel(f"y (mm), deviations × {factors[0]:g}")
-    panels[1, 0].set_ylabel(f"z (mm), deviations × {factors[1]:g}")
+    panels[0, 0].set_ylabel(f"y (mm), deviations × {across:g}")
+    panels[1, 0].set_ylabel(f"z (mm), deviations × {upwards:g}")
     style.legend_above(figure, panels[0, :1])
     return figure
 
@@ -89,10 +83,9 @@ def ptt_network(tables, options):
         test = rows[rows["set"] == "test"]
         axes.axhline(0.0, color="#cccccc", linewidth=0.5, zorder=0)
         for axis, colour in _COLOURS.items():
-            axes.plot(rows["point"], 1e3 * rows[f"network_{axis}_mm"], color=colour, linewidth=0.7, label=axis)
-            axes.plot(
-                test["point"], 1e3 * test[f"network_{axis}_mm"], color=colour, label=f"{axis}, test point", **_TEST
-            )
+            left, label = f"network_{axis}_mm", f"{axis}, test point"
+            axes.plot(rows["point"], 1e3 * rows[left], color=colour, linewidth=0.7, label=axis)
+            axes.plot(test["point"], 1e3 * test[left], color=colour, label=label, **_TEST)
         axes.set_title(name)
         axes.set_ylabel("left over (µm)")
         axes.margins(x=0.01)

@@ -5,6 +5,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
 
 from rrru.figures import style
+from rrru.figures.choose import where
 
 _LEVELS = (0.0, 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8, 1.0)
 _SLICES = {"xz": ("x", "z", "y"), "xy": ("x", "y", "z")}
@@ -23,23 +24,20 @@ def ptt_singularity(tables, options):
     panels = figure.subplots(2, 2, sharex=True, sharey="row", height_ratios=(0.55, 1.0))
     marks = iter("abcd")
     for row, (name, (across, up, normal)) in enumerate(_SLICES.items()):
-        part = grid[grid["slice"] == name]
+        part = where(grid, slice=name)
         place = f"{part[f'{normal}_mm'].iloc[0]:g}".replace("-", "\N{MINUS SIGN}")
-        fields = {
-            field: part.pivot(index=f"{up}_mm", columns=f"{across}_mm", values=field)
-            for field in ("translational_measure", "constraint_measure", "kappa_mm2")
-        }
+        fields = part.pivot(index=f"{up}_mm", columns=f"{across}_mm")
         for axes, measure in zip(panels[row], ("translational_measure", "constraint_measure"), strict=True):
             image = _map(axes, fields[measure], fields["kappa_mm2"] if measure == "translational_measure" else None)
-            axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color="white", linewidth=2.0)
-            axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color="black", linewidth=0.9)
+            for colour, width in (("white", 2.0), ("black", 0.9)):
+                axes.plot(curve[f"command_{across}_mm"], curve[f"command_{up}_mm"], color=colour, linewidth=width)
             axes.set(xlabel=f"{across} (mm)", aspect="equal")
             axes.set_title(f"({next(marks)}) {measure.replace('_', ' ')}, {normal} = {place} mm")
         panels[row, 0].set_ylabel(f"{up} (mm)")
-    bar = figure.colorbar(
-        image, ax=list(panels.ravel()), location="bottom", aspect=60, fraction=0.03, spacing="uniform"
+    bar = {"location": "bottom", "aspect": 60, "fraction": 0.03, "spacing": "uniform"}
+    figure.colorbar(image, ax=list(panels.ravel()), **bar).set_label(
+        "singularity measure: 0 at a singularity, 1 at best"
     )
-    bar.set_label("singularity measure: 0 at a singularity, 1 at best")
     handles = [
         Line2D([], [], color="black", linewidth=0.9, label="commanded curve (projected)"),
         Line2D([], [], color=style.VERMILION, linewidth=1.2, label="κ = 0: det J = 0"),
@@ -79,27 +77,14 @@ def ptt_backlash(tables, options):
     figure = style.new(style.DOUBLE_MM, 70.0)
     left, middle, right = figure.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
     encoder, widths = tables["ptt_encoder"], tables["ptt_backlash"]
-    lightest = encoder[encoder["payload_kg"] == encoder["payload_kg"].min()]
     for leg, colour in _LEGS.items():
-        record = lightest[lightest["leg"] == leg].sort_values("sample")
-        left.plot(
-            record["commanded_mm"],
-            record["encoder_mm"] - record["commanded_mm"],
-            color=colour,
-            linewidth=0.6,
-            label=f"screw {leg}",
-        )
-        part = widths[widths["leg"] == leg].sort_values("payload_kg")
+        record = where(encoder, payload_kg=encoder["payload_kg"].min(), leg=leg).sort_values("sample")
+        lag = record["encoder_mm"] - record["commanded_mm"]
+        left.plot(record["commanded_mm"], lag, color=colour, linewidth=0.6, label=f"screw {leg}")
+        part = where(widths, leg=leg).sort_values("payload_kg")
         middle.axhline(part["true_mm"].iloc[0], color=colour, linewidth=0.6, zorder=0)
-        middle.errorbar(
-            part["payload_kg"],
-            part["backlash_mm"],
-            2.0 * part["standard_error_mm"],
-            color=colour,
-            marker=_MARKS[leg],
-            markerfacecolor="white",
-            linestyle="none",
-        )
+        look = {"color": colour, "marker": _MARKS[leg], "markerfacecolor": "white", "linestyle": "none"}
+        middle.errorbar(part["payload_kg"], part["backlash_mm"], 2.0 * part["standard_error_mm"], **look)
     left.set(xlabel="commanded slider position (mm)", ylabel="encoder less command (mm)")
     left.set_title("(a) forwards, back, forwards")
     middle.set(xlabel="payload (kg)", ylabel="backlash (mm)", ylim=(0.0, None))
@@ -112,18 +97,11 @@ def ptt_backlash(tables, options):
 def _repeatability(axes, frame):
     """Scatter per travel of every slider, and what the tracker's noise alone gives."""
     for compensated, colour in ((False, "white"), (True, style.SKY)):
-        part = frame[frame["compensated"] == compensated].sort_values("leg")
+        part = where(frame, compensated=compensated).sort_values("leg")
         place = part["leg"] + (0.19 if compensated else -0.19)
         label = "backlash compensated" if compensated else "not compensated"
         axes.bar(place, part["per_travel_um_per_mm"], 0.36, color=colour, edgecolor="black", linewidth=0.6, label=label)
-        axes.plot(
-            place,
-            part["noise_um_per_mm"],
-            label="tracker's noise",
-            color=style.VERMILION,
-            marker="_",
-            linestyle="none",
-            markersize=9,
-        )
+        noise = {"color": style.VERMILION, "marker": "_", "linestyle": "none", "markersize": 9}
+        axes.plot(place, part["noise_um_per_mm"], label="tracker's noise", **noise)
     axes.set(xlabel="slider", ylabel="scatter per travel (µm/mm)", xticks=(1, 2, 3))
     axes.set_title("(c) repeatability")
