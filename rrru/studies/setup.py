@@ -1,10 +1,9 @@
-"""The only builder: from parts of the configuration to robots and campaigns. `rrru.studies.config` makes these parts."""
+"""The only builder: from parts of the configuration, which `rrru.studies.config` makes, to robots and campaigns."""
 
 from dataclasses import dataclass
 
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
-from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.plant import virtual_robot, virtual_tripod
 from rrru.robots.protocol import MECHANISMS, identifiable_truth, make_mechanism
@@ -80,11 +79,6 @@ def virtual_campaign(nominal, virtual):
     real = real_robot(nominal, virtual["robot"])
     origin = virtual.get("origin", "campaign")
     return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
-
-
-def ingest_campaign(nominal, section):
-    """The ingested file of a campaign's section; raises IngestError where it is refused."""
-    return ingest(IngestSpec.from_config(section), mechanism(nominal))
 
 
 def true_deviations(nominal, virtual):

@@ -16,7 +16,10 @@ def main(settings, inputs, outputs):
         measurements, truth = setup.virtual_campaign(nominal, settings["virtual"]).run()
         notes, registration = (), None
     else:
-        ingested = setup.ingest_campaign(nominal, section)
+        # what reads files is not small, and virtual campaigns do not need it
+        from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+
+        ingested = ingest(IngestSpec.from_config(section), robot)
         measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))
         notes, registration = ingested.notes, ingested.registration
     measurements, singular = campaigns.with_singularities(robot, measurements, settings["singularity_margin"])

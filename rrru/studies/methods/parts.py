@@ -1,26 +1,30 @@
 """What the comparison of methods reads of the configuration. Light to import: the workflow asks for it."""
 
+_SHARED = ("points", "test_points", "outside_factor", "motion", "network")
+
 
 def settings(config, name):
     """All that the comparison on one robot reads of the configuration, as plain mappings.
 
     The robot is the one of the robot's own study: of the reproduced campaign, of paper B, of the vision study.
     """
-    section, bounds = config["methods"], config["calibration"]["bounds"]
+    section = config["methods"]
     campaign = config["campaigns"][config["reproduce"]["campaign"]] if name == "rrru3" else {}
-    dimensions = {**config["robots"].get(name, {}), **campaign.get("dimensions", {})}
     real = {
         "rrru3": lambda: config["virtual_robots"][campaign["virtual"]],
-        "ptt3": lambda: config["ptt"]["robot"] | config["loads"],
-        "delta": lambda: {"errors": config["delta"]["errors"], "effects": section["delta_effects"]} | config["loads"],
-    }[name]()
-    shared = ("points", "test_points", "outside_factor", "motion", "network")
+        "ptt3": lambda: config["ptt"]["robot"],
+        "delta": lambda: {"errors": config["delta"]["errors"], "effects": section["delta_effects"]},
+    }[name]
     return {
         "robot": name,
         "seed": config["seed"],
-        "nominal": {"name": name, "dimensions": dimensions, "bounds": bounds},
-        "real": real,
+        "nominal": {
+            "name": name,
+            "dimensions": {**config["robots"].get(name, {}), **campaign.get("dimensions", {})},
+            "bounds": config["calibration"]["bounds"],
+        },
+        "real": config["loads"] | real(),
         "region": section["regions"][name],
         "genetic": config["genetic"],
-        **{key: section[key] for key in shared},
+        **{key: section[key] for key in _SHARED},
     }
