@@ -7,7 +7,7 @@ from tests.studies.printers.simulated_printers import PRINTERS
 
 
 def test_printers_that_share_readings_are_one_piece_of_evidence(results):
-    """The file by hand: 18, 22, 23 and 24 have the same twelve distances, 19 the heights of 18, 10 and 11 those of 09."""
+    """By hand: 18, 22, 23 and 24 have the same twelve distances, 19 the heights of 18; 10 and 11 share some of 09."""
     names = ("printers", "printer_causes", "printer_readings")
     printers, causes, readings = (pd.read_parquet(results / f"tables/{name}.parquet") for name in names)
     printers = printers.set_index("printer")

@@ -15,7 +15,7 @@ _BEFORE = {"variant": "none", "source": "none", "measure": "none", "planes": "no
 def study(twin, seen, length_error_mm):
     """Rows of `delta_calibrations`, `delta_observability` and `delta_points` for every variant, and before any.
 
-    seen: `Seen`; length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zero errors.
+    seen: `Seen`; length_error_mm: 1 sigma of every length's error that nobody knows of, for what it does to the zeros.
     """
     points, directions = [_points(twin, "none", None)], []
     calibrations = [_BEFORE | _sizes(points[0])]

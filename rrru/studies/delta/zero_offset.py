@@ -124,7 +124,7 @@ class Heights(Residuals):
 
 
 def one_step(residuals):
-    """Deviations (p,) by one linear step from the nominal robot: the paper's on `Distances` that count alike (eq. 15)."""
+    """Deviations (p,) by one step from the nominal robot: the paper's on `Distances` that count alike (eq. 15)."""
     nominal = residuals.mechanism.parameters.nominal
     return nominal + taken_for_errors(residuals, residuals.residual(nominal)[..., None])[:, 0]
 

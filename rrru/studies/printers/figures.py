@@ -1,15 +1,14 @@
-"""Linear-delta printers on one page: whose saved answer belongs to its readings, what is left, and how well arms are
-known.
-"""
+"""Linear-delta printers on one page: whose saved answer belongs, what is left, and how well arms are known."""
 
 import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.figures import style
 
+_OPEN = {"markerfacecolor": "white"}
 _VERDICTS = {
     "reproduced": {"color": style.BLUE, "marker": "o"},
-    "does not belong": {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white"},
+    "does not belong": {"color": style.VERMILION, "marker": "D"} | _OPEN,
 }
 _HEIGHT = {"color": style.BLUE, "marker": "o"}
 _DISTANCE = {"color": style.ORANGE, "marker": "^"}
@@ -49,12 +48,10 @@ def _decades(low, high):
 
 
 def _differences(axes, frame, rows):
-    """Largest difference between saved and own numbers, by verdict."""
+    """Largest difference between saved and fitted numbers, by verdict."""
     for verdict, look in _VERDICTS.items():
         chosen = (frame["verdict"] == verdict).to_numpy()
-        axes.plot(
-            frame["largest_difference"][chosen], rows[chosen], linestyle="none", label=f"answer {verdict}", **look
-        )
+        _marks(axes, frame["largest_difference"][chosen], rows[chosen], f"answer {verdict}", look)
     axes.set(xlabel="largest difference (mm) or (deg)")
     axes.set_title("(a) saved answer less ours")
 
@@ -62,28 +59,25 @@ def _differences(axes, frame, rows):
 def _residuals(axes, frame, rows):
     """Rms residuals of heights and distances, ours filled, the saved answer's open."""
     for kind, look in (("height", _HEIGHT), ("distance", _DISTANCE)):
-        axes.plot(
-            frame[f"{kind}_rms_saved_mm"],
-            rows,
-            linestyle="none",
-            label=f"{kind}s, saved",
-            **look | {"markerfacecolor": "white", "markersize": 4.5},
-        )
-        axes.plot(frame[f"{kind}_rms_fitted_mm"], rows, linestyle="none", label=f"{kind}s, ours", **look)
+        _marks(axes, frame[f"{kind}_rms_saved_mm"], rows, f"{kind}s, saved", look | _OPEN | {"markersize": 4.5})
+        _marks(axes, frame[f"{kind}_rms_fitted_mm"], rows, f"{kind}s, ours", look)
     axes.set(xlabel="rms residual (mm)")
     axes.set_title("(b) what is left")
 
 
 def _arms(axes, frame, rows):
-    """Standard error of the arms: calibrated with distances, and of their common length if its heights, or 100, had to
-    give it.
-    """
+    """Standard error of an arm with distances, and of the common length if its heights, or 100, had to give it."""
     columns = (
-        ("arm_standard_error_mm", "an arm, with distances", {"color": style.ORANGE, "marker": "s"}),
-        ("common_arm_standard_error_mm", "all arms, heights alone", {"color": style.BLUE, "marker": "s"}),
-        ("dense_common_arm_standard_error_mm", "all arms, 100 heights", {"color": style.BLUE, "marker": "v"}),
+        ("arm_standard_error_mm", "an arm, with distances", style.ORANGE, "s"),
+        ("common_arm_standard_error_mm", "all arms, heights alone", style.BLUE, "s"),
+        ("dense_common_arm_standard_error_mm", "all arms, 100 heights", style.BLUE, "v"),
     )
-    for column, label, look in columns:
-        axes.plot(frame[column], rows, linestyle="none", label=label, markerfacecolor="white", **look)
+    for column, label, colour, marker in columns:
+        _marks(axes, frame[column], rows, label, _OPEN | {"color": colour, "marker": marker})
     axes.set(xlabel="standard error (mm)")
     axes.set_title("(c) how well arms are known")
+
+
+def _marks(axes, values, rows, label, look):
+    """Marks without a line."""
+    axes.plot(values, rows, linestyle="none", label=label, **look)

@@ -1,4 +1,4 @@
-"""The numbers that a printer's firmware calibrates: radius, angles of towers a and b, endstops, with distances the arms.
+"""Numbers that a printer's firmware calibrates: radius, angles of towers a and b, endstops, with distances the arms.
 
 The angle of tower c is the gauge: the base turns freely. The firmware minimises the sum of squares over these numbers
 and stops where steps of a size that it states no longer help any of them. Where that stop can lie is known without

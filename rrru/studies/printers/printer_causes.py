@@ -130,7 +130,7 @@ def diagnosis(answers):
 
 
 def _verdict(p, imitators, limit, p_without_any=lambda: 0.0):
-    """Verdict on a cause from its p and the limit for it; p_without_any(): the largest with a single reading left out."""
+    """Verdict on a cause from its p and the limit for it; p_without_any(): the largest with one reading left out."""
     if np.isnan(p) or (p < limit and imitators):
         return NOT_DECIDABLE
     if p >= limit:

@@ -29,13 +29,12 @@ import numpy as np
 from rrru.campaign.ingest.problems import Problems
 from rrru.robots.linear_delta import linear_delta
 
-TOWERS = ("a", "b", "c")
+_TOWERS = ("a", "b", "c")
 _SIZES = ("angle_deg", "arm_mm", "endstop_mm")
 _DRIVE = ("rotation_distance_mm", "microsteps", "full_steps")
 _NOT_READ = ("program_height_rms_mm", "program_distance_rms_mm", "refit_max_difference")
 _TEETH = r"\s*[1-9]\d*(\.\d+)?\s*:\s*[1-9]\d*(\.\d+)?\s*"
 _GEARS = re.compile(f"{_TEETH}(,{_TEETH})*")
-_NUMBER = "a finite number"
 # numbers of the calibration: radius, two angles, three endstops; with distances also three arms
 _NUMBERS = {"heights": 6, "distances": 9}
 
@@ -66,22 +65,13 @@ class Printer:
         return "distances" if len(self.distance_mm) else "heights"
 
     def mechanism(self, parameter_set=None):
-        """The printer with its saved numbers as nominal ones and the named error parameters, by default those that it
-        calibrates.
-        """
-        return linear_delta(
-            self.radius_mm,
-            np.radians(self.angle_deg),
-            self.arm_mm,
-            self.endstop_mm,
-            parameter_set or self.parameter_set,
-        )
+        """The printer with its saved numbers as nominal ones; by default with the parameters that it calibrates."""
+        saved = self.radius_mm, np.radians(self.angle_deg), self.arm_mm, self.endstop_mm
+        return linear_delta(*saved, parameter_set or self.parameter_set)
 
 
 def read(path):
-    """Printers of a file, a tuple; raises IngestError with every problem that the file has, naming printer and
-    field.
-    """
+    """Printers of a file, a tuple; raises IngestError with every problem that it has, naming printer and field."""
     problems = Problems(path)
     try:
         content = json.loads(Path(path).read_text())
@@ -104,18 +94,12 @@ def read(path):
 
 def _check_reach(printer, problems):
     """Note readings at which the saved printer's arms do not meet."""
-    robot = printer.mechanism()
-    ways = {"heights": printer.height_drop_mm[:, None], "distances": printer.distance_drop_mm}
-    for field, drops in ways.items():
+    robot, lost = printer.mechanism(), "a place that the saved printer cannot take"
+    for field, drops in (("heights", printer.height_drop_mm[:, None]), ("distances", printer.distance_drop_mm)):
         for number, drop in enumerate(drops, start=1):
             if np.isnan(robot.forward(-drop)).any():
                 where = f"{printer.name}: {field}, number {number}"
-                problems.add(
-                    "reach",
-                    column=where,
-                    value="a place that the saved printer cannot take",
-                    allowed="its own readings",
-                )
+                problems.add("reach", column=where, value=lost, allowed="its own readings")
 
 
 class _Reader:
@@ -132,40 +116,38 @@ class _Reader:
         """The printer of an entry, None where something is wrong with it."""
         self._keys("", entry, ("id", "radius_mm", "towers", "heights"), ("source", "distances", *_NOT_READ))
         towers = self._of_kind(entry, "towers", dict)
-        self._keys("towers", towers, TOWERS)
-        towers = [self._of_kind(towers, name, dict, "towers.") for name in TOWERS]
-        for name, tower in zip(TOWERS, towers, strict=True):
+        self._keys("towers", towers, _TOWERS)
+        towers = {name: self._of_kind(towers, name, dict, "towers.") for name in _TOWERS}
+        for name, tower in towers.items():
             self._keys(f"towers.{name}", tower, _SIZES, ("step_mm", "gear_ratio", *_DRIVE))
-        columns = [
-            [
-                self._number(f"towers.{name}.{size}", tower.get(size), positive=size == "arm_mm")
-                for name, tower in zip(TOWERS, towers, strict=True)
-            ]
+        angle, arm, endstop = (
+            np.array(
+                [
+                    self._number(f"towers.{name}.{size}", tower.get(size), size == "arm_mm")
+                    for name, tower in towers.items()
+                ]
+            )
             for size in _SIZES
-        ]
-        step = np.array([self._step(name, tower) for name, tower in zip(TOWERS, towers, strict=True)])
-        heights = self._readings(entry, "heights", "z_mm", ("stable",))
-        distances = self._readings(entry, "distances", "mm", ("stable1", "stable2"))
+        )
+        step = np.array([self._step(f"towers.{name}", tower) for name, tower in towers.items()])
+        height, height_steps = self._readings(entry, "heights", "z_mm", ("stable",))
+        distance, distance_steps = self._readings(entry, "distances", "mm", ("stable1", "stable2"))
         radius = self._number("radius_mm", entry.get("radius_mm"), positive=True)
-        self._counts(len(heights[0]), len(distances[0]))
-        angle, arm, endstop = map(np.array, columns)
+        self._counts(len(height), len(distance))
         if self._sound and not (arm > radius).all():
             self._refuse("towers", f"an arm of {arm.min():g} mm", f"arms longer than radius_mm, {radius:g} mm")
         if not self._sound:
             return None
-        source = str(entry.get("source", ""))
-        drops = heights[1][:, 0] * step, distances[1] * step
-        return Printer(
-            self._name, source, radius, angle, arm, endstop, step, heights[0], drops[0], distances[0], drops[1]
-        )
+        saved = str(entry.get("source", "")), radius, angle, arm, endstop, step
+        return Printer(self._name, *saved, height, height_steps[:, 0] * step, distance, distance_steps * step)
 
     def _keys(self, place, mapping, needed, optional=()):
         """Note keys that are missing and keys that nobody knows."""
-        for key in needed:
-            if key not in mapping:
-                self._refuse(".".join(filter(None, (place, key))), "nothing", "this field")
-        for key in (key for key in mapping if key not in (*needed, *optional)):
-            self._refuse(".".join(filter(None, (place, str(key)))), "an unknown field", ", ".join((*needed, *optional)))
+        known = (*needed, *optional)
+        told = [(key, "nothing", "this field") for key in needed if key not in mapping]
+        told += [(key, "an unknown field", ", ".join(known)) for key in mapping if key not in known]
+        for key, value, allowed in told:
+            self._refuse(".".join(filter(None, (place, str(key)))), value, allowed)
 
     def _of_kind(self, mapping, key, kind, place=""):
         """mapping[key] if it is of the kind, else an empty one."""
@@ -176,33 +158,29 @@ class _Reader:
         return kind()
 
     def _number(self, field, value, positive=False):
-        """A number as float, NaN where it is none."""
-        good = (
-            isinstance(value, int | float)
-            and not isinstance(value, bool)
-            and np.isfinite(value)
-            and (value > 0.0 or not positive)
-        )
-        if not good:
-            if value is not None:
-                self._refuse(field, repr(value), "a positive number" if positive else _NUMBER)
+        """A number as float, NaN where it is none; that there is nothing is noted elsewhere."""
+        if value is None:
             return np.nan
-        return float(value)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if number and np.isfinite(value) and (value > 0.0 or not positive):
+            return float(value)
+        self._refuse(field, repr(value), "a positive number" if positive else "a finite number")
+        return np.nan
 
-    def _step(self, name, tower):
+    def _step(self, place, tower):
         """Length of one microstep of a tower's drive in mm."""
         if tower.get("step_mm") is not None:
-            return self._number(f"towers.{name}.step_mm", tower["step_mm"], positive=True)
+            return self._number(f"{place}.step_mm", tower["step_mm"], positive=True)
         for key in _DRIVE:
             if tower and tower.get(key) is None:
-                self._refuse(f"towers.{name}.{key}", "nothing", "a positive number, or step_mm")
-        turn, parts, full = (self._number(f"towers.{name}.{key}", tower.get(key), positive=True) for key in _DRIVE)
+                self._refuse(f"{place}.{key}", "nothing", "a positive number, or step_mm")
+        around, parts, full = (self._number(f"{place}.{key}", tower.get(key), positive=True) for key in _DRIVE)
         gears = tower.get("gear_ratio") or "1:1"
         if not (isinstance(gears, str) and _GEARS.fullmatch(gears)):
-            self._refuse(f"towers.{name}.gear_ratio", repr(gears), 'null or ratios such as "3:1" or "57:11, 2:1"')
+            self._refuse(f"{place}.gear_ratio", repr(gears), 'null or ratios such as "3:1" or "57:11, 2:1"')
             return np.nan
         ratios = [[float(teeth) for teeth in pair.split(":")] for pair in gears.split(",")]
-        return turn / (full * parts) / np.prod([driven / driving for driven, driving in ratios])
+        return around / (full * parts) / np.prod([driven / driving for driven, driving in ratios])
 
     def _readings(self, entry, field, size, places):
         """Sizes (n,) and steps (n, places, 3) of one kind of reading."""
@@ -220,20 +198,14 @@ class _Reader:
     def _triple(self, field, value):
         """Microsteps of the three carriages."""
         if isinstance(value, list) and len(value) == 3:
-            return [self._number(field, number) if number is not None else self._missing(field) for number in value]
+            return [self._number(field, "null" if number is None else number) for number in value]
         if value is not None:
             self._refuse(field, repr(value), "three numbers, microsteps down from the endstops")
         return [np.nan] * 3
 
-    def _missing(self, field):
-        self._refuse(field, "null", _NUMBER)
-        return np.nan
-
     def _counts(self, heights, distances):
-        """Note too few readings: one more than numbers to find, else nothing tells how good they are."""
-        least = _NUMBERS["distances" if distances else "heights"]
-        if heights + distances <= least or heights < _NUMBERS["heights"]:
-            found = f"{heights} heights and {distances} distances"
-            self._refuse(
-                "heights", found, f"at least {_NUMBERS['heights']} heights and {least + 1} readings for {least} numbers"
-            )
+        """Note too few readings: one more than numbers to fit, else nothing tells how good they are."""
+        few, least = _NUMBERS["heights"], _NUMBERS["distances" if distances else "heights"]
+        if heights + distances <= least or heights < few:
+            allowed = f"at least {few} heights and {least + 1} readings for {least} numbers"
+            self._refuse("heights", f"{heights} heights and {distances} distances", allowed)

@@ -1,6 +1,4 @@
-"""Tables of the linear-delta printers: calibrated here from their owners' readings, beside the answer that their
-firmware saved.
-"""
+"""Tables of the linear-delta printers: fitted to their owners' readings, beside what their firmware saved."""
 
 from rrru.store.schema import read_tables
 
@@ -8,7 +6,7 @@ TABLES = read_tables("""
 printer                str    its id in the file
 
 ## printers | tables/printers.parquet | printer
-One row per printer: answer here, answer there (what its firmware saved), residuals, and whether readings and saved
+One row per printer: fitted answer, saved answer (of its firmware), residuals, and whether readings and saved
 answer belong together. Rms values are over readings.
 --
 printer
@@ -21,14 +19,14 @@ numbers                int    calibrated numbers: 6 from heights, 9 with distanc
 freedom                int    readings less numbers
 rank                   int    combinations of numbers that the readings see
 condition              float? of the scaled Jacobian
-radius_fitted_mm       float? radius as calibrated here; the other numbers are in printer_parameters
+radius_fitted_mm       float? fitted radius; the other numbers are in printer_parameters
 radius_saved_mm        float? radius as saved
-largest_difference     float? largest difference between the saved and our numbers, in mm or degrees
+largest_difference     float? largest difference between the saved and the fitted numbers, in mm or degrees
 largest_difference_in  str    the number that it is in
 largest_over_stop      float? largest difference over how far the other program can stop from the best number
-height_rms_fitted_mm   float? residual of the heights under our answer
+height_rms_fitted_mm   float? residual of the heights under the fitted answer
 height_rms_saved_mm    float? residual of the heights under the saved answer
-distance_rms_fitted_mm float? residual of the distances under our answer; null without distances
+distance_rms_fitted_mm float? residual of the distances under the fitted answer; null without distances
 distance_rms_saved_mm  float? residual of the distances under the saved answer; null without distances
 noise_mm               float? 1 sigma, from the residuals: of a distance, of a height where there are no distances
 arm_standard_error_mm  float? largest standard error of an arm's length; null where arms are not calibrated
@@ -46,14 +44,14 @@ cause                  str    cause of what the calibration leaves; none found; 
 notes                  str    what to know about this row
 
 ## printer_parameters | tables/printer_parameters.parquet | printer parameter
-Every number of every printer: as calibrated here, as saved, and how well the readings see it.
+Every number of every printer: as fitted, as saved, and how well the readings see it.
 --
 printer
 parameter              str    radius, angle and endstop of a tower, or arm; the angle of tower c is fixed
 unit                   str    of the numbers of this row {mm, deg}
-fitted                 float? as calibrated here; null where the readings do not calibrate it
+fitted                 float? fitted; null where the readings do not calibrate it
 saved                  float  as saved
-difference             float? saved less ours
+difference             float? saved less fitted
 stop                   float? how far from the best number the other program can stop
 standard_error         float? with the noise from the residuals
 half_width_95          float? half the 95 % interval, Student's t with the printer's freedom
@@ -67,7 +65,7 @@ printer
 kind                   str    what was measured {height, distance}
 number                 int    number of the reading among its kind, from 1
 value_mm               float  the reading
-residual_fitted_mm     float  reading less our model's
+residual_fitted_mm     float  reading less the fitted model's
 residual_saved_mm      float  reading less the saved model's
 left_out_mm            float  reading less what the fit of all others foretells
 studentised            float? that over its standard error, under the firmware's ratio of noises; null where the
