@@ -59,6 +59,16 @@ class Finding:
         }
 
 
+def finding(where, printed, right, unit, shows):
+    """Decorator: the Finding of a function, whose docstring says what is computed; see Finding for the arguments."""
+
+    def of(values):
+        check = " ".join(values.__doc__.split()).rstrip(".")
+        return Finding(where, printed, right, check[0].lower() + check[1:], unit, values, shows)
+
+    return of
+
+
 def published_rows(paper, numbers, here, spread=None, notes=None):
     """Rows of `published` for the numbers that a paper prints, null for what is absent.
 

@@ -12,7 +12,7 @@ from rrru.fit.identifiability import analyse
 from rrru.robots.delta import Delta
 from rrru.studies import paper
 from rrru.studies.delta.paper import RESULTS
-from rrru.studies.paper import Finding
+from rrru.studies.paper import Finding, finding
 
 _PRINTED = {number.item: number.value for number in RESULTS}
 _CONCLUSION = ("conclusion (1)", "x, y errors of the platform along one plane identify the zero errors")
@@ -48,6 +48,27 @@ def _off_y(first_rad, back_rad):
     return np.degrees(np.arccos(np.clip(direction[1], -1.0, 1.0)))
 
 
+# the scan prints minus signs as question marks
+@finding(
+    "structure angles, Fig. 2",
+    "beta_i = ? pi/6 + 2 pi (i ? 1)/3",
+    "-pi/6 + 2 pi (i - 1)/3",
+    "deg",
+    lambda plus, minus: minus < 1e-9 < plus,
+)
+def _first_axis():
+    """Angle between Y and the second drive axis's middle with +pi/6 and with -pi/6; the text says that Y points
+    there.
+    """
+    return tuple(_off_y(sign * np.pi / 6.0, -np.pi / 2.0) for sign in (1.0, -1.0))
+
+
+@finding("eq. (2), text", "beta_i?pi2", "beta_i - pi/2", "deg", lambda plus, minus: minus < 1e-9 < plus)
+def _arms():
+    """Angle between Y and the second arm, level, turned by beta_2 + pi/2 and by beta_2 - pi/2; arms point outwards."""
+    return tuple(_off_y(-np.pi / 6.0, sign * np.pi / 2.0) for sign in (1.0, -1.0))
+
+
 def _planar_jacobians():
     """Derivatives by the zero errors at z = 100, (n, k, 3): 20 positions, 19 displacements in x, y, 19 distances."""
     robot, points = Delta(), disc(100.0, _CALIBRATED_MM, 20)
@@ -57,18 +78,36 @@ def _planar_jacobians():
     return position, moved[:, :2], distance[:, None]
 
 
+@finding(*_CONCLUSION, "they do, in rank", "1", lambda errors, rank: rank < errors)
 def _rank():
-    """Number of zero errors, and rank of the distances."""
-    return 3.0, analyse(Delta(), _planar_jacobians()[2]).rank
+    """Zero errors, and rank of the distances from position 1 over 20 positions at z = 100 mm, within 200 mm of the
+    axis.
+    """
+    return 3, analyse(Delta(), _planar_jacobians()[2]).rank
 
 
+@finding(
+    *_CONCLUSION,
+    "eqs. (8) to (15) use distances, which keep half of the x, y displacements",
+    "1",
+    lambda displacements, distances: distances > displacements,
+)
 def _conditions():
-    """Condition of the displacements and of the distances."""
+    """Condition over these 20 positions: x, y displacements, and distances."""
     return tuple(analyse(Delta(), jacobian).condition for jacobian in _planar_jacobians()[1:])
 
 
+@finding(
+    *_CONCLUSION,
+    "differences between the zero errors mostly shift the whole plane, which distances do not see: "
+    "the position is off {2:.0f} times as far as the distances",
+    "mm",
+    lambda stretch, shift, _: shift > stretch,
+)
 def _least_seen():
-    """Rms change of distances and of positions in mm for the least seen zero errors, and their ratio."""
+    """Rms change for the least seen combination of zero errors, 1 mm at the arms' ends: of the distances, and of the
+    position.
+    """
     position, _, distance = _planar_jacobians()
     identifiability = analyse(Delta(), distance)
     weak = identifiability.directions[-1] * identifiability.scale
@@ -76,109 +115,59 @@ def _least_seen():
     return stretch, shift, shift / stretch
 
 
-def _checked_jacobian():
-    """Derivatives (600, p) of positions on z = 0 by zero errors and by the legs' lengths."""
+def _checked_jacobians():
+    """Derivatives (600, k) of positions on z = 0 by zero errors and by the legs' lengths."""
     robot, points = Delta(parameter_set="legs"), disc(0.0, _CHECKED_MM, 200)
     jacobian = robot.parameter_jacobian(points, robot.inverse(points)).reshape(-1, len(robot.parameters))
     angle = np.array([unit == "rad" for unit in robot.parameters.units])
     return jacobian[:, angle], jacobian[:, ~angle]
 
 
+@finding(
+    "eq. (3), text",
+    "errors of l1 and l2 can be neglected",
+    f"the zero errors cannot take them up; a mean of {_PRINTED['after_mean']} mm is left, "
+    "which zero errors alone do not explain",
+    "mm",
+    lambda exact, left: left > 1e-3 > exact,
+)
 def _left_by_lengths():
-    """Rms error in mm with the best zero offsets: exact lengths, and lengths off by 0.1 mm."""
-    zeros, lengths = _checked_jacobian()
+    """Rms error on z = 0 with the best zero offsets: exact lengths, and independent errors of 0.1 mm of every l1, l2
+    and a.
+    """
+    zeros, lengths = _checked_jacobians()
     kept = lengths - zeros @ np.linalg.lstsq(zeros, lengths, rcond=None)[0]
     return 0.0, 0.1 * np.sqrt((kept**2).sum() / (len(kept) / 3))
 
 
+@finding(
+    "text at Fig. 7",
+    "arms levelled by eye, mean error 0.932 mm before calibration",
+    "an eye that levels to 0.1 degree, or points taken relative to a common shift",
+    "mm",
+    lambda tenth, one: one > _PRINTED["before_max"] > tenth,
+)
 def _levelled_by_eye():
-    """Rms error in mm from zero errors of 0.1 and of 1 degree."""
-    zeros, _ = _checked_jacobian()
+    """Rms error on z = 0 from independent zero errors of 0.1 and of 1 degree."""
+    zeros, _ = _checked_jacobians()
     per_degree = np.radians(1.0) * np.sqrt((zeros**2).sum() / (len(zeros) / 3))
     return 0.1 * per_degree, per_degree
 
 
-COMPUTED = (
-    # the scan prints minus signs as question marks
-    Finding(
-        "structure angles, Fig. 2",
-        "beta_i = ? pi/6 + 2 pi (i ? 1)/3",
-        "-pi/6 + 2 pi (i - 1)/3",
-        "angle between Y and the second drive axis's middle with +pi/6 and with -pi/6; "
-        "the text says that Y points there",
-        "deg",
-        lambda: tuple(_off_y(sign * np.pi / 6.0, -np.pi / 2.0) for sign in (1.0, -1.0)),
-        lambda plus, minus: minus < 1e-9 < plus,
-    ),
-    Finding(
-        "eq. (2), text",
-        "beta_i?pi2",
-        "beta_i - pi/2",
-        "angle between Y and the second arm, level, turned by beta_2 + pi/2 and by beta_2 - pi/2; arms point outwards",
-        "deg",
-        lambda: tuple(_off_y(-np.pi / 6.0, sign * np.pi / 2.0) for sign in (1.0, -1.0)),
-        lambda plus, minus: minus < 1e-9 < plus,
-    ),
-    Finding(
-        *_CONCLUSION,
-        "they do, in rank",
-        "zero errors, and rank of the distances from position 1 over 20 positions at z = 100 mm, "
-        "within 200 mm of the axis",
-        "1",
-        _rank,
-        lambda errors, rank: rank < errors,
-    ),
-    Finding(
-        *_CONCLUSION,
-        "eqs. (8) to (15) use distances, which keep half of the x, y displacements",
-        "condition over these 20 positions: x, y displacements, and distances",
-        "1",
-        _conditions,
-        lambda displacements, distances: distances > displacements,
-    ),
-    Finding(
-        *_CONCLUSION,
-        "differences between the zero errors mostly shift the whole plane, which distances do not see: "
-        "the position is off {2:.0f} times as far as the distances",
-        "rms change for the least seen combination of zero errors, 1 mm at the arms' ends: "
-        "of the distances, and of the position",
-        "mm",
-        _least_seen,
-        lambda stretch, shift, _: shift > stretch,
-    ),
-    Finding(
-        "eq. (3), text",
-        "errors of l1 and l2 can be neglected",
-        f"the zero errors cannot take them up; a mean of {_PRINTED['after_mean']} mm is left, "
-        "which zero errors alone do not explain",
-        "rms error on z = 0 with the best zero offsets: exact lengths, "
-        "and independent errors of 0.1 mm of every l1, l2 and a",
-        "mm",
-        _left_by_lengths,
-        lambda exact, left: left > 1e-3 > exact,
-    ),
-    Finding(
-        "text at Fig. 7",
-        "arms levelled by eye, mean error 0.932 mm before calibration",
-        "an eye that levels to 0.1 degree, or points taken relative to a common shift",
-        "rms error on z = 0 from independent zero errors of 0.1 and of 1 degree",
-        "mm",
-        _levelled_by_eye,
-        lambda tenth, one: one > _PRINTED["before_max"] > tenth,
-    ),
+@finding(
+    "eqs. (13) to (15)",
+    "distances between any two positions, m >= 4",
+    "distances from position 1, as the text at eq. (8) says",
+    "1",
+    lambda any_two, from_one: any_two > from_one,
 )
-READ = (
-    Finding(
-        "eqs. (13) to (15)",
-        "distances between any two positions, m >= 4",
-        "distances from position 1, as the text at eq. (8) says",
-        "equations from 4 positions: between any two, where 3 positions would do for 3 errors, and from position 1",
-        "1",
-        lambda: (len(list(combinations(range(4), 2))), 4 - 1),
-        lambda any_two, from_one: any_two > from_one,
-    ),
-    Finding("Fig. 6, target", "4055x dots", "40 x 55 dots"),
-)
+def _equations():
+    """Equations from 4 positions: between any two, where 3 positions would do for 3 errors, and from position 1."""
+    return len(list(combinations(range(4), 2))), 4 - 1
+
+
+COMPUTED = (_first_axis, _arms, _rank, _conditions, _least_seen, _left_by_lengths, _levelled_by_eye)
+READ = (_equations, Finding("Fig. 6, target", "4055x dots", "40 x 55 dots"))
 
 
 def audit_rows():

@@ -8,13 +8,15 @@ import numpy as np
 from rrru.robots import singularity
 from rrru.robots.ptt3 import Ptt3
 from rrru.studies import paper
-from rrru.studies.paper import Finding
+from rrru.studies.paper import Finding, finding
 
 POINTS = np.array(
     [[0.0, 0.0, -250.0], [40.0, 25.0, -230.0], [-60.0, 10.0, -260.0], [15.0, -70.0, -210.0], [-35.0, -45.0, -280.0]]
 )
 # R = r, where the paper sees a singularity, and the nominal robot
 _ROBOTS = (Ptt3(R_mm=60.0, r_mm=60.0), Ptt3())
+# links 0.001 mm from upright
+_UPRIGHT = np.array([[0.0, 0.0, -np.sqrt(_ROBOTS[0].L_mm ** 2 - 1e-6)]])
 _CONSTRAINT = ("section 2.2 and conclusion (2)", "a constraint singularity at R = r, so none for r < R")
 _LOST = {
     "Table 1": ("dimensions of the robot", "L 350 mm, R 300 mm, r 60 mm, chosen"),
@@ -43,26 +45,48 @@ _LOST = {
 }
 
 
+@finding(
+    *_CONSTRAINT,
+    "R and r shift the sliders only: at a position neither J nor the couples depend on them",
+    "1",
+    lambda equal, apart: abs(equal - apart) < 1e-9 < abs(equal),
+)
 def _determinants():
-    """Det J at the first position, of both robots."""
+    """Det J at (0, 0, -250) with R = r, where it should be 0, and with R - r = 240 mm."""
     return tuple(np.linalg.det(robot.jacobian(POINTS[:1], robot.inverse(POINTS[:1])))[0] for robot in _ROBOTS)
 
 
-def _upright():
-    """Point (1, 3) whose links stand 0.001 mm from upright, and both robots' sliders (1, 3) there."""
-    point = np.array([[0.0, 0.0, -np.sqrt(_ROBOTS[0].L_mm ** 2 - 1e-6)]])
-    return point, [robot.inverse(point) for robot in _ROBOTS]
-
-
+@finding(
+    *_CONSTRAINT,
+    "upright links let the platform turn, for r < R as well (U joints with tangential outer axes)",
+    "1",
+    lambda equal, apart: equal < 1e-4 and apart < 1e-4,
+)
 def _constraint_measures():
-    """Constraint measures of both robots with nearly upright links."""
-    point, sliders = _upright()
-    both = zip(_ROBOTS, sliders, strict=True)
-    return tuple(singularity.constraint_measure(robot, point, slider)[0] for robot, slider in both)
+    """Constraint measure 0.001 mm from upright links, with R = r and with R - r = 240 mm."""
+    return tuple(singularity.constraint_measure(robot, _UPRIGHT, robot.inverse(_UPRIGHT))[0] for robot in _ROBOTS)
 
 
-def _nearest_singularity():
-    """Nearest zero of det J on the first rail's azimuth at Z = -250 mm, and the translational measure there."""
+@finding(
+    *_CONSTRAINT,
+    "only a travel that ends before b = -(R - r) keeps the platform out of it",
+    "mm",
+    lambda _, apart: apart < -200.0,
+)
+def _upright_sliders():
+    """Slider position at which the links stand upright, with R = r and with R - r = 240 mm."""
+    return tuple(robot.inverse(_UPRIGHT)[0, 0] for robot in _ROBOTS)
+
+
+@finding(
+    "section 2.2, eqs. (6) to (9)",
+    "no kinematic singularity away from eqs. (7) and (9), which are lost",
+    "det J vanishes where Z = 0, and where u_i = sqrt(L^2 - Z^2) on a rail's azimuth and on the surface through it",
+    "mm",
+    lambda _, distance, measure: measure < 1e-6 < distance,
+)
+def _kinematic_singularity():
+    """Distance from the axis at Z = -250 mm where det J crosses zero on the first rail's azimuth."""
     from scipy.optimize import brentq
 
     robot = _ROBOTS[1]
@@ -71,8 +95,15 @@ def _nearest_singularity():
     return np.nan, distance, singularity.translational_measure(robot, point, robot.inverse(point))[0]
 
 
+@finding(
+    "eqs. (11) and (12)",
+    "f(p - dp) = f(p) - J dp",
+    "equal to first order only; half the error leaves a quarter of the difference",
+    "mm",
+    lambda half, full: abs(full / half - 4.0) < 0.1,
+)
 def _first_order():
-    """Largest difference between the sliders of eqs. (11) and (12), for an error of 0.5 mm and of 1 mm."""
+    """Largest difference of the two corrected sliders over five positions, for an error of 0.5 mm and of 1 mm."""
     robot = _ROBOTS[1]
     sliders = robot.inverse(POINTS)
     jacobian = robot.jacobian(POINTS, sliders)
@@ -82,66 +113,21 @@ def _first_order():
     )
 
 
+@finding(
+    "section 3.2, vertical error",
+    "z error relative to the first position",
+    "what all heights share, most of a wrong link length, is not in the z benefit",
+    "mm",
+    lambda relative, full: relative < full,
+)
 def _heights():
-    """Mean z error for links 1 mm too long: relative to the first position, and in full."""
+    """Mean z error over five positions for links 1 mm too long: relative to the first position, and in full."""
     robot = Ptt3(parameter_set="tied")
     off = robot.forward(robot.inverse(POINTS), robot.parameters.vector({"dL": 1.0}))[:, 2] - POINTS[:, 2]
     return np.abs(off - off[0])[1:].mean(), np.abs(off).mean()
 
 
-COMPUTED = (
-    Finding(
-        *_CONSTRAINT,
-        "R and r shift the sliders only: at a position neither J nor the couples depend on them",
-        "det J at (0, 0, -250) with R = r, where it should be 0, and with R - r = 240 mm",
-        "1",
-        _determinants,
-        lambda equal, apart: abs(equal - apart) < 1e-9 < abs(equal),
-    ),
-    Finding(
-        *_CONSTRAINT,
-        "upright links let the platform turn, for r < R as well (U joints with tangential outer axes)",
-        "constraint measure 0.001 mm from upright links, with R = r and with R - r = 240 mm",
-        "1",
-        _constraint_measures,
-        lambda equal, apart: equal < 1e-4 and apart < 1e-4,
-    ),
-    Finding(
-        *_CONSTRAINT,
-        "only a travel that ends before b = -(R - r) keeps the platform out of it",
-        "slider position at which the links stand upright, with R = r and with R - r = 240 mm",
-        "mm",
-        lambda: tuple(slider[0, 0] for slider in _upright()[1]),
-        lambda _, apart: apart < -200.0,
-    ),
-    Finding(
-        "section 2.2, eqs. (6) to (9)",
-        "no kinematic singularity away from eqs. (7) and (9), which are lost",
-        "det J vanishes where Z = 0, and where u_i = sqrt(L^2 - Z^2) on a rail's azimuth and on the surface through it",
-        "distance from the axis at Z = -250 mm where det J crosses zero on the first rail's azimuth",
-        "mm",
-        _nearest_singularity,
-        lambda _, distance, measure: measure < 1e-6 < distance,
-    ),
-    Finding(
-        "eqs. (11) and (12)",
-        "f(p - dp) = f(p) - J dp",
-        "equal to first order only; half the error leaves a quarter of the difference",
-        "largest difference of the two corrected sliders over five positions, for an error of 0.5 mm and of 1 mm",
-        "mm",
-        _first_order,
-        lambda half, full: abs(full / half - 4.0) < 0.1,
-    ),
-    Finding(
-        "section 3.2, vertical error",
-        "z error relative to the first position",
-        "what all heights share, most of a wrong link length, is not in the z benefit",
-        "mean z error over five positions for links 1 mm too long: relative to the first position, and in full",
-        "mm",
-        _heights,
-        lambda relative, full: relative < full,
-    ),
-)
+COMPUTED = (_determinants, _constraint_measures, _upright_sliders, _kinematic_singularity, _first_order, _heights)
 READ = (
     Finding(
         "section 3.3, Table 8, Figs. 16 to 18",
