@@ -43,8 +43,7 @@ class SpatialSolution:
 
 @dataclass(frozen=True)
 class SpatialGeometry:
-    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) where they change from point to point, and
-    displacements.
+    """Azimuths (3,), lengths (3, 5) = R, L1, L2, L3, r per leg, or (n, 3, 5) from point to point, and displacements.
 
     axis_deviations: (3 legs, 6 PLACES, 6) = shift in mm, rotation vector in rad, in the leg's frame at that place.
     """
@@ -53,7 +52,7 @@ class SpatialGeometry:
     lengths_mm: np.ndarray
     axis_deviations: np.ndarray
 
-    def solve(self, theta_rad, passive_guess_rad, joint_shift_mm=None):
+    def solve(self, theta_rad, passive_guess_rad, joint_shift_mm=0.0):
         """Close the chains at drive angles (n, 3).
 
         passive_guess_rad: (n, 3, 4) of the ideal robot; joint_shift_mm: (n, 3, 3), displacement of the platform's joint
@@ -61,20 +60,20 @@ class SpatialGeometry:
         that the last one needed.
         """
         n = len(theta_rad)
-        shift = np.zeros((n, 3, 3)) if joint_shift_mm is None else np.broadcast_to(joint_shift_mm, (n, 3, 3))
-        rotations = (
-            Rotation.from_rotvec(self.axis_deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
-        )
         position, turned, residual = _solve_points(
-            np.ascontiguousarray(self.azimuth_rad, dtype=float),
-            np.ascontiguousarray(np.broadcast_to(self.lengths_mm, (n, 3, 5)), dtype=float),
-            np.ascontiguousarray(self.axis_deviations[..., :3], dtype=float),
-            np.ascontiguousarray(rotations),
-            np.ascontiguousarray(theta_rad, dtype=float),
-            np.ascontiguousarray(passive_guess_rad, dtype=float).reshape(n, 12),
-            np.ascontiguousarray(shift, dtype=float),
+            *(_array(part) for part in self.fixed_parts),
+            _array(np.broadcast_to(self.lengths_mm, (n, 3, 5))),
+            _array(theta_rad),
+            _array(passive_guess_rad).reshape(n, 12),
+            _array(np.broadcast_to(joint_shift_mm, (n, 3, 3))),
         )
         return SpatialSolution(position, turned, residual, residual < 1e3 * _TOLERANCE_MM)
+
+    @property
+    def fixed_parts(self):
+        """What is the same at all points: azimuths (3,), shifts (3, 6, 3) in mm and rotations (3, 6, 3, 3)."""
+        rotations = Rotation.from_rotvec(self.axis_deviations[..., 3:].reshape(-1, 3)).as_matrix()
+        return self.azimuth_rad, self.axis_deviations[..., :3], rotations.reshape(3, len(PLACES), 3, 3)
 
     def solve_under(self, theta_rad, passive_guess_rad, change):
         """Close the chains as `solve` does under what effects contribute; positions are in the tracker's frame.
@@ -82,42 +81,15 @@ class SpatialGeometry:
         Displacements of effects and the geometry's own at one place are added, which holds to first order in their
         angles.
         """
-        changed = replace(
-            self,
-            lengths_mm=self.lengths_mm + change.length_mm,
-            axis_deviations=self.axis_deviations + change.displacement,
-        )
+        deviations = self.axis_deviations + change.displacement
+        changed = replace(self, lengths_mm=self.lengths_mm + change.length_mm, axis_deviations=deviations)
         solution = changed.solve(theta_rad + change.drive, passive_guess_rad, change.joint_mm)
-        return (
-            solution
-            if not np.ndim(change.frame)
-            else replace(solution, position_mm=into_frame(solution.position_mm, change.frame))
-        )
+        return replace(solution, position_mm=into_frame(solution.position_mm, change.frame))
 
-    def closure_determinant(self, theta_rad, passive_rad):
-        """Determinant (n,) of the 12 x 12 closure Jacobian at drive angles (n, 3) and passive angles (n, 3, 4), lengths
-        in units of 500 mm.
-        """
-        rotations = (
-            Rotation.from_rotvec(self.axis_deviations[..., 3:].reshape(-1, 3)).as_matrix().reshape(3, len(PLACES), 3, 3)
-        )
-        jacobian, residual = np.empty((12, 12)), np.empty(12)
-        result = []
-        lengths_mm = np.broadcast_to(self.lengths_mm, (len(theta_rad), 3, 5))
-        for theta, passive, lengths in zip(theta_rad, passive_rad, lengths_mm, strict=True):
-            _closure(
-                np.asarray(self.azimuth_rad, dtype=float),
-                np.ascontiguousarray(lengths, dtype=float),
-                np.ascontiguousarray(self.axis_deviations[..., :3], dtype=float),
-                np.ascontiguousarray(rotations),
-                np.ascontiguousarray(theta, dtype=float),
-                np.ascontiguousarray(passive, dtype=float).reshape(12),
-                np.zeros((3, 3)),
-                jacobian,
-                residual,
-            )
-            result.append(np.linalg.det(jacobian / _ARM_MM))
-        return np.array(result)
+
+def _array(values):
+    """A writable copy, row by row in memory: one kind of array, so that the kernels are compiled once."""
+    return np.array(values, dtype=float, order="C")
 
 
 @_compiled
@@ -142,117 +114,121 @@ def _turn_z(matrix, angle):
 
 @_compiled
 def _displace(matrix, point, length, shift, rotation):
-    """Go `length` along the local x, then the displacement: shift (3,) and rotation (3, 3) in the local frame, in
-    place.
-    """
+    """Go `length` along the local x, then by shift (3,) and rotation (3, 3) in the local frame, in place."""
     for k in range(3):
-        point[k] += matrix[k, 0] * (length + shift[0]) + matrix[k, 1] * shift[1] + matrix[k, 2] * shift[2]
-    matrix[:] = matrix @ rotation
+        x, y, z = matrix[k, 0], matrix[k, 1], matrix[k, 2]
+        point[k] += x * (length + shift[0]) + y * shift[1] + z * shift[2]
+    turned = matrix @ rotation
+    for k in range(3):
+        for j in range(3):
+            matrix[k, j] = turned[k, j]
 
 
 @_compiled
-def _chain(azimuth, lengths, shifts, rotations, angles, joint_shift, axes, points, matrix, point):
-    """One leg: joint axes (5, 3) and points (5, 3) on them, platform rotation (3, 3) and position (3,), all written in
-    place.
-    """
-    matrix[:] = np.eye(3)
-    point[:] = 0.0
+def _chain(azimuth, shifts, rotations, lengths, angles, joint_shift, axes, points, matrix, point):
+    """One leg: joint axes (5, 3), points (5, 3) on them, platform rotation (3, 3) and position (3,), all in place."""
+    for k in range(3):
+        point[k] = 0.0
+        for j in range(3):
+            matrix[k, j] = 1.0 if k == j else 0.0
     _turn_z(matrix, azimuth)
     _displace(matrix, point, lengths[0], shifts[0], rotations[0])
     for joint in range(5):
-        axes[joint] = -matrix[:, 1] if joint in (0, 1, 4) else matrix[:, 2]
-        points[joint] = point
-        if joint in (0, 1, 4):
-            _turn_y(matrix, angles[joint])
-        else:
+        upright = joint in (2, 3)
+        for k in range(3):
+            axes[joint, k] = matrix[k, 2] if upright else -matrix[k, 1]
+            points[joint, k] = point[k]
+        if upright:
             _turn_z(matrix, angles[joint])
-        if joint < 3:
-            _displace(matrix, point, lengths[joint + 1], shifts[joint + 1], rotations[joint + 1])
-        elif joint == 3:
-            point += joint_shift
-            _displace(matrix, point, 0.0, shifts[4], rotations[4])
         else:
-            _displace(matrix, point, -lengths[4], shifts[5], rotations[5])
+            _turn_y(matrix, angles[joint])
+        if joint == 3:
+            for k in range(3):
+                point[k] += joint_shift[k]
+        length = lengths[joint + 1] if joint < 3 else 0.0 if joint == 3 else -lengths[4]
+        _displace(matrix, point, length, shifts[joint + 1], rotations[joint + 1])
     _turn_z(matrix, -azimuth)
 
 
 @_compiled
-def _closure(azimuth, lengths, shifts, rotations, theta, passive, joint_shift, jacobian, residual):
-    """Closure residual (12,) and its Jacobian (12, 12) by the passive angles, in place; returns the platform pose of
-    leg 1.
-    """
-    axes, points = np.empty((5, 3)), np.empty((5, 3))
-    first_matrix, first_point = np.empty((3, 3)), np.empty(3)
-    matrix, point, angles = np.empty((3, 3)), np.empty(3), np.empty(5)
-    jacobian[:] = 0.0
+def _closure(azimuth, shifts, rotations, lengths, theta, passive, joint_shift, jacobian, residual, matrices, positions):
+    """Closure residual (12,), its Jacobian (12, 12) by the passive angles, and the legs' platform poses, in place."""
+    axes, points, angles = np.empty((5, 3)), np.empty((5, 3)), np.empty(5)
+    for row in range(12):
+        for column in range(12):
+            jacobian[row, column] = 0.0
     for leg in range(3):
         angles[0] = theta[leg]
-        angles[1:] = passive[4 * leg : 4 * leg + 4]
-        _chain(
-            azimuth[leg],
-            lengths[leg],
-            shifts[leg],
-            rotations[leg],
-            angles,
-            joint_shift[leg],
-            axes,
-            points,
-            matrix,
-            point,
-        )
-        if leg == 0:
-            first_matrix[:], first_point[:] = matrix, point
-        else:
-            row = 6 * (leg - 1)
-            difference = first_matrix @ matrix.T
-            for k in range(3):
-                residual[row + k] = first_point[k] - point[k]
-            residual[row + 3] = 0.5 * _ARM_MM * (difference[2, 1] - difference[1, 2])
-            residual[row + 4] = 0.5 * _ARM_MM * (difference[0, 2] - difference[2, 0])
-            residual[row + 5] = 0.5 * _ARM_MM * (difference[1, 0] - difference[0, 1])
         for joint in range(1, 5):
-            lever = point - points[joint]
-            column = 4 * leg + joint - 1
-            axis = axes[joint]
-            moved = np.cross(axis, lever)
-            for loop in range(2):
-                if leg == 0 or leg == loop + 1:
-                    sign = 1.0 if leg == 0 else -1.0
-                    for k in range(3):
-                        jacobian[6 * loop + k, column] = sign * moved[k]
-                        jacobian[6 * loop + 3 + k, column] = sign * _ARM_MM * axis[k]
-    return first_matrix, first_point
+            angles[joint] = passive[4 * leg + joint - 1]
+        matrix, point = matrices[leg], positions[leg]
+        _chain(
+            *(azimuth[leg], shifts[leg], rotations[leg], lengths[leg], angles, joint_shift[leg]),
+            *(axes, points, matrix, point),
+        )
+        if leg > 0:
+            row = 6 * (leg - 1)
+            difference = matrices[0] @ matrix.T
+            for k in range(3):
+                residual[row + k] = positions[0, k] - point[k]
+                i, j = (k + 2) % 3, (k + 1) % 3
+                residual[row + 3 + k] = 0.5 * _ARM_MM * (difference[i, j] - difference[j, i])
+        for joint in range(1, 5):
+            _add_columns(leg, 4 * leg + joint - 1, axes[joint], points[joint], point, jacobian)
 
 
 @_compiled
-def _solve_points(azimuth, lengths, shifts, rotations, theta, guess, joint_shift):
+def _add_columns(leg, column, axis, through, point, jacobian):
+    """Columns of the closure Jacobian by one passive angle: leg 1 closes both loops, legs 2 and 3 one each."""
+    for loop in range(2):
+        if leg == 0 or leg == loop + 1:
+            sign = 1.0 if leg == 0 else -1.0
+            for k in range(3):
+                i, j = (k + 1) % 3, (k + 2) % 3
+                moved = axis[i] * (point[j] - through[j]) - axis[j] * (point[i] - through[i])
+                jacobian[6 * loop + k, column] = sign * moved
+                jacobian[6 * loop + 3 + k, column] = sign * _ARM_MM * axis[k]
+
+
+@_compiled
+def _largest(values):
+    """Largest magnitude of values (k,), NaN or inf where one is."""
+    result = 0.0
+    for value in values:
+        if not abs(value) <= result:
+            result = abs(value)
+    return result
+
+
+@_compiled
+def _solve_points(azimuth, shifts, rotations, lengths, theta, guess, joint_shift):
     """Newton on the 12 closure equations, point after point; see SpatialGeometry.solve."""
     n = theta.shape[0]
-    position, turned, residuals = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.inf)
-    jacobian, residual, correction = np.empty((12, 12)), np.empty(12), np.zeros(12)
+    position, turned, residuals = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    jacobian, residual, correction, passive = np.empty((12, 12)), np.empty(12), np.zeros(12), np.empty(12)
+    matrices, centres = np.empty((3, 3, 3)), np.empty((3, 3))
     for j in range(n):
-        if not (np.isfinite(theta[j]).all() and np.isfinite(guess[j]).all()):
-            continue
-        passive = guess[j] + correction
-        for _ in range(_MOST_STEPS):
-            matrix, point = _closure(
-                azimuth, lengths[j], shifts, rotations, theta[j], passive, joint_shift[j], jacobian, residual
+        residuals[j] = np.inf
+        known = np.isfinite(_largest(theta[j])) and np.isfinite(_largest(guess[j]))
+        for k in range(12):
+            passive[k] = guess[j, k] + correction[k]
+        for _ in range(_MOST_STEPS if known else 0):
+            _closure(
+                *(azimuth, shifts, rotations, lengths[j], theta[j], passive, joint_shift[j]),
+                *(jacobian, residual, matrices, centres),
             )
-            largest = np.abs(residual).max()
-            residuals[j] = largest
-            if not largest > _TOLERANCE_MM:
-                break
-            if np.linalg.det(jacobian / _ARM_MM) == 0.0:
+            residuals[j] = _largest(residual)
+            if not residuals[j] > _TOLERANCE_MM or np.linalg.det(jacobian / _ARM_MM) == 0.0:
                 break
             step = np.linalg.solve(jacobian, residual)
-            longest = np.abs(step).max()
-            if longest > 0.2:
-                step *= 0.2 / longest
-            passive = passive - step
-        if residuals[j] < 1e3 * _TOLERANCE_MM:
-            correction = passive - guess[j]
-            position[j] = point
-            turned[j, 0] = 0.5 * (matrix[2, 1] - matrix[1, 2])
-            turned[j, 1] = 0.5 * (matrix[0, 2] - matrix[2, 0])
-            turned[j, 2] = 0.5 * (matrix[1, 0] - matrix[0, 1])
+            longest = _largest(step)
+            for k in range(12):
+                passive[k] -= step[k] * (0.2 / longest) if longest > 0.2 else step[k]
+        solved = residuals[j] < 1e3 * _TOLERANCE_MM
+        for k in range(12 if solved else 0):
+            correction[k] = passive[k] - guess[j, k]
+        for k in range(3):
+            a, b = (k + 2) % 3, (k + 1) % 3
+            position[j, k] = centres[0, k] if solved else np.nan
+            turned[j, k] = 0.5 * (matrices[0, a, b] - matrices[0, b, a]) if solved else np.nan
     return position, turned, residuals

@@ -14,64 +14,20 @@ _LAST_STEP_SQUARED = 1e-8
 _MOST_STEPS = 25
 
 _compiled = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
+# taken up by its caller: a copy of its own would contract products otherwise, and compiled code give other last bits
+# than the same code loaded from the cache
+_part = numba.njit(forceinline=True, error_model="numpy", fastmath={"contract"})
 
 
-@_compiled
+@_part
 def _newton_step(legs, turn, cosine, sine, position, step_squared):
-    """One Newton step of all points on the three closures (eq. 8), in place; the squared step lengths go to
-    `step_squared`.
-    """
-    n = position.shape[1]
-    cos_delta, sin_delta = np.cos(legs[:, 0]), np.sin(legs[:, 0])
-    arm, offset, forearm_squared, radial = legs[:, 1], legs[:, 2], legs[:, 3] * legs[:, 3], legs[:, 4]
-    cx, cy = turn[0], turn[1]
-    for j in range(n):
+    """One Newton step of all points on the closures (eq. 8), in place; squared step lengths go to `step_squared`."""
+    first, second, third = _leg(legs, turn, 0), _leg(legs, turn, 1), _leg(legs, turn, 2)
+    for j in range(position.shape[1]):
         x, y, z = position[0, j], position[1, j], position[2, j]
-        g00, g01, g02, h0 = _leg_row(
-            x,
-            y,
-            z,
-            cx[0],
-            cy[0],
-            cos_delta[0],
-            sin_delta[0],
-            arm[0],
-            offset[0],
-            forearm_squared[0],
-            radial[0],
-            cosine[0, j],
-            sine[0, j],
-        )
-        g10, g11, g12, h1 = _leg_row(
-            x,
-            y,
-            z,
-            cx[1],
-            cy[1],
-            cos_delta[1],
-            sin_delta[1],
-            arm[1],
-            offset[1],
-            forearm_squared[1],
-            radial[1],
-            cosine[1, j],
-            sine[1, j],
-        )
-        g20, g21, g22, h2 = _leg_row(
-            x,
-            y,
-            z,
-            cx[2],
-            cy[2],
-            cos_delta[2],
-            sin_delta[2],
-            arm[2],
-            offset[2],
-            forearm_squared[2],
-            radial[2],
-            cosine[2, j],
-            sine[2, j],
-        )
+        g00, g01, g02, h0 = _leg_row(x, y, z, first, cosine[0, j], sine[0, j])
+        g10, g11, g12, h1 = _leg_row(x, y, z, second, cosine[1, j], sine[1, j])
+        g20, g21, g22, h2 = _leg_row(x, y, z, third, cosine[2, j], sine[2, j])
         c0 = g11 * g22 - g12 * g21
         c1 = g12 * g20 - g10 * g22
         c2 = g10 * g21 - g11 * g20
@@ -85,34 +41,36 @@ def _newton_step(legs, turn, cosine, sine, position, step_squared):
         step_squared[j] = dx * dx + dy * dy + dz * dz
 
 
+# not contracted: a square that is rounded by itself gives the same bits wherever the legs come from
+@numba.njit(cache=True, error_model="numpy")
+def _leg(legs, turn, k):
+    """Numbers of one leg that stay over the points: azimuth and drive as cosines and sines, lengths."""
+    angle, forearm = legs[k, 0], legs[k, 3]
+    lengths = legs[k, 1], legs[k, 2], forearm * forearm, legs[k, 4]
+    return turn[0, k], turn[1, k], np.cos(angle), np.sin(angle), lengths
+
+
 @numba.njit(inline="always", error_model="numpy", fastmath={"contract"})
-def _leg_row(x, y, z, cx, cy, cos_delta, sin_delta, arm, offset, forearm_squared, radial, cosine, sine):
+def _leg_row(x, y, z, leg, cosine, sine):
     """Half the closure's gradient with respect to x, y, z and half the closure itself, for one leg at one point."""
+    cx, cy, cos_delta, sin_delta, (arm, offset, forearm_squared, radial) = leg
     v = cx * y - cy * x
     s = np.sqrt(forearm_squared - v * v)
     rho = offset + s
     big_x = cx * x + cy * y + radial - arm * (cosine * cos_delta - sine * sin_delta)
     big_z = z - arm * (sine * cos_delta + cosine * sin_delta)
     side = rho * v / s
-    return (
-        big_x * cx - side * cy,
-        big_x * cy + side * cx,
-        big_z,
-        0.5 * (big_x * big_x + big_z * big_z - rho * rho),
-    )
+    closure = 0.5 * (big_x * big_x + big_z * big_z - rho * rho)
+    return big_x * cx - side * cy, big_x * cy + side * cx, big_z, closure
 
 
-@_compiled
+@_part
 def _solve(legs, turn, cosine, sine, position, step_squared):
-    """Newton iteration of all points, in place, until the longest step is negligible; points that do not converge
-    become NaN.
-    """
+    """Newton on all points, in place, until the longest step is negligible; NaN where it does not converge."""
     n = position.shape[1]
     for iteration in range(_MOST_STEPS):
         _newton_step(legs, turn, cosine, sine, position, step_squared)
-        if iteration == 0:
-            continue
-        converged = True
+        converged = iteration > 0
         for j in range(n):
             # a NaN has left the reach and stays NaN; it must not keep the others iterating
             if step_squared[j] > _LAST_STEP_SQUARED:
@@ -121,7 +79,8 @@ def _solve(legs, turn, cosine, sine, position, step_squared):
             return
     for j in range(n):
         if step_squared[j] > _LAST_STEP_SQUARED:
-            position[:, j] = np.nan
+            for axis in range(3):
+                position[axis, j] = np.nan
 
 
 @_compiled
@@ -135,7 +94,9 @@ def forward(legs, turn, cosine, sine, start):
     result = np.empty((m, 3, n))
     step_squared = np.empty(n)
     for k in range(m):
-        result[k] = start
+        for axis in range(3):
+            for j in range(n):
+                result[k, axis, j] = start[axis, j]
         _solve(legs[k], turn, cosine, sine, result[k], step_squared)
     return result
 

@@ -71,19 +71,6 @@ def test_lengths_of_their_own_at_every_point_equal_one_robot_per_point(rich_pose
     np.testing.assert_array_equal(everywhere.position_mm, _solve(points, theta, grown[0]).position_mm)
 
 
-def test_closure_determinants_take_the_lengths_of_each_point(rich_poses):
-    points, theta = rich_poses
-    robot = Rrru3()
-    passive = robot.passive_angles(points, theta)
-    lengths = np.stack([_LENGTHS, _LENGTHS * 1.1])
-    none = np.zeros((3, 6, 6))
-    azimuth = np.array(robot.azimuth_rad)
-    both = SpatialGeometry(azimuth, lengths, none).closure_determinant(theta[:2], passive[:2])
-    for k in range(2):
-        alone = SpatialGeometry(azimuth, lengths[k], none).closure_determinant(theta[k : k + 1], passive[k : k + 1])
-        assert both[k] == alone[0]
-
-
 def test_turning_the_whole_base_turns_the_whole_robot(rich_poses):
     """The same small rotation of all three legs about the base's z axis turns the platform by it."""
     points, theta = rich_poses
