@@ -10,6 +10,7 @@ from rrru.errors import ConfigError
 from rrru.plant.virtual_robot import VirtualRobot
 
 _LEGS = (1, 2, 3)
+_OFFSETS = ("offset_first_mm", "offset_second_mm", "offset_third_mm")
 _GEOMETRY = {
     **{f"dtheta{k}": (-0.01, 0.01) for k in _LEGS},
     **{f"dL{link}": (-1.5, 1.5) for link in (1, 2, 3)},
@@ -25,9 +26,7 @@ SEARCH_BOUNDS = {
     "ratio": (0.5, 12.5),
     "side": (-1.0, 1.0),
     "wobble_mm": (0.2, 0.9),
-    "offset_first_mm": (15.0, 45.0),
-    "offset_second_mm": (15.0, 45.0),
-    "offset_third_mm": (15.0, 45.0),
+    **{name: (15.0, 45.0) for name in _OFFSETS},
     "centre_x_mm": (-560.0, 250.0),
     "centre_y_mm": (-200.0, 200.0),
     "radius_start_mm": (20.0, 420.0),
@@ -48,7 +47,6 @@ _SPIRAL = {
     "radius_mm": ("radius_start_mm", "radius_end_mm"),
     "z_mm": ("z_start_mm", "z_end_mm"),
 }
-_OFFSETS = ("offset_first_mm", "offset_second_mm", "offset_third_mm")
 
 
 @dataclass(frozen=True)

@@ -3,15 +3,7 @@
 import numpy as np
 
 from rrru.figures import choose, style
-from rrru.studies.rrru3.figures.along import (
-    before_and_after,
-    both_calibrations,
-    draw_along,
-    finish,
-    pass_note,
-    shade_near_singular,
-    tolerance,
-)
+from rrru.studies.rrru3.figures import panels
 
 _PATTERN = "line_*"
 
@@ -25,18 +17,18 @@ def fig09(tables, options):
     """
     name = choose.trajectories(tables["measurements"], _PATTERN, "fig09")[0]
     places = choose.stations(tables["measurements"], name)
-    curves = before_and_after(tables, options, "fig09")
+    curves = panels.before_and_after(tables, options, "fig09")
     figure = style.new(style.DOUBLE_MM, 105.0)
     plane, sizes = figure.subplots(2, 1, height_ratios=[0.8, 1.0])
     factor = _plane(plane, places, curves)
     plane.set_title(f"(a) {choose.trajectory_label(name)}: points, deviations magnified {factor:g} times")
     for curve in curves:
-        draw_along(sizes, curve, places)
-    tolerance(sizes)
-    shade_near_singular(sizes, places)
+        panels.draw_along(sizes, curve, places)
+    panels.tolerance(sizes)
+    panels.shade_near_singular(sizes, places)
     sizes.set(xlabel="point", ylabel="position error (mm)", ylim=(0.0, None))
-    sizes.set_title(f"(b) size of the error{pass_note(places)}")
-    finish(sizes, places)
+    sizes.set_title(f"(b) size of the error{panels.pass_note(places)}")
+    panels.finish(sizes, places)
     style.legend_above(figure, [plane, sizes])
     return figure
 
@@ -47,21 +39,21 @@ def fig10(tables, options):
     outer ones. The numbers are the smallest and largest error. Grey: points near a constraint singularity. Where a
     trajectory was passed more than once, curves are means over the passes, bands their range.
     """
-    curves = before_and_after(tables, options, "fig10")
+    curves = panels.before_and_after(tables, options, "fig10")
     names = choose.trajectories(tables["measurements"], _PATTERN, "fig10")
     inner, outer = names[:3], names[3:]
     columns = 4
     rows = 1 + -(-len(outer) // columns)
     figure = style.new(style.DOUBLE_MM, 46.0 * rows)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    panels = {**dict(zip(inner, grid[0], strict=False)), **dict(zip(outer, grid[1:].ravel(), strict=False))}
+    cells = {**dict(zip(inner, grid[0], strict=False)), **dict(zip(outer, grid[1:].ravel(), strict=False))}
     marks = {inner[0]: "(a) ", **({outer[0]: "(b) "} if outer else {})}
-    _error_panels(tables["measurements"], panels, curves, ("before", "after"), marks)
-    for axes in panels.values():
-        tolerance(axes)
-    _outer_labels(grid, panels)
+    _error_panels(tables["measurements"], cells, curves, ("before", "after"), marks)
+    for axes in cells.values():
+        panels.tolerance(axes)
+    _outer_labels(grid, cells)
     # the upper row always has an empty place at its end
-    style.legend_inside(grid[0, -1], panels.values())
+    style.legend_inside(grid[0, -1], cells.values())
     return figure
 
 
@@ -71,18 +63,18 @@ def fig12(tables, options):
     smallest and largest error. Grey: points near a constraint singularity. Where a trajectory was passed more than
     once, curves are means over the passes, bands their range.
     """
-    curves = both_calibrations(tables, options, "fig12")
+    curves = panels.both_calibrations(tables, options, "fig12")
     names = choose.trajectories(tables["measurements"], _PATTERN, "fig12")
     names = names[1:] or names
     columns = min(3, len(names))
     rows = -(-len(names) // columns)
     figure = style.new(style.DOUBLE_MM, 12.0 + 46.0 * rows)
     grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
-    panels = dict(zip(names, grid.ravel(), strict=False))
+    cells = dict(zip(names, grid.ravel(), strict=False))
     tags = (options["calibration_lines"], options["calibration_spiral"])
-    _error_panels(tables["measurements"], panels, curves, tags, {})
-    _outer_labels(grid, panels)
-    style.legend_above(figure, panels.values())
+    _error_panels(tables["measurements"], cells, curves, tags, {})
+    _outer_labels(grid, cells)
+    style.legend_above(figure, cells.values())
     return figure
 
 
@@ -107,26 +99,26 @@ def _plane(axes, places, curves):
     return factor
 
 
-def _error_panels(paths, panels, curves, tags, marks):
+def _error_panels(paths, cells, curves, tags, marks):
     """One panel per line with its curves and, in numbers behind their tags, their ranges."""
-    for name, axes in panels.items():
+    for name, axes in cells.items():
         places = choose.stations(paths, name)
-        ranges = [draw_along(axes, curve, places) for curve in curves]
-        shade_near_singular(axes, places)
-        axes.set_title(f"{marks.get(name, '')}{choose.trajectory_label(name)}{pass_note(places)}")
-        finish(axes, places)
+        ranges = [panels.draw_along(axes, curve, places) for curve in curves]
+        panels.shade_near_singular(axes, places)
+        axes.set_title(f"{marks.get(name, '')}{choose.trajectory_label(name)}{panels.pass_note(places)}")
+        panels.finish(axes, places)
         for row, (tag, (_, look, _), (low, high)) in enumerate(zip(tags, curves, ranges, strict=True)):
             text = f"{choose.trajectory_label(tag)} {style.number(low)} to {style.number(high)} mm"
             place = {"transform": axes.transAxes, "ha": "right", "va": "top", "in_layout": False}
             axes.text(0.97, 0.97 - 0.11 * row, text, fontsize=7.0, color=_dark(look["color"]), **place)
     # space for the numbers above the highest curve
-    top = max((axes.dataLim.y1 for axes in panels.values() if np.isfinite(axes.dataLim.y1)), default=1.0)
-    next(iter(panels.values())).set_ylim(0.0, 1.45 * top)
+    top = max((axes.dataLim.y1 for axes in cells.values() if np.isfinite(axes.dataLim.y1)), default=1.0)
+    next(iter(cells.values())).set_ylim(0.0, 1.45 * top)
 
 
-def _outer_labels(grid, panels):
+def _outer_labels(grid, cells):
     """Labels at the left and below the lowest used panel of each column; unused panels vanish."""
-    used = set(panels.values())
+    used = set(cells.values())
     for axes in set(grid.ravel()) - used:
         axes.set_axis_off()
     for row in grid:

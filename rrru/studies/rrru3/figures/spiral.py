@@ -4,14 +4,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from rrru.figures import choose, style
-from rrru.studies.rrru3.figures.along import (
-    both_calibrations,
-    draw_along,
-    finish,
-    pass_note,
-    shade_near_singular,
-    tolerance,
-)
+from rrru.studies.rrru3.figures import panels
 
 _AXES = "xyz"
 _COLUMNS = [f"error_{axis}_mm" for axis in _AXES]
@@ -25,7 +18,7 @@ def fig11(tables, options):
     """
     name = choose.trajectories(tables["measurements"], "*spiral*", "fig11")[0]
     places = choose.stations(tables["measurements"], name)
-    curves = both_calibrations(tables, options, "fig11")
+    curves = panels.both_calibrations(tables, options, "fig11")
     figure = style.new(style.DOUBLE_MM, 100.0)
     # a panel in space does not take part in the arrangement: it has its own place at the left
     figure.get_layout_engine().set(rect=(0.5, 0.0, 0.5, 1.0))
@@ -37,7 +30,7 @@ def fig11(tables, options):
     for row, axis in enumerate(_AXES):
         axes = first = figure.add_subplot(grid[row], sharex=first, sharey=first)
         _component(axes, places, curves, tags, axis)
-        axes.set_title(f"({'bcd'[row]}) {axis}{pass_note(places)}")
+        axes.set_title(f"({'bcd'[row]}) {axis}{panels.pass_note(places)}")
         axes.tick_params(labelbottom=row == len(_AXES) - 1)
     axes.set_xlabel("point")
     style.legend_above(figure, figure.axes)
@@ -73,13 +66,13 @@ def _path(axes, places, curves):
 
 def _component(axes, places, curves, tags, axis):
     """Error along one axis under each calibration, the ranges as numbers above the panel."""
-    ranges = [draw_along(axes, curve, places, f"error_{axis}_mm") for curve in curves]
+    ranges = [panels.draw_along(axes, curve, places, f"error_{axis}_mm") for curve in curves]
     texts = [
         f"{tag} {style.number(low)} to {style.number(high)}" for tag, (low, high) in zip(tags, ranges, strict=True)
     ]
     axes.set_title("; ".join(texts) + " mm", loc="right", fontsize=7.0)
     axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
-    tolerance(axes, (1.0, -1.0))
-    shade_near_singular(axes, places)
+    panels.tolerance(axes, (1.0, -1.0))
+    panels.shade_near_singular(axes, places)
     axes.set_ylabel(f"{axis} error (mm)")
-    finish(axes, places)
+    panels.finish(axes, places)
