@@ -1,16 +1,18 @@
 """Calibrations of one campaign, as frames: every set of trajectories by least squares and by least mean distance."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError, FitError
-from rrru.fit.least_squares import least_squares
+from rrru.fit.least_squares import Fit, least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
+from rrru.robots.protocol import Mechanism
 
 
 @dataclass(frozen=True)
@@ -23,12 +25,14 @@ class CalibrationSettings:
     use_near_singularity: bool = True
 
     @classmethod
-    def from_config(cls, section):
+    def from_config(cls, section: Mapping[str, Any]) -> Self:
         """From the configuration's `calibration` section."""
         return cls(**{entry.name: section[entry.name] for entry in fields(cls) if entry.name in section})
 
 
-def select(measurements, mechanism, patterns, use_near_singularity=True):
+def select(
+    measurements: pd.DataFrame, mechanism: Mechanism, patterns: Iterable[str], use_near_singularity: bool = True
+) -> Residuals | None:
     """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit."""
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if 3 * chosen.sum() < len(mechanism.parameters):
@@ -37,7 +41,9 @@ def select(measurements, mechanism, patterns, use_near_singularity=True):
     return Residuals(mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame))
 
 
-def fit_sets(measurements, mechanism, settings, noise_mm=None):
+def fit_sets(
+    measurements: pd.DataFrame, mechanism: Mechanism, settings: CalibrationSettings, noise_mm: float | None = None
+) -> dict[tuple[str, str], Fit]:
     """Fits {(set, method): Fit} of all sets of the CalibrationSettings that the campaign has points for.
 
     Raises ConfigError where no set matches.
@@ -57,12 +63,15 @@ def fit_sets(measurements, mechanism, settings, noise_mm=None):
     return fits
 
 
-def tables(campaign, fits, truth=None):
+def tables(
+    campaign: str, fits: Mapping[tuple[str, str], Fit], truth: Mapping[str, float] | None = None
+) -> dict[str, pd.DataFrame]:
     """Frames by table name: calibrations, parameters, correlations, observability.
 
     truth: the virtual robot's true deviations by the mechanism's names, or None where nobody knows them.
     """
-    frames = {name: [] for name in ("calibrations", "parameters", "correlations", "observability")}
+    names = ("calibrations", "parameters", "correlations", "observability")
+    frames: dict[str, list] = {name: [] for name in names}
     for (calibration, method), fit in fits.items():
         label = {"campaign": campaign, "calibration": calibration}
         parts = {"calibrations": _calibration_row(fit), "parameters": _parameter_rows(fit, method, truth or {})}
@@ -75,7 +84,7 @@ def tables(campaign, fits, truth=None):
     return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
-def _calibration_row(fit):
+def _calibration_row(fit: Fit) -> pd.DataFrame:
     """One row of `calibrations`."""
     ident, distance = fit.identifiability, np.linalg.norm(fit.residual_mm, axis=1)
     row = {
@@ -93,7 +102,7 @@ def _calibration_row(fit):
     return pd.DataFrame([row | {f"{key}_observability": value for key, value in ident.indices().items()}])
 
 
-def _parameter_rows(fit, method, truth):
+def _parameter_rows(fit: Fit, method: str, truth: Mapping[str, float]) -> pd.DataFrame:
     """Rows of `parameters`; standard errors belong to least squares only."""
     ident, parameters = fit.identifiability, fit.parameters
     stated = np.isfinite(fit.standard_errors) & (method == "least_squares")
@@ -110,7 +119,7 @@ def _parameter_rows(fit, method, truth):
     )
 
 
-def _correlation_rows(fit):
+def _correlation_rows(fit: Fit) -> pd.DataFrame:
     """Rows of `correlations`: every pair of parameters once."""
     names, matrix = np.array(fit.identifiability.names), fit.identifiability.correlations()
     second, first = np.tril_indices(len(names), -1)
@@ -119,7 +128,7 @@ def _correlation_rows(fit):
     )
 
 
-def _observability_rows(fit):
+def _observability_rows(fit: Fit) -> pd.DataFrame:
     """Rows of `observability`: how each direction of parameter space is seen, and what it is made of."""
     ident = fit.identifiability
     count, values = len(ident.names), ident.singular_values
@@ -136,7 +145,7 @@ def _observability_rows(fit):
     )
 
 
-def deviation_vector(parameters, calibration, method, mechanism):
+def deviation_vector(parameters: pd.DataFrame, calibration: str, method: str, mechanism: Mechanism) -> np.ndarray:
     """Deviations (p,) of one calibration out of a `parameters` frame; raises FitError where it is not there."""
     chosen = parameters[(parameters["calibration"] == calibration) & (parameters["method"] == method)]
     if chosen.empty:

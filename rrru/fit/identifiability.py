@@ -5,16 +5,19 @@ parameters are lengths and singular values compare. Indices O1 to O5 as in Jouba
 efficiency of five observability indices for robot calibration", Mechanism and Machine Theory 70, 2013.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+
+from rrru.robots.protocol import Mechanism
 
 # A direction whose singular value is smaller than this share of the largest is not seen: it would need millimetre data
 # true to nanometres.
 RANK_TOLERANCE = 1e-6
 
 
-def parameter_scale(mechanism):
+def parameter_scale(mechanism: Mechanism) -> np.ndarray:
     """Deviation (p,) that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm for angles."""
     return np.array([1.0 / mechanism.angle_arm_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
 
@@ -23,29 +26,29 @@ def parameter_scale(mechanism):
 class Identifiability:
     """Singular values (p,) in mm per mm, right singular vectors (p, p) row by row, rank and the scale they refer to."""
 
-    names: tuple
+    names: tuple[str, ...]
     scale: np.ndarray
     singular_values: np.ndarray
     directions: np.ndarray
     points: int
 
     @property
-    def rank(self):
+    def rank(self) -> int:
         """Number of parameter combinations that the points see."""
         return int((self.singular_values > RANK_TOLERANCE * self.singular_values[0]).sum())
 
     @property
-    def condition(self):
+    def condition(self) -> float:
         """Ratio of the largest to the smallest singular value; inf where the smallest is zero."""
         smallest = self.singular_values[-1]
         return float(self.singular_values[0] / smallest) if smallest > 0.0 else np.inf
 
     @property
-    def unseen(self):
+    def unseen(self) -> np.ndarray:
         """Flags (p,) of parameters that touch a direction which the points do not see."""
         return (self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8
 
-    def covariance(self, noise_mm):
+    def covariance(self, noise_mm: float) -> np.ndarray:
         """Covariance (p, p) of the parameters for noise of `noise_mm` per axis; inf variance for unseen parameters."""
         seen = slice(0, self.rank)
         half = self.directions[seen].T * self.scale[:, None] / self.singular_values[seen]
@@ -53,11 +56,11 @@ class Identifiability:
         result[self.unseen, self.unseen] = np.inf
         return result
 
-    def standard_errors(self, noise_mm):
+    def standard_errors(self, noise_mm: float) -> np.ndarray:
         """Standard errors (p,) for noise of `noise_mm` per axis; inf for unseen parameters."""
         return np.sqrt(np.diag(self.covariance(noise_mm)))
 
-    def robust_standard_errors(self, jacobian, influence, curvature):
+    def robust_standard_errors(self, jacobian: np.ndarray, influence: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """Standard errors (p,) of an M-estimate: A^-1 B A^-1, A = J' diag(curvature) J, B = J' diag(influence^2) J.
 
         jacobian: (n, 3, p); influence, curvature: (n, 3), first and second derivative of the loss by the residuals. Inf
@@ -72,14 +75,14 @@ class Identifiability:
         result[self.unseen] = np.inf
         return result
 
-    def correlations(self):
+    def correlations(self) -> np.ndarray:
         """Correlation matrix (p, p) of the estimates; NaN for unseen parameters."""
         covariance = self.covariance(1.0)
         deviation = np.sqrt(np.diag(covariance))
         with np.errstate(invalid="ignore"):
             return covariance / np.outer(deviation, deviation)
 
-    def indices(self):
+    def indices(self) -> dict[str, float]:
         """Observability indices O1 to O5 by name; 0 where a direction is not seen."""
         s = np.where(self.singular_values > RANK_TOLERANCE * self.singular_values[0], self.singular_values, 0.0)
         full = s[-1] > 0.0
@@ -92,12 +95,12 @@ class Identifiability:
         }
 
 
-def analyse(mechanism, jacobian):
+def analyse(mechanism: Mechanism, jacobian: np.ndarray) -> Identifiability:
     """Identifiability from the derivative (n, 3, p) of the positions with respect to the mechanism's parameters."""
     return analyse_columns(mechanism.parameters.names, parameter_scale(mechanism), jacobian)
 
 
-def analyse_columns(names, scale, jacobian):
+def analyse_columns(names: Iterable[str], scale: np.ndarray, jacobian: np.ndarray) -> Identifiability:
     """Identifiability of named parameters with scales (p,) from the positions' derivative (n, 3, p) by them."""
     flat = np.asarray(jacobian).reshape(-1, len(scale)) * scale
     # with at least as many rows as parameters the thin decomposition holds all directions

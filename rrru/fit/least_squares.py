@@ -1,13 +1,19 @@
 """Least squares on the residuals of a calibration, with everything that says how far to trust the answer."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import wraps
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
 from rrru.parameters import ParameterSet
+
+if TYPE_CHECKING:
+    from rrru.fit.residuals import Residuals
 
 # first and second derivative of scipy's loss functions rho(z), z the squared residual in units of the loss scale
 _DERIVATIVES = {
@@ -22,12 +28,12 @@ _DERIVATIVES = {
 LOSSES = tuple(_DERIVATIVES)
 
 
-def last_kept(method):
+def last_kept(method: Callable) -> Callable:
     """A method of deviations (p,) that keeps its last answer: a search wants slopes where it just wanted residuals."""
     name = f"_last_{method.__name__}"
 
     @wraps(method)
-    def kept(self, deviations):
+    def kept(self: Any, deviations: npt.ArrayLike) -> Any:
         asked = np.asarray(deviations, dtype=float).tobytes()
         if self.__dict__.get(name, (None,))[0] != asked:
             self.__dict__[name] = asked, method(self, deviations)
@@ -55,17 +61,19 @@ class Fit:
     evaluations: int
 
     @property
-    def rms_mm(self):
+    def rms_mm(self) -> float:
         """Root mean square of the distances."""
         return float(np.sqrt((self.residual_mm**2).sum(axis=1).mean()))
 
     @property
-    def mean_mm(self):
+    def mean_mm(self) -> float:
         """Mean distance: the objective of paper A."""
         return float(np.linalg.norm(self.residual_mm, axis=1).mean())
 
 
-def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
+def least_squares(
+    residuals: "Residuals", noise_mm: float | None = None, loss: str = "linear", loss_scale_mm: float = 0.1
+) -> Fit:
     """Fit within the parameters' bounds that minimises the sum of squares of the signed residuals; see `minimise`.
 
     noise_mm: known noise per axis; None estimates it from the residuals, and so does a value that the residuals clearly
@@ -76,7 +84,7 @@ def least_squares(residuals, noise_mm=None, loss="linear", loss_scale_mm=0.1):
     return make_fit(residuals, *minimise(residuals, loss, loss_scale_mm), noise_mm, loss, loss_scale_mm)
 
 
-def minimise(residuals, loss="linear", loss_scale_mm=0.1):
+def minimise(residuals: "Residuals", loss: str = "linear", loss_scale_mm: float = 0.1) -> tuple[np.ndarray, int]:
     """Deviations (p,) within the bounds of the least sum of squares, and how many evaluations the search took.
 
     loss: one of LOSSES, with the residual size `loss_scale_mm` at which a robust loss begins to bend. The search moves
@@ -107,7 +115,14 @@ def minimise(residuals, loss="linear", loss_scale_mm=0.1):
     return deviations, evaluations
 
 
-def _search(residuals, origin, directions, start, scale, **options):
+def _search(
+    residuals: "Residuals",
+    origin: np.ndarray | float,
+    directions: np.ndarray,
+    start: np.ndarray,
+    scale: np.ndarray,
+    **options: Any,
+) -> Any:
     """Scipy's result q (k,) of the least squares over deviations origin + directions (p, k) q, from a start (k,)."""
     from scipy import optimize
 
@@ -123,7 +138,14 @@ def _search(residuals, origin, directions, start, scale, **options):
     )
 
 
-def make_fit(residuals, deviations, evaluations, noise_mm=None, loss="linear", loss_scale_mm=0.1):
+def make_fit(
+    residuals: "Residuals",
+    deviations: np.ndarray,
+    evaluations: int,
+    noise_mm: float | None = None,
+    loss: str = "linear",
+    loss_scale_mm: float = 0.1,
+) -> Fit:
     """Fit of deviations (p,) that a search has come to; see `least_squares` for the other arguments."""
     mechanism, parameters = residuals.mechanism, residuals.mechanism.parameters
     residual, jacobian = residuals.residual(deviations), residuals.jacobian(deviations)
@@ -133,9 +155,10 @@ def make_fit(residuals, deviations, evaluations, noise_mm=None, loss="linear", l
     # the median absolute value of a standard normal number is 0.6745
     robust = loss != "linear"
     estimated = float(np.median(np.abs(residual)) / 0.6745 if robust else np.sqrt((residual**2).sum() / freedom))
+    noise, noise_from = estimated, "residuals"
     # three standard deviations of an estimated standard deviation
-    given = noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom))
-    noise, noise_from = (noise_mm, "given") if given else (estimated, "residuals")
+    if noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom)):
+        noise, noise_from = noise_mm, "given"
     standard_errors = np.full(len(deviations), np.nan)
     names, scale, jacobian = np.array(parameters.names)[free], parameter_scale(mechanism)[free], jacobian[..., free]
     reduced = analyse_columns(names, scale, jacobian)

@@ -1,19 +1,22 @@
 """Least mean distance: the optimum of paper A's objective, eq. (11), which its genetic algorithm searches."""
 
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import analyse, parameter_scale
-from rrru.fit.least_squares import make_fit
+from rrru.fit.least_squares import Fit, make_fit
+from rrru.fit.residuals import Residuals
 
 _OUT_OF_REACH_MM = 1e6
 _GRADIENT = 1e-9
 _SIMPLEX = {"maxfev": 20_000, "maxiter": 20_000, "xatol": 1e-8, "fatol": 1e-12, "adaptive": True}
 
 
-def least_mean_distance(residuals, start, noise_mm=None):
+def least_mean_distance(residuals: Residuals, start: npt.ArrayLike, noise_mm: float | None = None) -> Fit:
     """Fit within the parameters' bounds, near `start` (p,), that minimises the mean distance.
 
     Newton steps in a trust region with the exact gradient and the Hessian of the distances without the model's own
@@ -50,12 +53,12 @@ def least_mean_distance(residuals, start, noise_mm=None):
     return make_fit(residuals, deviations, evaluations, noise_mm)
 
 
-def _objective(residuals, start, directions):
+def _objective(residuals: Residuals, start: np.ndarray, directions: np.ndarray) -> tuple[Callable, Callable, Callable]:
     """Mean distance at start + directions q, its gradient and its Hessian, as functions of q."""
     rank = directions.shape[1]
 
     @lru_cache(maxsize=1)
-    def parts(key):
+    def parts(key: bytes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         deviations = start + directions @ np.frombuffer(key)
         residual = residuals.residual(deviations)
         if not np.isfinite(residual).all():
@@ -65,13 +68,13 @@ def _objective(residuals, start, directions):
         jacobian = residuals.jacobian(deviations) @ directions
         return distance, np.einsum("na,nap->np", residual / distance[:, None], jacobian), jacobian
 
-    def value(q):
+    def value(q: np.ndarray) -> float:
         return parts(q.tobytes())[0].mean()
 
-    def gradient(q):
+    def gradient(q: np.ndarray) -> np.ndarray:
         return parts(q.tobytes())[1].mean(axis=0)
 
-    def hessian(q):
+    def hessian(q: np.ndarray) -> np.ndarray:
         distance, along, jacobian = parts(q.tobytes())
         weighted = jacobian / np.sqrt(distance[: len(jacobian)])[:, None, None]
         flat, along = weighted.reshape(-1, rank), along / np.sqrt(distance)[:, None]
@@ -80,12 +83,12 @@ def _objective(residuals, start, directions):
     return value, gradient, hessian
 
 
-def _simplex(centre):
+def _simplex(centre: np.ndarray) -> np.ndarray:
     """Simplex (k + 1, k) about a point (k,) with edges of a hundredth of a millimetre's effect."""
     return np.vstack([centre, centre + 0.01 * np.eye(len(centre))])
 
 
-def _bounded(residuals, start):
+def _bounded(residuals: Residuals, start: np.ndarray) -> tuple[np.ndarray, int]:
     """Errors (p,) of least mean distance inside the bounds from a start (p,) inside them, and the evaluations."""
     from scipy import optimize
 
