@@ -1,6 +1,7 @@
 """The Delta's zero calibration by vision: what the camera sees, errors on the plane, and what the variants can tell."""
 
 import numpy as np
+import pandas as pd
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 
@@ -27,6 +28,7 @@ _DIFFERENTIAL = {"color": style.VERMILION, "marker": "o", "markerfacecolor": "wh
 _MEAN = {"color": style.BLUE, "marker": "s", "linestyle": "none"}
 _MAX = {"color": style.BLACK, "marker": "|", "markersize": 6.0, "linestyle": "none"}
 _DRAWS = {"color": style.BLUE, "alpha": 0.3, "linewidth": 4.5}
+_RANGE = {"color": "#bbbbbb", "linewidth": 0.9}
 _FOUND = {"color": style.ORANGE, "marker": "+", "markersize": 4.0, "linestyle": "none"}
 
 
@@ -52,51 +54,31 @@ def delta_images(tables, options):
 
 def _plate(axes, dots, first, poses, centres):
     """The dots that were seen, numbered in pitches, and the centres with magnified errors."""
-    pitch = _pitch(dots, centres)
+    pitch, dot = _pitch(dots, centres), {"marker": ".", "linestyle": "none", "markersize": 1.6}
     seen = dots.drop_duplicates(["column", "row"])
-    axes.plot(
-        pitch * seen["column"], pitch * seen["row"], ".", color="#bbbbbb", markersize=1.6, label="dot seen in any image"
-    )
-    axes.plot(
-        pitch * first["column"], pitch * first["row"], ".", color=style.ORANGE, markersize=1.6, label="dot seen in (a)"
-    )
+    for rows, colour, where in ((seen, "#bbbbbb", "any image"), (first, style.ORANGE, "(a)")):
+        axes.plot(pitch * rows["column"], pitch * rows["row"], color=colour, label=f"dot seen in {where}", **dot)
     place = centres[["centre_x_mm", "centre_y_mm"]].to_numpy()
     error = poses[["error_x_mm", "error_y_mm"]].to_numpy()
     factor = style.magnification(np.linalg.norm(error, axis=1), np.ptp(place, axis=0).max(), 0.12)
-    for plane, look in (
-        ("first", {"color": style.BLUE, "marker": "o"}),
-        ("second", {"color": style.BLACK, "marker": "^"}),
-    ):
+    arrows = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "width": 0.004}
+    for plane, colour, marker in (("first", style.BLUE, "o"), ("second", style.BLACK, "^")):
         rows = (centres["plane"] == plane).to_numpy()
         if rows.any():
-            axes.plot(
-                *place[rows].T,
-                linestyle="none",
-                markerfacecolor="white",
-                label=f"optical centre, {plane} height",
-                **look,
-            )
-            axes.quiver(
-                *place[rows].T,
-                *error[rows].T,
-                color=look["color"],
-                angles="xy",
-                scale_units="xy",
-                scale=1.0 / factor,
-                width=0.004,
-            )
+            look = {"color": colour, "marker": marker, "markerfacecolor": "white", "linestyle": "none"}
+            axes.plot(*place[rows].T, label=f"optical centre, {plane} height", **look)
+            axes.quiver(*place[rows].T, *error[rows].T, color=colour, **arrows)
     axes.set(xlabel="x of the target (mm)", ylabel="y of the target (mm)", aspect="equal")
     axes.set_title(f"(b) target; errors magnified {factor:g} times")
 
 
 def _pitch(dots, centres):
-    """Pitch of the dots in mm: what the optical centre moves over what the middle of the seen dots does, on the longest
-    way.
-    """
+    """Pitch of the dots in mm: the optical centre's longest way over that of the middle of the seen dots."""
     middle = dots.groupby("pose")[["column", "row"]].mean().to_numpy()
     place = centres.sort_values("pose")[["centre_x_mm", "centre_y_mm"]].to_numpy()
-    far = np.linalg.norm(place - place[0], axis=1).argmax()
-    return float(np.rint(np.linalg.norm(place[far] - place[0]) / np.linalg.norm(middle[far] - middle[0])))
+    way = np.linalg.norm(place - place[0], axis=1)
+    far = way.argmax()
+    return float(np.rint(way[far] / np.linalg.norm(middle[far] - middle[0])))
 
 
 @style.printed
@@ -106,11 +88,9 @@ def delta_errors(tables, options):
     error under every variant, and the range of the mean when plate, views and noise are drawn anew, (c) in the
     calibration frame, (d) in the frame of the robot's base.
     """
-    points, calibrations = (
-        _rows(tables, "delta_points", "delta_errors"),
-        _rows(tables, "delta_calibrations", "delta_errors"),
-    )
-    draws = _rows(tables, "delta_draws", "delta_errors").set_index("variant").reindex(calibrations["variant"])
+    names = ("delta_points", "delta_calibrations", "delta_draws")
+    points, calibrations, draws = (_rows(tables, name, "delta_errors") for name in names)
+    draws = draws.set_index("variant").reindex(calibrations["variant"])
     figure = style.new(style.DOUBLE_MM, 92.0 + 4.6 * len(calibrations))
     grid = figure.add_gridspec(2, 1, height_ratios=[78.0, 10.0 + 4.6 * len(calibrations)])
     upper, lower = grid[0].subgridspec(1, 2), grid[1].subgridspec(1, 2)
@@ -133,14 +113,11 @@ def _map(axes, rows, title):
     x, y, size = (rows[column].to_numpy() for column in ("command_x_mm", "command_y_mm", "error_mm"))
     flat = rows[["error_x_mm", "error_y_mm"]].to_numpy()
     factor = style.magnification(np.linalg.norm(flat, axis=1), np.ptp(x), 0.12)
-    side = np.sort(np.unique(x))
-    marks = axes.scatter(
-        x, y, c=size, s=46.0, marker="s", cmap=style.SEQUENTIAL, norm=Normalize(0.0, size.max()), linewidths=0.0
-    )
+    colour = {"c": size, "cmap": style.SEQUENTIAL, "norm": Normalize(0.0, size.max())}
+    marks = axes.scatter(x, y, s=46.0, marker="s", linewidths=0.0, **colour)
     axes.quiver(x, y, *flat.T, angles="xy", scale_units="xy", scale=1.0 / factor, width=0.003, color="black")
-    room = 0.08 * np.ptp(side)
-    axes.set(xlim=(side[0] - room, side[-1] + room), ylim=(side[0] - room, side[-1] + room), aspect="equal")
-    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    limits = x.min() - 0.08 * np.ptp(x), x.max() + 0.08 * np.ptp(x)
+    axes.set(xlim=limits, ylim=limits, aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
     axes.set_title(f"{title}\nmean {size.mean():.3f} mm, largest {size.max():.3f} mm")
     bar = axes.figure.colorbar(marks, ax=axes, location="bottom", aspect=40, fraction=0.05)
     bar.set_label(f"error (mm); arrows magnified {factor:g} times")
@@ -148,16 +125,25 @@ def _map(axes, rows, title):
 
 def _sizes(axes, calibrations, draws, frame, title):
     """Mean and largest error of every variant in a frame, and the mean's range over draws."""
-    rows = np.arange(len(calibrations))
+    rows, mean, largest = (
+        np.arange(len(calibrations)),
+        calibrations[f"{frame}_mean_mm"],
+        calibrations[f"{frame}_max_mm"],
+    )
     low, high = (draws[f"{frame}_mean_{side}_mm"].to_numpy() for side in ("low", "high"))
     axes.hlines(rows, low, high, **_DRAWS, label=f"mean in {draws['draws'].max():g} draws, 5 to 95 %")
-    axes.hlines(rows, calibrations[f"{frame}_mean_mm"], calibrations[f"{frame}_max_mm"], color="#bbbbbb", linewidth=0.9)
-    axes.plot(calibrations[f"{frame}_mean_mm"], rows, **_MEAN, label="mean")
-    axes.plot(calibrations[f"{frame}_max_mm"], rows, **_MAX, label="largest")
-    axes.set_yticks(rows, [_NAMES.get(name, name) for name in calibrations["variant"]])
-    right = max(calibrations[f"{frame}_max_mm"].max(), np.nanmax(high))
-    axes.set(xlim=(0.0, 1.08 * right), ylim=(len(rows) - 0.5, -0.5), xlabel="error on the plane (mm)")
+    axes.hlines(rows, mean, largest, **_RANGE)
+    axes.plot(mean, rows, **_MEAN, label="mean")
+    axes.plot(largest, rows, **_MAX, label="largest")
+    axes.set(xlim=(0.0, 1.08 * max(largest.max(), np.nanmax(high))), xlabel="error on the plane (mm)")
+    _name_rows(axes, calibrations["variant"], title)
     axes.set_ylabel("variant" if frame == "plane" else "")
+
+
+def _name_rows(axes, variants, title):
+    """A row per variant, the first one on top."""
+    axes.set_yticks(range(len(variants)), [_NAMES.get(name, name) for name in variants])
+    axes.set(ylim=(len(variants) - 0.5, -0.5))
     axes.tick_params(axis="y", length=0.0)
     axes.set_title(title)
     axes.grid(True, axis="x")
@@ -169,7 +155,7 @@ def delta_observability(tables, options):
     (differential). (a) Singular value. (b) Standard error. (c) Error per unknown length error of 1 mm.
     """
     rows = _rows(tables, "delta_observability", "delta_observability")
-    names = list(dict.fromkeys(rows["variant"]))
+    place, names = pd.factorize(rows["variant"])
     figure = style.new(style.DOUBLE_MM, 24.0 + 5.4 * len(names))
     panels = figure.subplots(1, 3, sharey=True)
     columns = {
@@ -177,28 +163,22 @@ def delta_observability(tables, options):
         "standard_error_rad": ("(b) uncertainty", "standard error (mrad)", 1e3),
         "per_length_rad_mm": ("(c) length errors", "error per length (mrad/mm)", 1e3),
     }
+    kinds = {"all drives alike (common)": ("common", _COMMON), "differential": ("differential", _DIFFERENTIAL)}
     for axes, (column, (title, label, factor)) in zip(panels, columns.items(), strict=True):
-        for place, name in enumerate(names):
-            part = rows[rows["variant"] == name]
-            axes.hlines(place, *(factor * part[column].agg(["min", "max"])), color="#bbbbbb", linewidth=0.9)
-            for kind, look in (("common", _COMMON), ("differential", _DIFFERENTIAL)):
-                values = factor * part.loc[part["kind"] == kind, column]
-                axes.plot(values, np.full(len(values), place), **look)
-        axes.set(ylim=(len(names) - 0.5, -0.5), xlabel=label)
+        values = factor * rows[column]
+        low, high = (values.groupby(place).agg(of) for of in ("min", "max"))
+        axes.hlines(low.index, low, high, **_RANGE)
+        for kind, look in kinds.values():
+            axes.plot(values[rows["kind"] == kind], place[rows["kind"] == kind], **look)
+        axes.set(xlabel=label)
         if column == "per_length_rad_mm":
             axes.set_xlim(left=0.0)
         else:
             axes.set_xscale("log")
             style.plain_log(axes.xaxis)
-        axes.tick_params(axis="y", length=0.0)
-        axes.set_title(title)
-        axes.grid(True, axis="x")
-    panels[0].set_yticks(range(len(names)), [_NAMES.get(name, name) for name in names])
+        _name_rows(axes, names, title)
     panels[0].set_ylabel("variant")
-    handles = [
-        Line2D([], [], **_COMMON, label="all drives alike (common)"),
-        Line2D([], [], **_DIFFERENTIAL, label="differential"),
-    ]
+    handles = [Line2D([], [], **look, label=label) for label, (_, look) in kinds.items()]
     figure.legend(handles=handles, loc="outside upper center", ncols=2)
     return figure
 
