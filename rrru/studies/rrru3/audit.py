@@ -1,6 +1,7 @@
 """Misprints and contradictions of paper A: what the printed form gives, and what an independent check gives."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -38,17 +39,22 @@ def _predicted(values, points):
     return _TIED.forward(_TIED.inverse(points), _TIED.parameters.vector(values), points) - points
 
 
+@cache
+def _read_both_ways():
+    """Errors (26, 3) on group 1 that Table 5 predicts, and Table 6 with its angles read in rad and in degrees."""
+    degrees = {name: np.radians(value) if name in ANGLES else value for name, value in TABLE_6.items()}
+    return tuple(_predicted(values, _line()) for values in (TABLE_5, TABLE_6, degrees))
+
+
 def _table_6(bound, take, measured):
     """Findings on the unit of Table 6's angles, from the smallest or the largest errors on group 1."""
-    degrees = {name: np.radians(value) if name in ANGLES else value for name, value in TABLE_6.items()}
-    lines, *spirals = (_predicted(values, _line()) for values in (TABLE_5, TABLE_6, degrees))
     table = ("Table 6", "drive angle errors in rad", "very likely degrees")
     yield Finding(
         *table,
         f"{bound} error predicted on group 1, read in rad and in deg; "
         f"Table 5 predicts {{2:.2f}}, measured {ERRORS_MM[measured]}",
         "mm",
-        lambda: tuple(take(np.linalg.norm(errors, axis=1)) for errors in (*spirals, lines)),
+        lambda: tuple(take(np.linalg.norm(_read_both_ways()[k], axis=1)) for k in (1, 2, 0)),
         lambda rad, degrees, table_5: abs(degrees - table_5) < abs(rad - table_5),
     )
     yield Finding(
@@ -56,7 +62,7 @@ def _table_6(bound, take, measured):
         f"{bound} difference between Tables 5 and 6 on group 1, in rad and in deg; "
         "'the spiral's calibration compensates the lines to 0.08-1.12 mm' needs about 1",
         "mm",
-        lambda: tuple(take(np.linalg.norm(lines - spiral, axis=1)) for spiral in spirals),
+        lambda: tuple(take(np.linalg.norm(_read_both_ways()[0] - _read_both_ways()[k], axis=1)) for k in (1, 2)),
         lambda rad, degrees: degrees < ERRORS_MM["lines_after_max"] < rad,
     )
 

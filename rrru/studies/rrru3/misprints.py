@@ -1,5 +1,7 @@
 """Misprinted equations of paper A, each evaluated at a pose: printed, corrected, and beside an independent check."""
 
+from functools import cache
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -8,8 +10,12 @@ from rrru.studies.paper import Finding, finding
 
 _ROBOT = Rrru3()
 _POSE = np.array([[-700.0, 60.0, 600.0]])
-_THETA = _ROBOT.inverse(_POSE)
-_ANGLE = _THETA[0, 0]
+
+
+@cache
+def _theta():
+    """Drive angles (3,) at the pose."""
+    return _ROBOT.inverse(_POSE)[0]
 
 
 def _half_turn(degrees):
@@ -19,24 +25,29 @@ def _half_turn(degrees):
 
 def _rotated():
     """Where theta11 turns a unit link to, (3,)."""
-    return Rotation.from_rotvec([0.0, 0.0, _ANGLE]).apply([1.0, 0.0, 0.0])
+    return Rotation.from_rotvec([0.0, 0.0, _theta()[0]]).apply([1.0, 0.0, 0.0])
 
 
 @finding("eq. (1), element (2,4)", "L c(theta)", "L s(theta)", "1", lambda c, y, s: abs(s - y) < 1e-12 < abs(c - y))
 def _unit_link():
     """Y of a unit link turned by theta11 about z."""
-    return np.cos(_ANGLE), _rotated()[1], np.sin(_ANGLE)
+    return np.cos(_theta()[0]), _rotated()[1], np.sin(_theta()[0])
 
 
 def _link(matrix, length):
     """Finding on the matrix of a link of a length in mm."""
+
+    def lengths():
+        angle = _theta()[0]
+        return np.hypot(length * angle, length * angle), np.hypot(length * np.cos(angle), length * _rotated()[1])
+
     return Finding(
         f"{matrix}, elements (1,4) and (2,4)",
         "L theta",
         "L c(theta), L s(theta)",
         f"length of the link of {matrix[1:]} turned by theta11",
         "mm",
-        lambda: (np.hypot(length * _ANGLE, length * _ANGLE), np.hypot(length * np.cos(_ANGLE), length * _rotated()[1])),
+        lengths,
         lambda printed, right: abs(right - length) < 1e-9 < abs(printed - length),
     )
 
@@ -79,9 +90,10 @@ def _roots_of_equation_6(point, sign):
 )
 def _equation_7():
     """Height that the three links of leg 1 span at (-700, 60, 600); it has to be 600."""
-    second, third = _ROBOT.passive_angles(_POSE, _THETA)[0, 0, :2]
-    sine = np.sin(_ANGLE + second)
-    return 400.0 * np.sin(_ANGLE) + np.array([sine, 100.0 * sine]) + 800.0 * np.cos(third) * sine
+    first = _theta()[0]
+    second, third = _ROBOT.passive_angles(_POSE, _theta()[None])[0, 0, :2]
+    sine = np.sin(first + second)
+    return 400.0 * np.sin(first) + np.array([sine, 100.0 * sine]) + 800.0 * np.cos(third) * sine
 
 
 @finding(
@@ -91,11 +103,11 @@ def _equation_8():
     """Left side at (-700, 60, 600) with the angles of the inverse; it has to be 0."""
     # its frame is the robot frame turned by pi about z: leg 3 points to +60 degrees; r = R, so c1 = L1 cos(theta31)
     x, y, z = _POSE[0] * [-1.0, -1.0, 1.0]
-    c1 = 400.0 * np.cos(_THETA[0, 2])
+    c1 = 400.0 * np.cos(_theta()[2])
     side = np.sqrt(3.0) * x - y
     links = 100.0**2 + 800.0**2 + 100.0 * np.sqrt(4.0 * 800.0**2 - side**2)
     flat = (x - c1 / 2.0) ** 2 + (y - np.sqrt(3.0) * c1 / 2.0) ** 2
-    return flat + (z - 400.0 * np.sin(_THETA[0, 1:])) ** 2 - links
+    return flat + (z - 400.0 * np.sin(_theta()[1:])) ** 2 - links
 
 
 EQUATIONS = (
