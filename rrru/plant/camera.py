@@ -1,15 +1,8 @@
-"""The real camera of paper C, 2.1: a dot target seen by a pinhole camera with lens distortion, blur, pixel noise and 8
-bits.
+"""The real camera of paper C, 2.1: a dot target seen by a pinhole camera with lens distortion, blur and pixel noise.
 
 Camera frame: x along the rows of pixels, y down the columns, z along the optical axis; the first pixel's centre is (0,
-0). A point (X, Y, Z) of it has the normalised coordinates x = X / Z, y = Y / Z, which the lens moves (Brown,
-"Close-range camera calibration", 1971) to
-
-    x_d = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2),   y_d = y (1 + k1 r^2 + k2 r^4) + p1 (r^2 + 2 y^2) + 2
-    p2 x y
-
-and the chip turns into pixels. The target's dots lie in the plane z = 0 of its own frame. Lengths in mm, greys 0 to
-255.
+0). The lens moves the normalised coordinates x = X / Z, y = Y / Z of a point as OpenCV's model does (Brown, Close-range
+camera calibration, 1971). The target's dots lie in the plane z = 0 of its own frame. Lengths in mm, greys 0 to 255.
 """
 
 from dataclasses import dataclass
@@ -30,8 +23,7 @@ _CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-7)
 
 @dataclass(frozen=True)
 class Target:
-    """A plate with columns x rows of dots; the first dot is the origin of its frame, x along the columns' numbers, y
-    along the rows'.
+    """A plate with columns x rows of dots, the first at its frame's origin; x along the columns' numbers, y the rows'.
 
     offsets_mm (rows, columns, 2): how far each dot lies off its place in the lattice.
     """
@@ -75,17 +67,16 @@ class Camera:
         """Where the optical axis meets the chip, (2,)."""
         return (np.array([self.width_px, self.height_px]) - 1.0) / 2.0 + self.centre_offset_px
 
+    @property
+    def matrix(self):
+        """Camera matrix (3, 3) in pixels."""
+        (x, y), focal = self.centre_px, self.focal_px
+        return np.array([[focal, 0.0, x], [0.0, focal, y], [0.0, 0.0, 1.0]])
+
     def project(self, points_mm):
         """Pixels (n, 2) of points (n, 3) of the camera frame."""
-        x, y = np.asarray(points_mm, dtype=float)[:, :2].T / np.asarray(points_mm, dtype=float)[:, 2]
-        k1, k2, p1, p2 = self.distortion
-        square = x**2 + y**2
-        radial = 1.0 + k1 * square + k2 * square**2
-        moved = [
-            x * radial + 2.0 * p1 * x * y + p2 * (square + 2.0 * x**2),
-            y * radial + p1 * (square + 2.0 * y**2) + 2.0 * p2 * x * y,
-        ]
-        return self.centre_px + self.focal_px * np.stack(moved, axis=-1)
+        points, still = np.asarray(points_mm, dtype=float), np.zeros(3)
+        return cv2.projectPoints(points, still, still, self.matrix, np.array(self.distortion))[0][:, 0]
 
     @cached_property
     def rays(self):
@@ -94,10 +85,7 @@ class Camera:
         across = (np.arange(self.width_px)[:, None] + offset).ravel()
         down = (np.arange(self.height_px)[:, None] + offset).ravel()
         pixels = np.stack(np.meshgrid(across, down), axis=-1).reshape(-1, 1, 2)
-        matrix = np.array(
-            [[self.focal_px, 0.0, self.centre_px[0]], [0.0, self.focal_px, self.centre_px[1]], [0.0, 0.0, 1.0]]
-        )
-        rays = cv2.undistortPoints(pixels, matrix, np.array(self.distortion), criteria=_CRITERIA)
+        rays = cv2.undistortPoints(pixels, self.matrix, np.array(self.distortion), criteria=_CRITERIA)
         return np.ascontiguousarray(rays.reshape(len(down), len(across), 2).transpose(2, 0, 1))
 
 

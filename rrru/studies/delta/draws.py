@@ -42,8 +42,7 @@ def seen_dots(view, rotation, translation_mm, noise_px=0.0, generator=None):
     pixel = camera.project(place)
     margin = (target.diameter_mm / 2.0 * camera.focal_px / place[:, 2] + _EDGE_PX)[:, None]
     whole = ((pixel >= margin) & (pixel <= np.array([camera.width_px, camera.height_px]) - 1.0 - margin)).all(axis=1)
-    (cx, cy), focal = camera.centre_px, camera.focal_px
-    model = vision.CameraModel(np.array([[focal, 0, cx], [0, focal, cy], [0, 0, 1.0]]), camera.distortion, 0.0)
+    model = vision.CameraModel(camera.matrix, camera.distortion, 0.0)
     lattice, turn = vision.Lattice(target.pitch_mm, target.diameter_mm), Rotation.from_matrix(rotation).as_rotvec()
     centre = pixel[whole] + model.centre_bias(number[whole], turn, translation_mm, lattice)
     if noise_px > 0.0:
