@@ -1,21 +1,37 @@
-"""Measurements of paper B's experiments."""
+"""Kinematics, singularities, backlash and repeatability of paper B's robot, and what its experiments measure."""
 
-from rrru.campaign.schemas import TABLES
+from rrru.campaign.schemas import TABLES as CAMPAIGN_TABLES
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.ptt3.bench import widths_mm
+from rrru.studies.ptt3 import bench
 from rrru.studies.ptt3.experiments import experiment, joined
+from rrru.studies.ptt3.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
-    """Write what the tracker sees in every experiment, and joint experiments as one campaign."""
-    backlash, measured, section = tables.read(inputs["backlash"]), {}, settings["ptt"]
+    """Write the tables of all that comes before the experiments, then what the tracker sees in every one of them."""
+    encoder, backlash = bench.backlash(settings)
+    frames = {
+        "ptt_kinematics": bench.kinematics(settings),
+        "ptt_singularity": bench.singularity(settings),
+        "ptt_encoder": encoder,
+        "ptt_backlash": backlash,
+        "ptt_repeatability": bench.repeatabilities(settings, backlash),
+    }
+    tables.write_all(TABLES, frames, outputs)
+    for name, frame in _measured(settings, backlash).items():
+        tables.write_all(CAMPAIGN_TABLES, {"slider_measurements": frame}, {"slider_measurements": outputs[name]})
+
+
+def _measured(settings, backlash):
+    """Measurements by experiment, and by name of experiments that are diagnosed together, as one campaign."""
+    section, measured = settings["ptt"], {}
     for name, own in section["experiments"].items():
-        measured[name], _ = experiment(settings, name, widths_mm(backlash, own["payload_kg"])).campaign.run()
+        widths = bench.widths_mm(backlash, own["payload_kg"])
+        measured[name], _ = experiment(settings, name, widths).campaign.run()
     for name, members in section["joint"].items():
         measured[name] = joined([measured[member] for member in members], section["motion"]["dwell_s"])
-    for name, frame in measured.items():
-        tables.write_all(TABLES, {"slider_measurements": frame}, {"slider_measurements": outputs[name]})
+    return measured
 
 
 if __name__ == "__main__":

@@ -101,14 +101,13 @@ def starts(experiment, starts_deg):
 
 
 def changes(experiment, radius_mm, height_mm, payload_kg):
-    """Changed tasks as (family, size, experiment, payload, direction): a curve wider or higher, backwards, loaded."""
+    """Changed tasks as (family, size, curve, payload, direction): wider or raised, backwards, under another payload."""
     curve, load = experiment.curve, experiment.payload_kg
-    low, high = curve.z_mm
     yield "none", 0.0, curve, load, False
     for size in radius_mm:
         yield "radius_mm", size, replace(curve, radius_mm=curve.radius_mm + size), load, False
     for size in height_mm:
-        yield "height_mm", size, replace(curve, z_mm=(low + size, high + size)), load, False
+        yield "height_mm", size, replace(curve, raised_mm=size), load, False
     yield "reverse", 0.0, curve, load, True
     for other in payload_kg:
         if other != load:

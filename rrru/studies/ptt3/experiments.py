@@ -20,13 +20,14 @@ from rrru.studies.ptt3.parts import campaign_section
 
 @dataclass(frozen=True)
 class Curve:
-    """The curve of eq. (18): one turn that rises evenly, and a run-up of some points before and after it."""
+    """The curve of eq. (18), raised: one turn that rises evenly, and a run-up of some points before and after it."""
 
     radius_mm: float
     z_mm: tuple[float, float]
     start_deg: float
     points: int
     run_up_points: int
+    raised_mm: float = 0.0
 
     @property
     def trajectories(self):
@@ -37,7 +38,7 @@ class Curve:
             "name": "curve",
             "centre_mm": (0.0, 0.0),
             "radius_mm": (self.radius_mm, self.radius_mm),
-            "z_mm": (low - rise, high + rise),
+            "z_mm": (low - rise + self.raised_mm, high + rise + self.raised_mm),
             "turns": 1.0 + 2.0 * share,
             "points": self.points + 2 * self.run_up_points,
             "start_deg": self.start_deg - 360.0 * share,
@@ -65,7 +66,7 @@ class Experiment:
     """One experiment: its campaign, its curve and motion, and what is learned from it how.
 
     model: the mechanism with the calibrated parameters; repeats: passes that a measured position is the mean of;
-    paper_spread: the paper's, its unit not printed.
+    network: None where nothing is learned; paper_spread: the paper's, its unit not printed.
     """
 
     campaign: setup.VirtualCampaign
@@ -122,7 +123,7 @@ def experiment(settings, name, widths_mm=(0.0, 0.0, 0.0), compensate=None):
         repeats=section["repeats"],
         payload_kg=own["payload_kg"],
         model=setup.mechanism(nominal(settings), section["parameters"]),
-        network=Network(**section["network"]),
+        network=Network(**section["network"]) if "network" in section else None,
         paper_spread=own["paper_spread"],
     )
 

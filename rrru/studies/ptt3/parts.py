@@ -30,7 +30,7 @@ def check(config):
 def campaign_section(settings, name):
     """What an entry of `campaigns` would say of an experiment, or of experiments that are diagnosed together."""
     section = settings["ptt"]
-    loads = [section["experiments"][member]["payload_kg"] for member in section["joint"].get(name, [name])]
+    loads = [section["experiments"][member]["payload_kg"] for member in section.get("joint", {}).get(name, [name])]
     return {
         "robot": "ptt3",
         "passes": [{"payload_kg": load, "reverse": False} for load in loads for _ in range(section["repeats"])],

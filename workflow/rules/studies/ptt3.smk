@@ -15,6 +15,9 @@ PTT_STUDY_TABLES = [
     "ptt_corrections",
     "ptt_extrapolation",
 ]
+# what every experiment is made of
+_MEASURED = ["seed", "robots.ptt3", "loads"]
+_MEASURED += [f"ptt.{key}" for key in ("curve", "motion", "repeats", "noise_mm", "parameters", "robot", "experiments")]
 _PTT = "rrru.studies.ptt3.figures"
 PTT_FIGURES = {
     "ptt_singularity": (f"{_PTT}.robot:ptt_singularity", ["ptt_singularity", "ptt_points"]),
@@ -37,28 +40,15 @@ PAPERS["B"] = {
 }
 
 
-rule ptt_bench:
-    output:
-        **named(PTT_BENCH_TABLES),
-    log:
-        f"{RESULTS}/logs/ptt_bench.log",
-    params:
-        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
-        code=code("ptt_bench"),
-    script:
-        "../../scripts/ptt_bench.py"
-
-
 # measured and, where experiments are diagnosed together, also as one campaign
 rule ptt_measure:
-    input:
-        backlash=table("ptt_backlash"),
     output:
+        **named(PTT_BENCH_TABLES),
         **{name: part("measurements", name) for name in (*PTT_EXPERIMENTS, *PTT_JOINT)},
     log:
         f"{RESULTS}/logs/ptt_measure.log",
     params:
-        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
+        settings=reads(*_MEASURED, "ptt.joint", "ptt.bench", "ptt.positions_mm"),
         code=code("ptt_measure"),
     script:
         "../../scripts/ptt_measure.py"
@@ -74,7 +64,7 @@ rule ptt_compensate:
     log:
         f"{RESULTS}/logs/ptt_compensate.log",
     params:
-        settings=reads("seed", "robots.ptt3", "loads", "ptt"),
+        settings=reads(*_MEASURED, "ptt.network", "ptt.extrapolation", "ptt.redraws", "ptt.starts_deg"),
         code=code("ptt_compensate"),
     script:
         "../../scripts/ptt_compensate.py"
