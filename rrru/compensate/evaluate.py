@@ -11,7 +11,9 @@ from rrru.fit.campaign_fit import deviation_vector
 GROUPS = {"all_lines": "line_*", "all": "*"}
 # the standard asks for 30 cycles; below three a spread says nothing
 _FEWEST_REPEATS = 3
-_ERROR = [f"error_{axis}_mm" for axis in "xyz"]
+_CALIBRATION = ["calibration", "method", "mode"]
+_ERROR = ["error_x_mm", "error_y_mm", "error_z_mm"]
+_TANGENT = ["tangent_x", "tangent_y", "tangent_z"]
 
 
 def under_calibrations(measurements, mechanism, parameters, drive=None):
@@ -62,66 +64,73 @@ def summarise(errors, measurements):
 
     errors: rows of `errors` of one campaign; besides every trajectory the groups "all_lines" and "all" are summed up.
     """
-    geometry = _path_geometry(measurements)
     names = measurements["trajectory"].unique().tolist()
     # a trajectory that is called as a group stands for itself
     groups = {group: [one for one in names if fnmatchcase(one, pattern)] for group, pattern in GROUPS.items()}
     groups = {name: [name] for name in names} | {name: groups[name] for name in groups if name not in names}
-    result = []
-    for key, part in errors.groupby(["calibration", "method", "mode"], sort=False):
-        label = dict(zip(("calibration", "method", "mode"), key, strict=True))
-        joined = part.merge(geometry, on=["run", "point"], how="left", validate="one_to_one")
+    joined = errors.merge(_path_geometry(measurements), on=["run", "point"], how="left", validate="many_to_one")
+    judged = _about_barycentres(joined.dropna(subset=_ERROR)).reindex(joined.index).to_numpy()
+    trajectory, result = joined["trajectory"].to_numpy(), []
+    for key, part in joined.groupby(_CALIBRATION, sort=False):
+        label, at = dict(zip(_CALIBRATION, key, strict=True)), part.index.to_numpy()
         for name, members in groups.items():
             if members:
-                chosen = joined[joined["trajectory"].isin(members)]
-                result.append(label | {"trajectory": name} | _sizes(chosen) | _iso_9283(chosen))
+                chosen = judged[at[np.isin(trajectory[at], members)]]
+                result.append(label | {"trajectory": name} | _statistics(chosen[np.isfinite(chosen[:, 0])]))
     return pd.DataFrame(result)
 
 
-def _sizes(part):
-    """Count, minimum, mean, RMS and maximum of the error's size; null where no point was measured."""
-    size = part["error_mm"].dropna().to_numpy()
-    known = size if size.size else np.array([np.nan])
-    numbers = (known.min(), known.mean(), np.sqrt((known**2).mean()), known.max())
-    return {"points": len(size), **dict(zip(("min_mm", "mean_mm", "rms_mm", "max_mm"), numbers, strict=True))}
-
-
 def _path_geometry(measurements):
-    """Per run and point: the commanded path's unit tangent (n, 3), the place as a key and the direction of motion."""
-    frame = measurements[["run", "point", "speed_mm_s", "payload_kg"]].reset_index(drop=True)
+    """Per run and point: the commanded path's unit tangent (n, 3) and the number of the station.
+
+    Points at one station are passed under the same conditions: trajectory, place, direction, speed and payload.
+    """
+    frame = measurements[["run", "point", "trajectory", "speed_mm_s", "payload_kg"]].reset_index(drop=True)
     position, tangent = rows.command(measurements), np.zeros((len(frame), 3))
     for run in frame.groupby("run", sort=False).indices.values():
         points = position[run]
         along = np.gradient(points, axis=0, edge_order=2) if len(run) > 2 else points[-1:] - points[:1]
         length = np.linalg.norm(along, axis=1, keepdims=True)
         tangent[run] = np.divide(along, length, out=np.zeros_like(along), where=length > 0.0)
-    columns = {f"tangent_{axis}": tangent[:, k] for k, axis in enumerate("xyz")}
-    columns |= {f"at_{axis}": position[:, k] for k, axis in enumerate("xyz")}
-    return frame.assign(**columns, direction=rows.direction(measurements))
+    keys = [frame["trajectory"], rows.direction(measurements), frame["speed_mm_s"], frame["payload_kg"], *position.T]
+    station = frame.groupby(keys, dropna=False, sort=False).ngroup()
+    return frame[["run", "point"]].assign(station=station, **dict(zip(_TANGENT, tangent.T, strict=True)))
 
 
-def _iso_9283(part):
-    """Accuracies after ISO 9283, from points passed `repeats` times under the same conditions, null without any.
+def _about_barycentres(known):
+    """What ISO 9283 compares, for every row with an error: its size, passes of its station, AP, AT and RP there.
 
-    pose_accuracy_mm: largest distance between commanded position and barycentre of the attained ones (AP).
-    path_accuracy_mm: the same across the path only (AT: the standard compares in the plane normal to the commanded
-    path). repeatability_mm: largest l + 3 S_l about the barycentre (RP), null with fewer than three repeats. In mode
-    "model" the model's position stands for the commanded one.
+    AP: distance between commanded position and barycentre of the attained ones. AT: the same across the path only (the
+    standard compares in the plane normal to the commanded path). RP: l + 3 S_l about the barycentre. In mode "model"
+    the model's position stands for the commanded one.
     """
-    part = part.dropna(subset=_ERROR).reset_index(drop=True)
-    if part.empty:
-        return {"repeats": 0, "pose_accuracy_mm": np.nan, "path_accuracy_mm": np.nan, "repeatability_mm": np.nan}
-    keys = ["trajectory", "direction", "speed_mm_s", "payload_kg", "at_x", "at_y", "at_z"]
-    groups = part.groupby(keys, dropna=False, sort=False)
-    barycentre = groups[_ERROR].transform("mean").to_numpy()
-    tangent = part[["tangent_x", "tangent_y", "tangent_z"]].to_numpy()
+    keys = [*_CALIBRATION, "station"]
+    stations, tangent = known.groupby(keys, sort=False), known[_TANGENT].to_numpy()
+    barycentre = stations[_ERROR].transform("mean").to_numpy()
     across = barycentre - (barycentre * tangent).sum(axis=1, keepdims=True) * tangent
-    distance = pd.Series(np.linalg.norm(part[_ERROR].to_numpy() - barycentre, axis=1))
-    distance, repeats = distance.groupby(groups.ngroup().to_numpy()), int(groups.size().min())
-    largest = (distance.mean() + 3.0 * distance.std(ddof=1)).max()
+    known = known.assign(off=np.linalg.norm(known[_ERROR].to_numpy() - barycentre, axis=1))
+    off = known.groupby(keys, sort=False)["off"]
+    return known[["error_mm"]].assign(
+        repeats=off.transform("size"),
+        pose=np.linalg.norm(barycentre, axis=1),
+        path=np.linalg.norm(across, axis=1),
+        scatter=off.transform("mean") + 3.0 * off.transform("std"),
+    )
+
+
+def _statistics(judged):
+    """Count, sizes and largest ISO 9283 numbers of rows (n, 5) of `_about_barycentres`, null where there is none."""
+    count = len(judged)
+    size, repeats, pose, path, scatter = (judged if count else np.full((1, 5), np.nan)).T
+    passes = int(repeats.min()) if count else 0
     return {
-        "repeats": repeats,
-        "pose_accuracy_mm": np.linalg.norm(barycentre, axis=1).max(),
-        "path_accuracy_mm": np.linalg.norm(across, axis=1).max(),
-        "repeatability_mm": largest if repeats >= _FEWEST_REPEATS else np.nan,
+        "points": count,
+        "min_mm": size.min(),
+        "mean_mm": size.mean(),
+        "rms_mm": np.sqrt((size**2).mean()),
+        "max_mm": size.max(),
+        "repeats": passes,
+        "pose_accuracy_mm": pose.max(),
+        "path_accuracy_mm": path.max(),
+        "repeatability_mm": scatter.max() if passes >= _FEWEST_REPEATS else np.nan,
     }
