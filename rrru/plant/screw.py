@@ -14,9 +14,7 @@ PASSES = ("forward_1", "reverse", "forward_2")
 
 @dataclass(frozen=True)
 class ScrewBench:
-    """turns of the motor per pass, lead of the screw in mm per turn, samples per turn, the encoder's noise (1 sigma)
-    and resolution in mm.
-    """
+    """Turns of the motor per pass, lead in mm per turn, samples per turn, the encoder's noise (1 sigma), resolution."""
 
     turns: int
     lead_mm: float
@@ -25,8 +23,7 @@ class ScrewBench:
     resolution_mm: float
 
     def path(self):
-        """Commanded travel (3 n + 1,) in mm from the start, and the pass (3 n + 1,) that each sample belongs to, 0 to
-        2.
+        """Commanded travel (3 n + 1,) in mm from the start, and each sample's pass (3 n + 1,), 0 to 2.
 
         All passes stop at the same places, so that readings can be compared one by one; the turning points belong to
         the pass that ends there.
@@ -38,11 +35,10 @@ class ScrewBench:
 
 
 def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
-    """Record of one slider: pass, commanded_mm and encoder_mm per sample, robot standing about `place_mm` (3,) under a
-    payload.
+    """Record of one slider, leg 1 to 3: pass, commanded_mm and encoder_mm per sample, under a payload.
 
-    The other two sliders stand still. The encoder sees the carriage, with all that the robot's effects do to its drive.
-    leg: 1 to 3. Raises UnreachableError where the travel leaves the reach.
+    The robot stands about `place_mm` (3,), the other two sliders stand still. The encoder sees the carriage, with all
+    that the robot's effects do to its drive. Raises UnreachableError where the travel leaves the reach.
     """
     mechanism, (travel, number) = robot.mechanism, bench.path()
     sliders = np.repeat(mechanism.require_reachable(np.reshape(place_mm, (1, 3))), len(travel), axis=0)

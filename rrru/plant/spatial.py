@@ -31,9 +31,7 @@ def into_frame(position_mm, frame):
 
 @dataclass(frozen=True)
 class SpatialSolution:
-    """Solved points: platform centre (n, 3), platform rotation vector (n, 3), closure residual (n,) in mm, converged
-    (n,).
-    """
+    """Solved points: platform centres (n, 3), rotation vectors (n, 3), closure residuals (n,) in mm, converged (n,)."""
 
     position_mm: np.ndarray
     rotation_rad: np.ndarray

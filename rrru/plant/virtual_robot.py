@@ -1,6 +1,4 @@
-"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside.
-Lengths mm, angles rad.
-"""
+"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside."""
 
 from dataclasses import dataclass, field
 
@@ -101,9 +99,7 @@ class VirtualRobot(DrivenRobot):
 
 
 def non_repeatability(generator, count):
-    """Points (count, 3) uniform in the unit ball: what clearance lets the platform do from stop to stop, bounded unlike
-    instrument noise.
-    """
+    """Points (count, 3) uniform in the unit ball: what clearance does from stop to stop, bounded unlike noise."""
     direction = generator.standard_normal((count, 3))
     radius = generator.random((count, 1)) ** (1.0 / 3.0)
     return radius * direction / np.linalg.norm(direction, axis=1, keepdims=True)

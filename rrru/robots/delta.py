@@ -68,7 +68,7 @@ class Delta(Tripod):
 
     @property
     def angle_arm_mm(self):
-        """Length that makes an angle error comparable with a length error."""
+        """Length that makes deviations of angles comparable with those of lengths."""
         return self.l1_mm
 
     @property

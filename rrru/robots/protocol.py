@@ -19,7 +19,7 @@ class Mechanism(Protocol):
     """A parallel robot as its controller believes it to be, with small deviations of its numbers.
 
     drive_unit: "rad" or "mm", unit of an actuator value; TRACKED: the set of parameters that measured positions
-    identify; angle_arm_mm: the length that makes an angle error comparable with a length error; lengths_mm (5,):
+    identify; angle_arm_mm: the length that makes angles comparable with lengths; lengths_mm (5,):
     nominal R, L1, L2, L3, r as effects count them, 0 for what a robot does not have.
     """
 

@@ -80,7 +80,7 @@ class Ptt3(Tripod):
 
     @property
     def angle_arm_mm(self):
-        """Length that makes an angle error comparable with a length error."""
+        """Length that makes deviations of angles comparable with those of lengths."""
         return self.R_mm
 
     @property

@@ -69,7 +69,7 @@ class Rrru3(ThreeLegs):
 
     @property
     def angle_arm_mm(self):
-        """Length that makes an angle error comparable with a length error."""
+        """Length that makes deviations of angles comparable with those of lengths."""
         return self.L1_mm
 
     @property
@@ -111,13 +111,12 @@ class Rrru3(ThreeLegs):
         return self.forward_batch(theta_rad, None if deviations is None else np.asarray(deviations)[None], guess_mm)[0]
 
     def forward_batch(self, theta_rad, deviations=None, guess_mm=None):
-        """Positions (m, n, 3) in mm of n drive-angle triples under m error vectors (m, p); see `forward`."""
+        """Positions (m, n, 3) in mm of n drive-angle triples under m vectors of deviations (m, p); see `forward`."""
         legs = self.legs(deviations) if deviations is not None else self.legs()[None]
         return self.forward_of_legs(theta_rad, legs, guess_mm)
 
     def first_guess(self, theta_rad):
-        """Positions (n, 3) in mm of the nominal robot if joints 2 and 3 stood at one point: the lower intersection of
-        three spheres.
+        """Positions (n, 3) in mm of the nominal robot if joints 2 and 3 stood at one point: where three spheres meet.
 
         With rho = L2 + L3 on every leg each closure is a sphere about the elbow, shifted by r - R. Where the spheres do
         not meet, the point nearest to all three is taken.
@@ -127,16 +126,15 @@ class Rrru3(ThreeLegs):
         radial = self.L1_mm * np.cos(theta) - (self.r_mm - self.R_mm)
         centre = np.stack([radial * cx, radial * cy, self.L1_mm * np.sin(theta)], axis=-1)
         first, second, third = centre[:, 0], centre[:, 1], centre[:, 2]
-        normal = np.cross(second - first, third - first)
+        b, c = second - first, third - first
+        normal = np.cross(b, c)
         area = np.linalg.norm(normal, axis=1, keepdims=True)
         # the circumcentre of the elbows is as far from each of them
-        b, c = second - first, third - first
-        to_circumcentre = np.cross((b**2).sum(1, keepdims=True) * c - (c**2).sum(1, keepdims=True) * b, normal) / (
-            2.0 * area**2
-        )
-        height = np.sqrt(np.maximum((self.L2_mm + self.L3_mm) ** 2 - (to_circumcentre**2).sum(1, keepdims=True), 0.0))
+        across = (b**2).sum(1, keepdims=True) * c - (c**2).sum(1, keepdims=True) * b
+        offset = np.cross(across, normal) / (2.0 * area**2)
+        height = np.sqrt(np.maximum((self.L2_mm + self.L3_mm) ** 2 - (offset**2).sum(1, keepdims=True), 0.0))
         down = np.where(normal[:, 2:] < 0.0, -1.0, 1.0)
-        return first + to_circumcentre + down * normal / area * height
+        return first + offset + down * normal / area * height
 
     def forward_of_legs(self, theta_rad, legs, guess_mm=None):
         """Positions (m, n, 3) in mm of drive angles (n, 3) under m sets of leg numbers (m, 3, 5)."""
@@ -162,25 +160,15 @@ class Rrru3(ThreeLegs):
         return big_x**2 + big_z**2 - rho**2
 
     def closure_jacobians(self, position_mm, theta_rad, deviations=None):
-        """Derivatives of the closures with respect to the position (n, 3, 3) in mm and to the legs' numbers (n, 3,
-        5).
-        """
+        """Derivatives of the closures by the position (n, 3, 3) in mm and by the legs' numbers (n, 3, 5)."""
         legs = self.legs(deviations)
         big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
         cx, cy = self.azimuth_cos_sin
         by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
         arm, forearm = legs[:, 1], legs[:, 3]
-        by_leg = 2.0 * np.stack(
-            [
-                arm * (big_x * np.sin(angle) - big_z * np.cos(angle)),
-                -(big_x * np.cos(angle) + big_z * np.sin(angle)),
-                -rho,
-                -rho * forearm / s,
-                big_x,
-            ],
-            axis=-1,
-        )
-        return by_position, by_leg
+        across = arm * (big_x * np.sin(angle) - big_z * np.cos(angle))
+        along = -(big_x * np.cos(angle) + big_z * np.sin(angle))
+        return by_position, 2.0 * np.stack([across, along, -rho, -rho * forearm / s, big_x], axis=-1)
 
     def passive_angles(self, position_mm, theta_rad, deviations=None):
         """Angles (n, 3 legs, 4) of joints 2 to 5 in rad; theta3 = arcsin(v / L3) keeps the sign that eq. (6) loses.

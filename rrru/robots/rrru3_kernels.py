@@ -103,10 +103,9 @@ def forward(legs, turn, cosine, sine, start):
 
 @_compiled
 def tripod_mean_distance(ends, radii, measured):
-    """Mean distance (m,) in mm between measured points (n, 3) and the lower intersections of three spheres; inf where
-    there are none.
+    """Mean distance (m,) in mm between measured points (n, 3) and `lower_intersection` of three spheres; inf without.
 
-    ends: (m, n, 3 spheres, 3) centres, radii: (m, 3), both in mm; as `rrru.robots.spheres.lower_intersection`.
+    ends: (m, n, 3 spheres, 3) centres, radii: (m, 3), both in mm.
     """
     m, n = ends.shape[0], ends.shape[1]
     result = np.empty(m)

@@ -1,7 +1,7 @@
 """How far a mechanism is from its two kinds of singularity.
 
 A locked drive lets leg i move the platform only across g_i, the unit gradient of its closure, and keeps it from turning
-about b_i, the mechanism's `couples`. The rows g_i make the translational measure, the rows b_i the constraint measure:
+about b_i, its constraint moment. The rows g_i make the translational measure, the rows b_i the constraint measure:
 each is the smallest singular value of a matrix of three unit rows, 0 at a singularity and 1 at best. The closures of a
 platform that only translates do not see the second kind.
 """
@@ -16,21 +16,17 @@ def leg_forces(mechanism, position_mm, actuators, deviations=None):
 
 
 def translational_measure(mechanism, position_mm, actuators, deviations=None):
-    """Smallest singular value (n,) of the three unit force directions; 0 where the platform can move with all drives
-    locked.
-    """
+    """Smallest singular value (n,) of the legs' forces; 0 where the platform can move with all drives locked."""
     return _smallest_singular_value(leg_forces(mechanism, position_mm, actuators, deviations))
 
 
 def constraint_measure(mechanism, position_mm, actuators, deviations=None):
-    """Smallest singular value (n,) of the three unit couple directions; 0 where the platform can turn with all drives
-    locked.
-    """
+    """Smallest singular value (n,) of the constraint moments; 0 where the platform can turn with all drives locked."""
     return _smallest_singular_value(mechanism.constraint_moments(position_mm, actuators, deviations))
 
 
 def constraint_determinant(mechanism, position_mm, actuators, deviations=None):
-    """Determinant (n,) of the couple directions; its sign changes across a constraint singularity."""
+    """Determinant (n,) of the constraint moments; its sign changes across a constraint singularity."""
     return np.linalg.det(mechanism.constraint_moments(position_mm, actuators, deviations))
 
 

@@ -1,13 +1,10 @@
-"""The point at given distances from three others: forward kinematics of every robot whose links end at one point of the
-platform.
-"""
+"""The point at given distances from three others: forward kinematics where all links end at one point."""
 
 import numpy as np
 
 
 def lower_intersection(centres_mm, radii_mm):
-    """Lower of the two points (..., 3) that three spheres share; z points up, NaN where they share none or neither is
-    lower.
+    """Lower, in z, of the two points (..., 3) that three spheres share; NaN where there is none.
 
     centres_mm: (..., 3 spheres, 3); radii_mm: broadcast to (..., 3). The two points mirror each other in the centres'
     plane. With u along the line of the first two centres, at the distance d, and v across it in their plane, where the

@@ -8,9 +8,7 @@ PLANES = {"xz": (0, 2, 1), "xy": (0, 1, 2)}
 
 
 def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
-    """Regular grid (n, 3) in a plane: "xz" at a y, or "xy" at a z; the ranges (low, high) are of the plane's first and
-    second axis.
-    """
+    """Regular grid (n, 3) in a plane, "xz" at a y or "xy" at a z; ranges (low, high) of its first and second axis."""
     first, second, fixed = PLANES[plane]
     grid_a, grid_b = np.meshgrid(
         np.arange(horizontal_mm[0], horizontal_mm[1] + 0.5 * step_mm, step_mm),
@@ -23,9 +21,7 @@ def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
 
 
 def measures(mechanism, points_mm):
-    """Reachable (n,), translational and constraint measure (n,) and constraint determinant (n,), NaN where out of
-    reach.
-    """
+    """Reachable (n,), translational and constraint measure (n,), constraint determinant (n,); NaN out of reach."""
     theta = mechanism.inverse(points_mm)
     # of the poses that these actuator values allow, the robot takes the one of its own assembly
     reachable = np.linalg.norm(mechanism.forward(theta, guess_mm=points_mm) - points_mm, axis=1) < 1e-6
