@@ -7,12 +7,13 @@ from matplotlib.colors import ListedColormap, Normalize
 from rrru.figures import style
 
 # axes of each view
-_VIEWS = {"top view": ("x", "y"), "side view": ("x", "z")}
+VIEWS = {"top view": ("x", "y"), "side view": ("x", "z")}
 # more arrows than this hide each other
 _MOST_ARROWS = 400
 # the largest arrow over the width of the view, and the size that the scale holds; single larger ones may stand out
 _ARROW_SHARE, _LARGEST_PERCENT = 0.08, 99.0
 _MARGIN = 0.03
+_ARROW = {"width": 0.0035, "headwidth": 3.5, "headlength": 4.0, "headaxislength": 3.5}
 _RING = {"color": style.VERMILION, "marker": "o", "markersize": 9.0, "markerfacecolor": "none", "markeredgewidth": 1.4}
 
 
@@ -23,12 +24,12 @@ def shades():
 
 def height_ratio(points, view):
     """Height over width of a view."""
-    low, high = _limits(points, _VIEWS[view])
+    low, high = _limits(points, VIEWS[view])
     return max((high[1] - low[1]) / (high[0] - low[0]), 0.3)
 
 
-def draw(views, points, worst, z_down=True):
-    """Draw both views into axes by name and return the arrows.
+def draw(panels, points, worst, z_down=True):
+    """Draw both views into axes by name; returns the arrows, and whether some are larger than the scale holds.
 
     points: rows of gap_points that are used, with `before_mm`; worst (3,); z_down: the robot frame's z points down.
     """
@@ -37,13 +38,12 @@ def draw(views, points, worst, z_down=True):
     span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz")
     factor = style.magnification(np.array([scale.vmax]), span, _ARROW_SHARE)
     shown = _thinned(points)
-    for name, axes in views.items():
-        arrows = _view(axes, points, shown, _VIEWS[name], scale, factor, z_down)
-        place = ["xyz".index(axis) for axis in _VIEWS[name]]
-        axes.plot(*worst[place], linestyle="none", zorder=6, **_RING)
-    views["top view"].tick_params(labelbottom=False)
-    views["side view"].set_xlabel("x (mm)")
-    views["top view"].set_title(f"(a) gap, magnified {factor:g} times; ring: worst spot")
+    for name, plane in VIEWS.items():
+        arrows = _view(panels[name], points, shown, plane, scale, factor, z_down)
+        panels[name].plot(*worst[["xyz".index(axis) for axis in plane]], linestyle="none", zorder=6, **_RING)
+    panels["top view"].tick_params(labelbottom=False)
+    panels["side view"].set_xlabel("x (mm)")
+    panels["top view"].set_title(f"(a) gap, magnified {factor:g} times; ring: worst spot")
     return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any())
 
 
@@ -52,22 +52,9 @@ def _view(axes, points, shown, plane, scale, factor, z_down):
     across, up = (f"command_{axis}_mm" for axis in plane)
     for _, run in points.groupby("run", sort=False):
         axes.plot(run[across], run[up], color="#cccccc", linewidth=0.5, zorder=1)
-    arrows = axes.quiver(
-        shown[across].to_numpy(),
-        shown[up].to_numpy(),
-        *(shown[f"before_{axis}_mm"].to_numpy() for axis in plane),
-        shown["before_mm"].to_numpy(),
-        angles="xy",
-        scale_units="xy",
-        scale=1.0 / factor,
-        cmap=shades(),
-        norm=scale,
-        width=0.0035,
-        headwidth=3.5,
-        headlength=4.0,
-        headaxislength=3.5,
-        zorder=3,
-    )
+    columns = (across, up, *(f"before_{axis}_mm" for axis in plane), "before_mm")
+    size = {"angles": "xy", "scale_units": "xy", "scale": 1.0 / factor, "cmap": shades(), "norm": scale}
+    arrows = axes.quiver(*shown[list(columns)].to_numpy().T, **size, **_ARROW, zorder=3)
     low, high = _limits(points, plane)
     # the views share x, so that what is left of a panel's height widens y
     axes.update_datalim([low, high])
@@ -81,11 +68,11 @@ def _view(axes, points, shown, plane, scale, factor, z_down):
 
 
 def _limits(points, plane):
-    """Lower and upper corner (2,) of a view, with room for the arrows."""
+    """Lower and upper corner (2,) of a view, with a margin for the arrows."""
     place = points[[f"command_{axis}_mm" for axis in plane]].to_numpy(dtype=float)
     span = max(np.ptp(points[f"command_{axis}_mm"]) for axis in "xyz") if len(points) else 1.0
-    room = (_MARGIN + _ARROW_SHARE) * max(span, 1.0)
-    return (place.min(axis=0) - room, place.max(axis=0) + room) if len(place) else (np.zeros(2), np.ones(2))
+    margin = (_MARGIN + _ARROW_SHARE) * max(span, 1.0)
+    return (place.min(axis=0) - margin, place.max(axis=0) + margin) if len(place) else (np.zeros(2), np.ones(2))
 
 
 def _thinned(points):
