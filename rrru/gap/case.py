@@ -7,10 +7,11 @@ best one found. Lengths in mm, angles in rad.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs
-from rrru.effects.effect import Contribution
+from rrru.effects.effect import Contribution, Motion
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.unknown import UNKNOWN, unknown_functions
@@ -78,8 +79,8 @@ class Case:
     """
 
     mechanism: object
-    measurements: object
-    motion: object
+    measurements: pd.DataFrame
+    motion: Motion
     used: np.ndarray
     library: dict
     untestable: dict

@@ -1,8 +1,11 @@
 """The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from rrru.errors import FitError
 from rrru.gap.advise import advise
@@ -12,8 +15,9 @@ from rrru.gap.details import details_of
 from rrru.gap.locate import worst_spot
 from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
-from rrru.gap.verdict import decide
+from rrru.gap.verdict import Verdict, decide
 from rrru.robots.dynamics import Masses
+from rrru.robots.protocol import Mechanism
 from rrru.seeds import stream
 
 # fewer points fit any effect, and left-out ones are extrapolated
@@ -33,7 +37,7 @@ class MeasuredRobot:
     where it is to be estimated; campaign: name of the campaign, for its random stream.
     """
 
-    mechanism: object
+    mechanism: Mechanism
     masses: Masses = field(default_factory=Masses)
     noise_mm: float | None = None
     campaign: str = ""
@@ -45,18 +49,20 @@ class Diagnosis:
     corrected sim; attribution: everything that the search found.
     """
 
-    verdict: dict
-    tables: dict
+    verdict: dict[str, Any]
+    tables: dict[str, pd.DataFrame]
     state: State
     attribution: Attribution
 
 
-def sim(mechanism):
+def sim(mechanism: Any) -> Any:
     """The mechanism with bounds wide enough for a gap to show itself in the deviations."""
     return replace(mechanism, angle_limit_rad=_ANGLE_LIMIT_RAD, length_limit_mm=_LENGTH_LIMIT_MM)
 
 
-def diagnose(measurements, robot, settings=_DEFAULTS, details=True):
+def diagnose(
+    measurements: pd.DataFrame, robot: MeasuredRobot, settings: GapSettings = _DEFAULTS, details: bool = True
+) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
     details: also the tables that no verdict needs. Raises FitError where there are too few points to calibrate on.
@@ -83,7 +89,9 @@ def diagnose(measurements, robot, settings=_DEFAULTS, details=True):
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
-def _row(attribution, verdict, steps, worst_mm, further):
+def _row(
+    attribution: Attribution, verdict: Verdict, steps: Sequence, worst_mm: np.ndarray, further: pd.DataFrame
+) -> dict:
     """The row of `gap_verdicts` without the campaign."""
     case = attribution.case
     return {
@@ -104,7 +112,7 @@ def _row(attribution, verdict, steps, worst_mm, further):
     }
 
 
-def _decide(attribution):
+def _decide(attribution: Attribution) -> tuple[Verdict, Attribution, list]:
     """Verdict, the attribution fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
@@ -122,7 +130,7 @@ def _decide(attribution):
         attribution = attribution.believing(beliefs)
 
 
-def _gain(attribution, name):
+def _gain(attribution: Attribution, name: str) -> float:
     """Log predictive score that one effect of the hypothesis gains on left-out points over the others."""
     hypothesis, level = attribution.hypothesis, attribution.level
     others = tuple(term for term in hypothesis.terms if term.effect != name)

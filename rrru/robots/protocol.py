@@ -30,8 +30,8 @@ class Mechanism(Protocol):
     angle_arm_mm: float
     lengths_mm: Array
 
-    def inverse(self, position_mm: Array, deviations: Array | None = None) -> Array:
-        """Actuator values (n, k) for positions (n, 3); NaN where out of reach."""
+    def inverse(self, position_mm: Array, deviations: Array | None = None, elbow: str = "out") -> Array:
+        """Actuator values (n, k) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
 
     def forward(self, actuators: Array, deviations: Array | None = None, guess_mm: Array | None = None) -> Array:
         """Positions (n, 3) for actuator values (n, k); NaN where there is none near the guess."""

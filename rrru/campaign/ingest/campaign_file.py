@@ -1,9 +1,10 @@
 """Ingest of a measured campaign: an instrument's CSV or parquet file becomes a measurement table or is refused."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
@@ -18,6 +19,7 @@ from rrru.campaign.ingest.sheet import COMMAND, DRIVES, MEASURED, Sheet
 from rrru.campaign.ingest.text import looks_like, text_cells
 from rrru.campaign.measurements import command, measured, vector_columns
 from rrru.errors import ConfigError, FitError
+from rrru.robots.protocol import Mechanism
 
 _CHOICES = {
     "unit": tuple(MM),
@@ -47,7 +49,7 @@ class IngestSpec:
     extra_columns: str = "refuse"
     elbow: str = "out"
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
         given = {key: getattr(self, key) for key in _CHOICES}
         wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(_CHOICES[key])}" for key in _CHOICES]
@@ -65,7 +67,7 @@ class IngestSpec:
             raise ConfigError(f"ingest of {self.path}: {wrong[0]}")
 
     @classmethod
-    def from_config(cls, section):
+    def from_config(cls, section: Mapping[str, Any]) -> Self:
         """From a campaign's section of the configuration, whose key `ingest` is the path."""
         given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
         points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
@@ -81,7 +83,7 @@ class Ingested:
     registration: Registration | None
 
 
-def ingest(spec, mechanism):
+def ingest(spec: IngestSpec, mechanism: Mechanism) -> Ingested:
     """Measurement table of a file, for the robot that it was measured on.
 
     Positions are brought to mm and the robot frame, angles to rad; drive angles that the file lacks are those of the
@@ -111,7 +113,7 @@ def ingest(spec, mechanism):
     return Ingested(table, (*notes, *more), registration)
 
 
-def _read(spec, mechanism):
+def _read(spec: IngestSpec, mechanism: Mechanism) -> tuple[Sheet, list[str]]:
     """The file as a sheet with numbered runs and points, and what the user should know about its columns."""
     problems, notes = Problems(spec.path), []
     names, rows, cells = _cells(Path(spec.path), problems)
@@ -126,7 +128,7 @@ def _read(spec, mechanism):
     return sheet, notes + more + _notes_on_columns(sheet)
 
 
-def _cells(path, problems):
+def _cells(path: Path, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
     """Names of the file's columns, numbers of its rows, and {name: cells (n,)}."""
     suffix = path.suffix.lower()
     try:
@@ -147,7 +149,7 @@ def _cells(path, problems):
     return names, rows, dict(zip(names, zip(*cells, strict=True), strict=True))
 
 
-def _parquet_cells(data, problems):
+def _parquet_cells(data: bytes, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
     """As `_cells` for a parquet file's bytes; the columns that pandas adds for its index are left out."""
     import pyarrow
     import pyarrow.parquet
@@ -169,7 +171,7 @@ def _parquet_cells(data, problems):
     return names, list(range(1, table.num_rows + 1)), cells
 
 
-def _notes_on_columns(sheet):
+def _notes_on_columns(sheet: Sheet) -> list[str]:
     """What the user should know about columns that are not there or hold nothing."""
     notes, frame, found = [], sheet.frame, sheet.found
     for name in ("time_s", "speed_mm_s", "payload_kg"):
@@ -185,7 +187,7 @@ def _notes_on_columns(sheet):
     return notes
 
 
-def _register(sheet, digit_mm):
+def _register(sheet: Sheet, digit_mm: float) -> Registration:
     """Registration from the chosen points, without those that a first registration shows to be outliers."""
     frame = sheet.frame
     seen, target = measured(frame), command(frame)
@@ -214,7 +216,7 @@ def _register(sheet, digit_mm):
     return result
 
 
-def _off_as_mirrored(seen, target):
+def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
     """Residual in mm rms of measured positions (n, 3) that fit far better with an axis turned round, else 0."""
     try:
         straight, mirrored = (register(seen * [1.0, 1.0, sign], target).rms_mm for sign in (1.0, -1.0))
@@ -223,7 +225,7 @@ def _off_as_mirrored(seen, target):
     return straight if straight > 1.0 and mirrored < 0.2 * straight else 0.0
 
 
-def _outliers(frame, digit_mm):
+def _outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
     """Rows (n,) that a broken beam spoilt, positions being in the robot frame; digit_mm: last digit of the file."""
     target, run = command(frame), frame["run"].to_numpy()
     deviation = measured(frame) - target
@@ -231,7 +233,7 @@ def _outliers(frame, digit_mm):
     return marked & ~reproduced(marked, deviation, target, run)
 
 
-def _table(sheet, digit_mm):
+def _table(sheet: Sheet, digit_mm: float) -> tuple[pd.DataFrame, list[str]]:
     """Frame in the form of the schema of measurements, and notes on what is strange and on outliers."""
     frame, drives = sheet.frame, sheet.drives
     if not set(drives) <= set(frame):

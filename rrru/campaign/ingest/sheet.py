@@ -1,11 +1,13 @@
 """A measurement file on its way to a measurement table: what its columns mean and what is wrong with it so far."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.measurements import actuator_columns
+from rrru.robots.protocol import Mechanism
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
@@ -22,8 +24,8 @@ class Sheet:
     indexed by the row number, NaN where a cell has been noted.
     """
 
-    spec: object
-    mechanism: object
+    spec: Any
+    mechanism: Mechanism
     problems: Problems
     found: dict
     frame: pd.DataFrame
