@@ -110,6 +110,7 @@ def against_least_squares(runs, calibrations, parameters, truth):
     runs, calibrations, parameters: rows of `genetic`, `calibrations` and `parameters` of that campaign; truth: the true
     errors by identifiable name, or None where nobody knows them.
     """
+    units = dict(zip(parameters["parameter"], parameters["unit"], strict=True))
     result = []
     for calibration, part in runs.groupby("calibration", sort=False):
         optimum = part["optimum_mm"].iloc[0]
@@ -126,7 +127,7 @@ def against_least_squares(runs, calibrations, parameters, truth):
                     "worst_mean_mm": row.mean_mm,
                 }
                 | {"excess": _excess(row.mean_mm, optimum), "evaluations": float(row.evaluations)}
-                | _parameter_error(pd.DataFrame([found]), truth)
+                | _parameter_error(pd.DataFrame([found]), truth, units)
             )
         for method, column, more in (
             ("genetic", "objective_mm", 0),
@@ -143,7 +144,7 @@ def against_least_squares(runs, calibrations, parameters, truth):
                 }
                 | {"excess": _excess(middle, optimum), "evaluations": float((part["evaluations"] + more).median())}
                 | (
-                    _parameter_error(part, truth)
+                    _parameter_error(part, truth, units)
                     if method == "genetic"
                     else {"angle_error_rad": np.nan, "length_error_mm": np.nan}
                 )
@@ -156,13 +157,13 @@ def _excess(value, optimum):
     return value / optimum - 1.0 if optimum > 1e-9 else np.nan
 
 
-def _parameter_error(values, truth):
+def _parameter_error(values, truth, units):
     """RMS deviation of angles and lengths from the truth over all rows of a frame of identifiable parameters."""
     if truth is None:
         return {"angle_error_rad": np.nan, "length_error_mm": np.nan}
     error = {}
-    for key, angle in (("angle_error_rad", True), ("length_error_mm", False)):
-        names = [name for name in truth if name.startswith("dtheta") == angle]
+    for key, unit in (("angle_error_rad", "rad"), ("length_error_mm", "mm")):
+        names = [name for name in truth if units[name] == unit]
         # NaN where the legs of the real robot differ, so that there is no true value
         error[key] = float(np.sqrt(np.mean([(values[name] - truth[name]) ** 2 for name in names])))
     return error
