@@ -34,7 +34,7 @@ _CORNERS = 36
 
 @dataclass(frozen=True)
 class Lattice:
-    """A target as its maker states it: distance of neighbouring dots and their diameter."""
+    """A target as its maker states it: pitch and diameter of its dots."""
 
     pitch_mm: float
     diameter_mm: float
@@ -65,22 +65,16 @@ class CameraModel:
 
         The same bits as `cv2.projectPoints`, which always adds a Jacobian at six times the cost.
         """
-        shift_mm = np.ravel(shift_mm)
-        x, y, z = (
-            row[0] * plane_mm[0] + row[1] * plane_mm[1] + shift
-            for row, shift in zip(cv2.Rodrigues(turn)[0], shift_mm, strict=True)
-        )
+        places = zip(cv2.Rodrigues(turn)[0], np.ravel(shift_mm), strict=True)
+        x, y, z = (row[0] * plane_mm[0] + row[1] * plane_mm[1] + shift for row, shift in places)
         inverse = 1.0 / z
         x, y = x * inverse, y * inverse
-        k1, k2, p1, p2 = self.distortion
+        (k1, k2, p1, p2), ((fx, _, cx), (_, fy, cy), _) = self.distortion, self.matrix
         square, across = x * x + y * y, 2.0 * x * y
         radial = 1.0 + k1 * square + k2 * (square * square)
-        return np.stack(
-            [
-                (x * radial + p1 * across + p2 * (square + 2.0 * x * x)) * self.matrix[0, 0] + self.matrix[0, 2],
-                (y * radial + p1 * (square + 2.0 * y * y) + p2 * across) * self.matrix[1, 1] + self.matrix[1, 2],
-            ]
-        )
+        moved_x = x * radial + p1 * across + p2 * (square + 2.0 * x * x)
+        moved_y = y * radial + p1 * (square + 2.0 * y * y) + p2 * across
+        return np.stack([moved_x * fx + cx, moved_y * fy + cy])
 
     def centre_bias(self, number, turn, shift_mm, lattice):
         """Pixels (n, 2) from the image of each dot's centre to its image's centroid: a tilted circle's is off it.
@@ -182,9 +176,9 @@ def calibrate_camera(views, size_px, lattice):
     places = [lattice.places(view.number).astype(np.float32) for view in views]
 
     def fitted(centres):
-        centres = [centre.astype(np.float32) for centre in centres]
-        flags = {"flags": cv2.CALIB_FIX_K3}
-        rms, matrix, distortion, turns, shifts = cv2.calibrateCamera(places, centres, size_px, None, None, **flags)
+        single = [centre.astype(np.float32) for centre in centres]
+        fit = cv2.calibrateCamera(places, single, size_px, None, None, flags=cv2.CALIB_FIX_K3)
+        rms, matrix, distortion, turns, shifts = fit
         return CameraModel(matrix, distortion.ravel()[:4], float(rms)), zip(views, turns, shifts, strict=True)
 
     rough, poses = fitted([view.centre_px for view in views])

@@ -60,14 +60,14 @@ def without(result, reading):
 class Cause:
     """One possible cause of what a calibration leaves.
 
-    freedom: that it uses up. share: of the sum of squares left, that it explains, under the firmware's ratio of noises.
-    p: that noise would explain as much, the largest over the ratios; NaN without freedom. estimate, standard_error: in
-    `unit`, NaN but for causes with one number. imitated_by: names of causes that hold what it explains.
+    freedom_used: numbers that it adds. explained_share: of the sum of squares left, under the firmware's ratio of
+    noises. p: that noise would explain as much, the largest over the ratios; NaN without freedom. estimate,
+    standard_error: in `unit`, NaN but for causes with one number. imitated_by: causes that hold what it explains.
     """
 
-    name: str
-    freedom: int
-    share: float
+    cause: str
+    freedom_used: int
+    explained_share: float
     p: float
     estimate: float
     standard_error: float
@@ -115,16 +115,18 @@ def causes(result, left, level):
     # what imitates a cause that is seen cannot be ruled out either
     seen = [one for one in (first, *others) if one.verdict in (NOT_DECIDABLE, ONE_READING)]
     rivals = {name for one in seen for name in one.imitated_by}
-    return tuple(replace(one, verdict=NOT_DECIDABLE) if one.name in rivals else one for one in (first, *others))
+    return tuple(replace(one, verdict=NOT_DECIDABLE) if one.cause in rivals else one for one in (first, *others))
 
 
 def diagnosis(answers):
     """What the causes say together: causes, "none found", or "not decidable" with those that it could be."""
     if any(np.isnan(one.p) for one in answers):
         return NOT_DECIDABLE
-    bad = [one.name for one in answers if one.name == BAD_READING and one.verdict == FOUND]
-    rest = [one for one in answers if one.verdict != NOT_FOUND and one.name not in bad]
-    names = ", ".join(one.name + one.verdict.removeprefix(NOT_DECIDABLE) * (one.verdict == ONE_READING) for one in rest)
+    bad = [one.cause for one in answers if one.cause == BAD_READING and one.verdict == FOUND]
+    rest = [one for one in answers if one.verdict != NOT_FOUND and one.cause not in bad]
+    names = ", ".join(
+        one.cause + one.verdict.removeprefix(NOT_DECIDABLE) * (one.verdict == ONE_READING) for one in rest
+    )
     certain = len(rest) == 1 and rest[0].verdict == FOUND
     return "; ".join([*bad, *([names if certain else f"{NOT_DECIDABLE}: {names}"] if rest else [])]) or "none found"
 

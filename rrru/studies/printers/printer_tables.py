@@ -1,5 +1,7 @@
 """The calibration of printers as frames: one row per printer, number, reading and possible cause."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pandas as pd
 from scipy.sparse import csgraph
@@ -103,7 +105,7 @@ def _notes(result, answers, common, dense):
         yield f"arms as saved: heights alone would give their common length with {alone}"
     else:
         yield f"arms known to {result.half_widths[6:].max():.1f} mm (95 %)"
-    if any(one.name == "caliper_scale" and "caliper_offset" in one.imitated_by for one in answers):
+    if any(one.cause == "caliper_scale" and "caliper_offset" in one.imitated_by for one in answers):
         low, high = result.printer.distance_mm.min(), result.printer.distance_mm.max()
         alike = f"all distances are {low:.1f} to {high:.1f} mm"
         yield f"a scale error of the calipers cannot be told from an offset: {alike}"
@@ -139,21 +141,17 @@ def _decides(printer):
 def _parameter_rows(result):
     """Rows of `printer_parameters`, all nine numbers; what was not calibrated is NaN but for what was saved."""
     saved = np.concatenate([result.saved, result.printer.arm_mm])[: len(NAMES)]
-    calibrated = pd.DataFrame(
-        {
-            "fitted": result.fitted,
-            "difference": result.saved - result.fitted,
-            "stop": result.tolerance,
-            "standard_error": result.standard_errors,
-            "half_width_95": result.half_widths,
-            "agrees": result.agrees,
-        },
-        index=list(result.names),
-    )
-    rows = pd.DataFrame({"parameter": NAMES, "unit": UNITS, "saved": saved}, index=list(NAMES)).join(calibrated)
-    rows["calibrated"] = rows["fitted"].notna()
-    rows["agrees"] = rows["agrees"].ne(False)
-    return rows.assign(printer=result.printer.name)
+    calibrated = {
+        "fitted": result.fitted,
+        "difference": result.saved - result.fitted,
+        "stop": result.tolerance,
+        "standard_error": result.standard_errors,
+        "half_width_95": result.half_widths,
+        "agrees": result.agrees,
+    }
+    rows = pd.DataFrame({"parameter": NAMES, "unit": UNITS, "saved": saved}).join(pd.DataFrame(calibrated))
+    agrees = rows["agrees"].ne(False)
+    return rows.assign(printer=result.printer.name, calibrated=rows["fitted"].notna(), agrees=agrees)
 
 
 def _reading_rows(result, left, bad):
@@ -180,22 +178,10 @@ def _cause_rows(result, answers, level):
     """Rows of `printer_causes`."""
     tests, rows = CauseTests(result), []
     for one in answers:
-        limit = level.limit(tests, one.name)
-        hopeless = not _decides(result.printer) or tests.always_imitated(one.name, level.imitated_from)
+        limit = level.limit(tests, one.cause)
+        hopeless = not _decides(result.printer) or tests.always_imitated(one.cause, level.imitated_from)
+        detectable = np.nan if hopeless else tests.detectable_mm(one.cause, limit)
         rows.append(
-            {
-                "printer": result.printer.name,
-                "cause": one.name,
-                "freedom_used": one.freedom,
-                "explained_share": one.share,
-                "p": one.p,
-                "estimate": one.estimate,
-                "standard_error": one.standard_error,
-                "unit": one.unit,
-                "limit": limit,
-                "detectable_mm": np.nan if hopeless else tests.detectable_mm(one.name, limit),
-                "imitated_by": ", ".join(one.imitated_by),
-                "verdict": one.verdict,
-            }
+            asdict(one) | {"limit": limit, "detectable_mm": detectable, "imitated_by": ", ".join(one.imitated_by)}
         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).assign(printer=result.printer.name)

@@ -69,4 +69,4 @@ def diagnosed(printer):
     result = printer_fit.fit_printer(printer, STEP)
     left = printer_causes.left_out(result)
     answers = printer_causes.causes(result, left, printer_causes.Level(SETTINGS["level"], SETTINGS["imitated_from"]))
-    return result, left, {one.name: one for one in answers}, printer_causes.diagnosis(answers)
+    return result, left, {one.cause: one for one in answers}, printer_causes.diagnosis(answers)

@@ -143,7 +143,9 @@ def test_seven_heights_decide_nothing(printer):
     assert result.freedom == 1 and diagnosis == "not decidable" and left.suspect is None and np.isnan(left.p).all()
     for name, one in answers.items():
         assert one.verdict == "not decidable" and set(one.imitated_by) == set(answers) - {name}
-    assert answers["tower_lean"].share == pytest.approx(1.0) and answers["arms"].share == pytest.approx(1.0)
+    assert answers["tower_lean"].explained_share == pytest.approx(1.0) and answers[
+        "arms"
+    ].explained_share == pytest.approx(1.0)
 
 
 def test_leaning_towers_are_found_with_distances_and_imitated_by_arms_in_heights():
