@@ -128,6 +128,10 @@ def test_a_users_own_effect_takes_part():
     assert without["effects"] == "unexplained"
 
 
+# where the answer is compared with itself the library need not be whole
+FEW = ("servo_lag", "backlash", "drive_compliance", "leg_asymmetry", "thermal_growth")
+
+
 @pytest.fixture(scope="module")
 def lagging():
     return measure((strong("servo_lag", 4.0),))
@@ -147,8 +151,9 @@ def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
 def test_angles_recomputed_from_the_commands_give_the_same_answer(lagging):
     """A file without drive angles gets those of the nominal inverse kinematics, which is what the controller sent."""
     theta = campaigns.ROBOT.inverse(lagging[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy())
-    again = diagnosed(lagging.assign(**{f"theta{k + 1}_rad": theta[:, k] for k in range(3)}))
-    verdict = diagnosed(lagging).verdict
+    settings = GapSettings(FEW, draws=20)
+    again = diagnosed(lagging.assign(**{f"theta{k + 1}_rad": theta[:, k] for k in range(3)}), settings=settings)
+    verdict = diagnosed(lagging, settings=settings).verdict
     numbers = [key for key, value in verdict.items() if isinstance(value, float)]
     assert {key: again.verdict[key] for key in numbers} == pytest.approx(
         {key: verdict[key] for key in numbers}, rel=1e-6, nan_ok=True
@@ -196,7 +201,7 @@ def test_an_unknown_noise_is_estimated_and_the_verdict_stays(name):
 
 def test_the_same_seed_gives_identical_tables_and_another_other_intervals(lagging):
     first, second, other = (
-        diagnosed(lagging, details=True, settings=GapSettings(draws=30, seed=seed)) for seed in (5, 5, 6)
+        diagnosed(lagging, details=True, settings=GapSettings(FEW, draws=30, seed=seed)) for seed in (5, 5, 6)
     )
     assert first.verdict == second.verdict and first.verdict["effects"] == other.verdict["effects"]
     for name in DETAILS:
