@@ -81,8 +81,8 @@ outlier                int    points with status outlier
 near_singularity       int    points with status near_singularity
 unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma
-noise_from             str    given: by the configuration; repeats: pooled over repeated points; residuals: from the
-    fit of all points {given, repeats, residuals}
+noise_from             str    given: by the configuration; repeats: pooled over repeated points; high_frequency: from
+    the residuals along the path of a fit of all points {given, repeats, high_frequency}
 platform_mass_kg       float? the real robot's platform, as given; null where it was not
 registration_rms_mm    float? residual of the frame registration; null where the frame was the robot's
 registration_max_mm    float? largest residual of the frame registration

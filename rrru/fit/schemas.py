@@ -17,8 +17,8 @@ mean_mm                float  mean distance: the paper's objective
 rms_mm                 float  root mean square distance
 max_mm                 float  largest distance
 noise_mm               float  noise per axis that the standard errors assume
-noise_from             str    given: by the configuration or from repeats, see campaigns; residuals: of this fit,
-    where nothing was given or more is left {given, residuals}
+noise_from             str    given: by the configuration or of the whole campaign, see campaigns; residuals: of
+    this fit, where more is left {given, residuals}
 rank                   int    parameter combinations that the points see, of 7
 condition              float  condition number of the scaled Jacobian (angles as arcs at the end of the drive arm)
 O1_observability       float  geometric mean of the singular values over sqrt(points)

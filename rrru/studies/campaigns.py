@@ -1,10 +1,10 @@
-"""What is told of one campaign before anything is fitted: its state, its singularities, its workspace. Lengths in mm."""
+"""What is told of one campaign before anything is fitted: state, singularities, workspace. Lengths in mm."""
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.noise import ENOUGH_REPEATS, repeat_noise
+from rrru.campaign.noise import estimate
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
@@ -16,19 +16,17 @@ _WORKSPACE_LINES = 130
 
 
 def noise(robot, measurements, given, use_near_singularity):
-    """Noise per axis in mm and where it is from: given, else from repeated points, else from the fit of all points.
+    """Noise per axis in mm and where it is from: given, else what a fit of all points leaves, or repeats, tell.
 
-    Raises ConfigError where none of these is possible.
+    See `rrru.campaign.noise.estimate`. Raises ConfigError where there are too few points.
     """
     if given is not None:
         return given, "given"
-    repeated, freedom = repeat_noise(measurements)
-    if freedom >= ENOUGH_REPEATS and repeated > 0.0:
-        return repeated, "repeats"
     residuals = select(measurements, robot, ["*"], use_near_singularity)
     if residuals is None:
         raise ConfigError("too few usable points to estimate noise_mm; give it")
-    return least_squares(residuals).noise_mm, "residuals"
+    fit, used = least_squares(residuals), rows.usable(measurements, use_near_singularity)
+    return estimate(measurements[used], fit.residual_mm, residuals.jacobian(fit.deviations))
 
 
 def with_singularities(robot, measurements, margin):

@@ -9,17 +9,20 @@ import pytest
 from scipy.fft import dct
 
 from rrru.campaign.noise import isolated
+from rrru.errors import ConfigError
 from rrru.gap import shrink
 from rrru.gap.attribute import calibrate, with_noise
 from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.heldout import HeldOut, resampled_rows
 from rrru.gap.terms import Term
+from rrru.studies import campaigns
 from tests.gap.campaigns import (
     EFFECTS,
     FORWARD,
     FULL,
     LINES,
     NOISE_MM,
+    SIM,
     SPIRAL,
     case_of,
     diagnosed,
@@ -161,6 +164,15 @@ def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
     estimated, source = with_noise(case, calibrate(case))
     upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
     assert source == "high_frequency" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
+
+
+def test_a_campaigns_own_noise_is_told_by_the_same_rule():
+    frame = measure((strong("servo_lag", 6.0),))
+    assert campaigns.noise(SIM, frame, 0.5, True) == (0.5, "given")
+    estimated, source = campaigns.noise(SIM, frame, None, True)
+    assert source == "high_frequency" and estimated == pytest.approx(NOISE_MM, rel=0.15)
+    with pytest.raises(ConfigError, match="too few"):
+        campaigns.noise(SIM, frame.head(2), None, True)
 
 
 def test_repeats_give_the_noise_where_they_are_clearly_quieter():

@@ -86,7 +86,7 @@ def test_a_user_campaign_is_added_by_an_overlay(results, tmp_path):
         errors["error_mm"][rows], same["error_mm"][(same["mode"] == "before").to_numpy()], atol=1e-5
     )
     info = pd.read_parquet(tmp_path / "build/minimal/campaigns/mine/campaigns.parquet").iloc[0]
-    assert info["noise_from"] in ("repeats", "residuals") and "theta" in info["notes"]
+    assert info["noise_from"] in ("repeats", "high_frequency") and "theta" in info["notes"]
 
 
 def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):

@@ -10,11 +10,9 @@ from rrru.studies import setup
 def main(settings, inputs, outputs):
     """Write the campaign's calibrations, parameters, correlations and observability."""
     nominal, info = settings["nominal"], tables.read(inputs["campaigns"]).iloc[0]
-    # noise known only from residuals is estimated anew by each fit
-    noise_mm = None if info["noise_from"] == "residuals" else info["noise_mm"]
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
-    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), calibration, noise_mm)
+    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), calibration, info["noise_mm"])
     truth = setup.true_deviations(nominal, settings["virtual"])
     tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
