@@ -108,7 +108,7 @@ def causes(result, left, level):
     first, others = _bad_reading(tests, left, level), _acting_on_all(tests, level)
     leader = min(others, key=lambda one: np.nan_to_num(one.p, nan=1.0))
     if first.p < limit and leader.p < first.p:
-        p = float(np.min(tests.p(BAD_READING, beside=tests.columns[leader.name][0])))
+        p = float(np.min(tests.p(BAD_READING, beside=tests.columns[leader.cause][0])))
         first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, limit))
     elif first.p < limit:
         others = _acting_on_all(CauseTests(without(result, left.suspect)), level)
