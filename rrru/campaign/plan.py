@@ -42,18 +42,13 @@ class Plan:
         Raises UnreachableError where a point is out of the mechanism's reach.
         """
         target, counts = self.targets(), [len(run.points_mm) for run in self.runs]
-        columns = {
-            "run": np.arange(1, len(self.runs) + 1),
-            "trajectory": [run.trajectory for run in self.runs],
-            "speed_mm_s": [run.speed_mm_s for run in self.runs],
-            "payload_kg": [run.payload_kg for run in self.runs],
-        }
-        table = pd.DataFrame(columns).loc[np.repeat(np.arange(len(counts)), counts)].reset_index(drop=True)
+        runs = [(k, run.trajectory, run.speed_mm_s, run.payload_kg) for k, run in enumerate(self.runs, start=1)]
+        told = pd.DataFrame(runs, columns=["run", "trajectory", "speed_mm_s", "payload_kg"])
+        table = told.loc[np.repeat(told.index, counts)].reset_index(drop=True)
+        table.insert(2, "point", np.concatenate([np.arange(1, count + 1) for count in counts]))
         values = mechanism.require_reachable(target)
         drives = dict(zip(actuator_columns(mechanism.drive_unit), values.T, strict=True))
-        point = np.concatenate([np.arange(1, count + 1) for count in counts])
-        table = table.assign(point=point, time_s=self.time_s(), **vector_columns("command", target), **drives)
-        return table[["run", "trajectory", "point", "time_s", *table.columns[6:], "speed_mm_s", "payload_kg"]]
+        return table.assign(time_s=self.time_s(), **vector_columns("command", target), **drives)
 
     def time_s(self):
         """Times (n,) of all sampled points since the campaign's start, the rests between the runs included."""

@@ -27,10 +27,8 @@ def cross(tables, options):
     single = sorted((name for name in present if name not in _GROUPS), key=choose.natural)
     columns = [*single, *(name for name in _GROUPS if name in present)]
     shown = pd.concat([before, after]).drop_duplicates(["calibration", "trajectory"], keep="last")
-    both = [
-        shown.pivot(index="calibration", columns="trajectory", values=size).reindex(rows)[columns].to_numpy(dtype=float)
-        for size in ("mean_mm", "max_mm")
-    ]
+    tables = (shown.pivot(index="calibration", columns="trajectory", values=size) for size in ("mean_mm", "max_mm"))
+    both = [table.reindex(rows)[columns].to_numpy(dtype=float) for table in tables]
     beside = len(columns) <= _SIDE_BY_SIDE
     height = 8.0 * len(rows) + 22.0
     figure = style.new(style.DOUBLE_MM, height + 22.0 if beside else 2.0 * height + 14.0)

@@ -17,6 +17,8 @@ _NEAR = {"color": style.VERMILION, "linestyle": "none", "marker": "o", "markersi
 _PATH = {"color": "black", "linewidth": 0.8}
 _MEASURES = {"translational_measure": "translational measure", "constraint_measure": "constraint measure"}
 
+_FIELDS = (*_MEASURES, "constraint_determinant")
+
 
 @style.printed
 def workspace(tables, options):
@@ -72,12 +74,9 @@ def _slice(rows, name):
         reached = position[reachable.loc[rows.index]]
         margin = 0.04 * np.ptp(reached) if len(reached) else np.inf
         rows = rows[position.between(reached.min() - margin, reached.max() + margin)] if len(reached) else rows
-    tables = {
-        field: rows.assign(value=rows[field].where(reachable)).pivot(
-            index=f"{up}_mm", columns=f"{across}_mm", values="value"
-        )
-        for field in (*_MEASURES, "constraint_determinant")
-    }
+    axes = {"index": f"{up}_mm", "columns": f"{across}_mm"}
+    rows = rows.assign(**{field: rows[field].where(reachable) for field in _FIELDS})
+    tables = {field: rows.pivot(**axes, values=field) for field in _FIELDS}
     fields = {field: table.to_numpy(dtype=float) for field, table in tables.items()}
     grid, place = tables["constraint_determinant"], f"{normal} = {rows[f'{normal}_mm'].iloc[0]:g} mm"
     return _Slice(across, up, grid.columns.to_numpy(), grid.index.to_numpy(), fields, place)

@@ -56,10 +56,8 @@ def fit_sets(
             fits[name, "least_squares"] = fit
             fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
-        present = ", ".join(measurements["trajectory"].unique())
-        raise ConfigError(
-            f"calibration.sets: no set matches the campaign's trajectories ({present}) with enough points"
-        )
+        present = f"the campaign's trajectories ({', '.join(measurements['trajectory'].unique())})"
+        raise ConfigError(f"calibration.sets: no set matches {present} with enough points")
     return fits
 
 
@@ -123,9 +121,8 @@ def _correlation_rows(fit: Fit) -> pd.DataFrame:
     """Rows of `correlations`: every pair of parameters once."""
     names, matrix = np.array(fit.identifiability.names), fit.identifiability.correlations()
     second, first = np.tril_indices(len(names), -1)
-    return pd.DataFrame(
-        {"parameter_a": names[first], "parameter_b": names[second], "correlation": matrix[second, first]}
-    )
+    columns = {"parameter_a": names[first], "parameter_b": names[second], "correlation": matrix[second, first]}
+    return pd.DataFrame(columns)
 
 
 def _observability_rows(fit: Fit) -> pd.DataFrame:

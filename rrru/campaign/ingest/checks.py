@@ -63,9 +63,8 @@ def _turns_back(command, change):
 def resolution(position):
     """Last digit of positions (n, 3) as the file has them: 0.001 for three decimals."""
     known = position[np.isfinite(position)]
-    return next(
-        (10.0**-d for d in range(7) if np.allclose(known, np.round(known, d), rtol=0.0, atol=1e-3 * 10.0**-d)), 1e-7
-    )
+    digits = (10.0**-d for d in range(7) if np.allclose(known, np.round(known, d), rtol=0.0, atol=1e-3 * 10.0**-d))
+    return next(digits, 1e-7)
 
 
 def check_runs(sheet, digit_mm):

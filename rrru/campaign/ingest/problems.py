@@ -20,15 +20,12 @@ class Problems:
 
     def add(self, kind, *, value, allowed, row=None, column=None):
         """Note a problem: data row from 1 or None, the file's column or None, its value there, what is allowed."""
-        self._by_kind[kind].append(
-            {
-                "file": self._file,
-                "row": None if row is None else int(row),
-                "column": None if column is None else _short(column),
-                "value": _short(value),
-                "allowed": _short(allowed),
-            }
-        )
+        texts = {
+            "column": None if column is None else _short(column),
+            "value": _short(value),
+            "allowed": _short(allowed),
+        }
+        self._by_kind[kind].append({"file": self._file, "row": None if row is None else int(row), **texts})
 
     def refuse(self):
         """Raise IngestError if there is any problem."""
