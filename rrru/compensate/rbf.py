@@ -116,6 +116,22 @@ def validation_mse(points_mm, targets, spread_mm, neurons, folds, new_share=ROUN
     return result
 
 
+@dataclass(frozen=True)
+class Choice:
+    """The best spread and number of neurons, and all cross-validated mean squared errors (s, neurons + 1)."""
+
+    spread_mm: float
+    neurons: int
+    validation_mse: np.ndarray
+
+
+def choose(points_mm, targets, spreads_mm, neurons, folds, new_share=ROUNDING):
+    """The Choice of least cross-validated error among spreads (s,), see `validation_mse`."""
+    curves = np.array([validation_mse(points_mm, targets, one, neurons, folds, new_share) for one in spreads_mm])
+    best, count = np.unravel_index(curves.argmin(), curves.shape)
+    return Choice(float(spreads_mm[best]), int(count), curves)
+
+
 def make_folds(count, folds, generator):
     """Fold numbers (count,) of equal share, at random."""
     return generator.permutation(np.arange(count) % folds)

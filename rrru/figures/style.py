@@ -84,11 +84,11 @@ def new(width_mm, height_mm):
     return figure
 
 
-def legend_above(figure, axes, columns=5):
-    """One legend above all panels, where it covers no data, in as few rows of `columns` as it takes."""
+def legend_above(figure, axes, columns=5, side="upper"):
+    """One legend above all panels, where it covers no data, in as few rows of `columns` as it takes; side: or lower."""
     entries = _entries(axes)
     rows = max(-(-len(entries) // columns), 1)
-    place = {"loc": "outside upper center", "ncols": max(-(-len(entries) // rows), 1), "columnspacing": 1.4}
+    place = {"loc": f"outside {side} center", "ncols": max(-(-len(entries) // rows), 1), "columnspacing": 1.4}
     figure.legend(entries.values(), entries.keys(), **place)
 
 

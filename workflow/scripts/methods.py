@@ -5,7 +5,7 @@ from rrru.genetic.settings import GeneticSettings
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.methods.compare import compare, measuring_time_s
-from rrru.studies.methods.learners import Network
+from rrru.studies.methods.learners import Candidates
 from rrru.studies.methods.regions import trial
 from rrru.studies.methods.schemas import TABLES
 
@@ -15,7 +15,7 @@ def main(settings, inputs, outputs):
     one, offsets = trial(settings), None
     if inputs.get("calibrations"):
         offsets = _from_images(one, tables.read(inputs["calibrations"]), tables.read(inputs["poses"]))
-    network, genetic = Network(**settings["network"]), GeneticSettings.from_config(settings["genetic"])
+    network, genetic = Candidates(**settings["network"]), GeneticSettings.from_config(settings["genetic"])
     names = ("methods", "method_points", "method_timings")
     frames = dict(zip(names, compare(one, settings["points"], network, genetic, offsets), strict=True))
     tables.write_all(TABLES, {name: frame.assign(robot=one.name) for name, frame in frames.items()}, outputs)

@@ -56,7 +56,7 @@ class Judge:
             )
 
 
-def compare(trial, counts, network, genetic_settings, image_offsets=None):
+def compare(trial, counts, candidates, genetic_settings, image_offsets=None):
     """Frames of one robot, without its name: rows of `methods`, `method_points` and `method_timings`.
 
     counts: numbers of points to learn from; image_offsets: mapping with dtheta_rad (3,) found from images, poses and
@@ -65,9 +65,9 @@ def compare(trial, counts, network, genetic_settings, image_offsets=None):
     judge, mechanism = Judge(trial), trial.robot.mechanism
     for count in counts:
         plan = trial.plan(trial.train_mm[:count])
-        points = learners.Points.of(mechanism, trial.run(plan, "train")[0])
+        points = learners.measured_points(mechanism, trial.run(plan, "train")[0])
         seed = run_seed(trial.seed, "methods", trial.name, "genetic", count)
-        methods = learners.position_methods(points, network, genetic_settings, trial.generator, seed)
+        methods = learners.position_methods(points, candidates, genetic_settings, trial.generator, seed)
         for name, learn in methods.items():
             judge.judge(name, count, _duration_s(plan), judge.learn(name, count, learn))
     for test, plan in judge.plans.items():
@@ -94,7 +94,7 @@ def _step(judge, test):
     """The Jacobian's step on the targets of a test."""
     plan = judge.plans[test]
     measurements, _ = judge.trial.run(plan, f"{test} first")
-    points = learners.Points.of(judge.trial.robot.mechanism, measurements)
+    points = learners.measured_points(judge.trial.robot.mechanism, measurements)
     path, index = plan.path()
     # where a target was not measured nothing is known of its error
     index = index[rows.usable(measurements)]

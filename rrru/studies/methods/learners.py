@@ -4,12 +4,13 @@ Lengths in mm.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.compensate.rbf import fit, grow, make_folds, validation_mse
+from rrru.compensate.rbf import choose, fit, grow, make_folds
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 
@@ -38,7 +39,7 @@ class Learned:
 
 
 @dataclass(frozen=True)
-class Network:
+class Candidates:
     """How networks are chosen: folds of the cross-validation, most neurons, spreads in units of the points' spacing."""
 
     folds: int
@@ -46,64 +47,53 @@ class Network:
     spreads: tuple
 
 
-@dataclass(frozen=True)
-class Points:
-    """What was measured: mechanism and commanded, actuator and measured values (n, 3) each."""
-
-    mechanism: object
-    command_mm: np.ndarray
-    actuators: np.ndarray
-    measured_mm: np.ndarray
-
-    @classmethod
-    def of(cls, mechanism, measurements):
-        """The usable points of a measurement table."""
-        frame = measurements[rows.usable(measurements)]
-        return cls(mechanism, rows.command(frame), rows.actuators(frame), rows.measured(frame))
-
-    def residuals(self, parameter_set):
-        """Residuals of the points for a set of parameters."""
-        mechanism = replace(self.mechanism, parameter_set=parameter_set)
-        return Residuals(mechanism, self.actuators, self.measured_mm, self.command_mm)
+def measured_points(mechanism, measurements):
+    """Residuals of the usable points of a measurement table; methods choose what is fitted to them."""
+    frame = measurements[rows.usable(measurements)]
+    return Residuals(mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame))
 
 
-def _calibrated(residuals, result):
-    """What a search for deviations has learned."""
-    mechanism, deviations = residuals.mechanism, result.deviations
-    controller = lambda path: mechanism.inverse(path, deviations)  # noqa: E731
-    return Learned(controller, len(deviations), result.evaluations * len(residuals))
+def _with(points, parameter_set):
+    """The points with a set of parameters to fit."""
+    return replace(points, mechanism=replace(points.mechanism, parameter_set=parameter_set))
+
+
+def _calibrated(points, result):
+    """What a search for the deviations of the points' mechanism has learned."""
+    controller = partial(points.mechanism.inverse, deviations=result.deviations)
+    return Learned(controller, len(result.deviations), result.evaluations * len(points))
 
 
 def parameters(points, parameter_set):
     """Least squares of a set of parameters, their bounds those of the mechanism."""
-    residuals = points.residuals(parameter_set)
-    return _calibrated(residuals, least_squares(residuals))
+    points = _with(points, parameter_set)
+    return _calibrated(points, least_squares(points))
 
 
 def genetic(points, settings, seed):
     """The genetic algorithm with GeneticSettings on the parameters that tracked positions identify."""
     from rrru.genetic.algorithm import minimise
 
-    residuals = points.residuals(points.mechanism.TRACKED)
-    bounds = residuals.mechanism.parameters
-    return _calibrated(residuals, minimise(residuals.mean_distance, bounds.low, bounds.high, settings, seed))
+    points = _with(points, points.mechanism.TRACKED)
+    bounds = points.mechanism.parameters
+    return _calibrated(points, minimise(points.mean_distance, bounds.low, bounds.high, settings, seed))
 
 
-def rbf_map(points, network, generator):
+def rbf_map(points, candidates, generator):
     """A network for the position error, through the exact inverse kinematics (paper B, eq. 11)."""
-    answers, numbers = _trained(points.command_mm, points.measured_mm - points.command_mm, network, generator)
+    answers, numbers = _trained(points.start_mm, points.measured_mm - points.start_mm, candidates, generator)
     return Learned(lambda path: through_inverse(points.mechanism, path, answers(path)), numbers, 0)
 
 
-def rbf_after_parameters(points, network, generator):
+def rbf_after_parameters(points, candidates, generator):
     """Least squares first, then a network for what it leaves."""
-    residuals = points.residuals(points.mechanism.TRACKED)
-    found = least_squares(residuals)
-    answers, numbers = _trained(points.command_mm, residuals.residual(found.deviations), network, generator)
+    points = _with(points, points.mechanism.TRACKED)
+    found = least_squares(points)
+    answers, numbers = _trained(points.start_mm, points.residual(found.deviations), candidates, generator)
     return Learned(
-        lambda path: through_inverse(residuals.mechanism, path, answers(path), found.deviations),
+        lambda path: through_inverse(points.mechanism, path, answers(path), found.deviations),
         numbers + len(found.deviations),
-        found.evaluations * len(residuals),
+        found.evaluations * len(points),
     )
 
 
@@ -113,7 +103,7 @@ def jacobian_step(points, path_index):
     path_index (m,): rows of the targets in the path that the controller is given; between them the correction is
     interpolated.
     """
-    error = points.measured_mm - points.command_mm
+    error = points.measured_mm - points.start_mm
 
     def controller(path):
         along = np.stack([np.interp(np.arange(len(path)), path_index, error[:, axis]) for axis in range(3)], axis=-1)
@@ -125,10 +115,10 @@ def jacobian_step(points, path_index):
 def offsets(mechanism, values):
     """Drive offsets (3,) that another measurement has found."""
     zero = replace(mechanism, parameter_set="zero")
-    return Learned(lambda path: zero.inverse(path, np.asarray(values, dtype=float)), 3, 0)
+    return Learned(partial(zero.inverse, deviations=np.asarray(values, dtype=float)), 3, 0)
 
 
-def position_methods(points, network, genetic_settings, generator, seed):
+def position_methods(points, candidates, genetic_settings, generator, seed):
     """Every method that learns from measured positions, as functions without arguments, by name."""
     tracked, full = points.mechanism.TRACKED, FULL[points.mechanism.name]
     methods = {
@@ -136,20 +126,18 @@ def position_methods(points, network, genetic_settings, generator, seed):
         "least_squares": lambda: parameters(points, tracked),
         "least_squares_full": lambda: parameters(points, full),
         "genetic": lambda: genetic(points, genetic_settings, seed),
-        "rbf_map": lambda: rbf_map(points, network, generator("folds")),
-        "rbf_after_parameters": lambda: rbf_after_parameters(points, network, generator("folds")),
+        "rbf_map": lambda: rbf_map(points, candidates, generator("folds")),
+        "rbf_after_parameters": lambda: rbf_after_parameters(points, candidates, generator("folds")),
     }
     return {name: learn for name, learn in methods.items() if full != tracked or name != "least_squares_full"}
 
 
-def _trained(command_mm, targets, network, generator):
+def _trained(command_mm, targets, candidates, generator):
     """Network of the least cross-validated error, and the count of its weights and thresholds."""
-    folds = make_folds(len(command_mm), network.folds, generator)
+    folds = make_folds(len(command_mm), candidates.folds, generator)
     # candidates in units of the distance that evenly spread points have
     spacing = (np.prod(np.ptp(command_mm, axis=0)) / len(command_mm)) ** (1.0 / 3.0)
-    spreads = [share * spacing for share in network.spreads]
-    most = min(network.neurons, len(command_mm) - len(command_mm) // network.folds - 1)
-    curves = np.array([validation_mse(command_mm, targets, spread, most, folds) for spread in spreads])
-    best, neurons = np.unravel_index(curves.argmin(), curves.shape)
-    order = grow(command_mm, targets, spreads[best], int(neurons)).order
-    return fit(command_mm, targets, spreads[best], order), 3 * (len(order) + 1)
+    most = min(candidates.neurons, len(command_mm) - len(command_mm) // candidates.folds - 1)
+    choice = choose(command_mm, targets, [share * spacing for share in candidates.spreads], most, folds)
+    order = grow(command_mm, targets, choice.spread_mm, choice.neurons).order
+    return fit(command_mm, targets, choice.spread_mm, order), 3 * (len(order) + 1)

@@ -51,8 +51,8 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Network:
-    """A network's training points, most neurons, folds, least share that is new of a neuron, and candidate spreads."""
+class Lesson:
+    """What a network learns from and may be: its keys in the configuration's `ptt.network`."""
 
     train: int
     neurons: int
@@ -75,7 +75,7 @@ class Experiment:
     repeats: int
     payload_kg: float
     model: object
-    network: Network
+    network: Lesson
     paper_spread: float
 
     def plan(self, payload_kg=None, reverse=(False,)):
@@ -123,7 +123,7 @@ def experiment(settings, name, widths_mm=(0.0, 0.0, 0.0), compensate=None):
         repeats=section["repeats"],
         payload_kg=own["payload_kg"],
         model=setup.mechanism(nominal(settings), section["parameters"]),
-        network=Network(**section["network"]) if "network" in section else None,
+        network=Lesson(**section["network"]) if "network" in section else None,
         paper_spread=own["paper_spread"],
     )
 

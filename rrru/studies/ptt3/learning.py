@@ -11,10 +11,10 @@ import numpy as np
 from scipy.interpolate import RBFInterpolator
 
 from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.compensate.rbf import ROUNDING, fit, grow, make_folds, validation_mse
+from rrru.compensate.rbf import ROUNDING, choose, fit, grow, make_folds
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.studies.ptt3.experiments import Network
+from rrru.studies.ptt3.experiments import Lesson
 
 
 def relative(error_mm):
@@ -35,15 +35,6 @@ def remembered(function):
 
 
 @dataclass(frozen=True)
-class Choice:
-    """The best spread and number of neurons, and all cross-validated mean squared errors (s, neurons + 1)."""
-
-    spread_mm: float
-    neurons: int
-    validation_mse: np.ndarray
-
-
-@dataclass(frozen=True)
 class Learning:
     """One experiment's curve as measured, and what is learned from its training points.
 
@@ -57,7 +48,7 @@ class Learning:
     measured_mm: np.ndarray
     train: np.ndarray
     folds: np.ndarray
-    network: Network
+    network: Lesson
     paper_spread: float
 
     @property
@@ -73,11 +64,8 @@ class Learning:
 
     def choose(self, targets):
         """The candidate spread and the number of neurons with the least cross-validated error on targets (n, q)."""
-        points, wanted = self.command_mm[self.train], targets[self.train]
-        spreads, most, share = self.network.spreads_mm, self.network.neurons, self.network.new_share
-        curves = np.array([validation_mse(points, wanted, spread, most, self.folds, share) for spread in spreads])
-        best, neurons = np.unravel_index(curves.argmin(), curves.shape)
-        return Choice(float(spreads[best]), int(neurons), curves)
+        points, wanted, own = self.command_mm[self.train], targets[self.train], self.network
+        return choose(points, wanted, own.spreads_mm, own.neurons, self.folds, own.new_share)
 
     def trained(self, targets, spread_mm, neurons, new_share=None):
         """Network on the training points with targets (n, q); new_share: another than the configured one."""

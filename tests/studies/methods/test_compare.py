@@ -45,7 +45,7 @@ PTT3 = _COMMON | {
     "real": {"errors": {}, "effects": {}} | _LOADS,
     "region": {"centre_mm": [0.0, 0.0], "radius_mm": 80.0, "z_mm": [-275.0, -215.0], "noise_mm": 0.005},
 }
-NETWORK = learners.Network(folds=3, neurons=20, spreads=(2.0, 8.0))
+NETWORK = learners.Candidates(folds=3, neurons=20, spreads=(2.0, 8.0))
 GENETIC = GeneticSettings(generations=60)
 
 
