@@ -1,4 +1,4 @@
-"""All methods on all robots: what each leaves of the error, inside and outside its region, and what fewer points cost."""
+"""All methods on all robots: what each leaves of the error inside and outside its region, and with fewer points."""
 
 from matplotlib.ticker import LogLocator
 
