@@ -167,7 +167,7 @@ def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
 
 
 def test_a_campaigns_own_noise_is_told_by_the_same_rule():
-    frame = measure((strong("servo_lag", 6.0),))
+    frame = measure((strong("leg_asymmetry", 6.0),))
     assert campaigns.noise(SIM, frame, 0.5, True) == (0.5, "given")
     estimated, source = campaigns.noise(SIM, frame, None, True)
     assert source == "high_frequency" and estimated == pytest.approx(NOISE_MM, rel=0.15)
