@@ -45,22 +45,12 @@ def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
     sliders[:, leg - 1] += travel - 0.5 * travel.max()
     position = mechanism.forward(sliders)
     if not np.isfinite(position).all():
-        raise UnreachableError(
-            f"screw {leg}: {travel.max():g} mm of travel about {tuple(place_mm)} leave the reach; allowed: less"
-        )
-    still = np.zeros_like(position)
-    everywhere, unknown, payload = (
-        np.arange(len(travel)),
-        np.full(len(travel), np.nan),
-        np.full(len(travel), payload_kg),
-    )
-    course = Course(position, sliders, sliders, everywhere, unknown, still, still, payload)
+        path = f"{travel.max():g} mm of travel about {tuple(place_mm)}"
+        raise UnreachableError(f"screw {leg}: {path} leave the reach; allowed: less")
+    n, still = len(travel), np.zeros_like(position)
+    unknown, payload = np.full(n, np.nan), np.full(n, payload_kg)
+    course = Course(position, sliders, sliders, np.arange(n), unknown, still, still, payload)
     change = np.zeros_like(sliders) + together(robot.effects, make_motion(mechanism, robot.masses, course)).drive
     seen = (sliders + change)[:, leg - 1] + bench.noise_mm * generator.standard_normal(len(travel))
-    return pd.DataFrame(
-        {
-            "pass": np.array(PASSES)[number],
-            "commanded_mm": sliders[:, leg - 1],
-            "encoder_mm": np.round(seen / bench.resolution_mm) * bench.resolution_mm,
-        }
-    )
+    encoder = np.round(seen / bench.resolution_mm) * bench.resolution_mm
+    return pd.DataFrame({"pass": np.array(PASSES)[number], "commanded_mm": sliders[:, leg - 1], "encoder_mm": encoder})

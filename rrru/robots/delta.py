@@ -5,15 +5,13 @@ beta_i = -pi/6 + 2 pi (i-1)/3, so that Y points to the second drive axis (the sc
 mark). The calibration frame o-xyz has the same directions and its origin where the platform stands at zero drive
 angles, in the middle of the workspace:
 
-    r = a_i + l1 u_i + l2 w_i
-    (eq. 1) u_i = Rot(Z, beta_i - pi/2) Rot(x_i, -theta_i) e_2 = cos(theta_i) e_i - sin(theta_i) z
-    (eq. 2)
+    r = a_i + l1 u_i + l2 w_i                                                                       (eq. 1)
+    u_i = Rot(Z, beta_i - pi/2) Rot(x_i, -theta_i) e_2 = cos(theta_i) e_i - sin(theta_i) z          (eq. 2)
 
 with e_i the outward direction and |a_i| = a the base's radius less the platform's: the platform counts as a point.
 theta > 0 lowers the arm. To first order an error of the drives moves the platform by
 
-    w_i . dr = l1 w_i . (du_i / dtheta_i) dtheta_i,   dr = J dtheta
-    (eqs. 3-6)
+    w_i . dr = l1 w_i . (du_i / dtheta_i) dtheta_i,   dr = J dtheta                                 (eqs. 3-6)
 
 Of the scan's equations (1), (3) to (6) the text around them is left; they are rebuilt from it. Lengths in mm, angles in
 rad.

@@ -6,16 +6,15 @@ along the first rail, z UP. The rails rise outwards by the inclination gamma: 0 
 linear delta, whose carriages run upright. With the outward direction e_i, the slider position b_i along d_i and a = R -
 r,
 
-    E_i = a e_i + b_i d_i,   d_i = cos(gamma) e_i + sin(gamma) z,   |P - E_i|^2 = L^2
-    (eq. 1) b_i = -w_i . d_i + sqrt((w_i . d_i)^2 - |w_i|^2 + L^2),   w_i = a e_i - P
-    (eq. 2)
+    E_i = a e_i + b_i d_i,   d_i = cos(gamma) e_i + sin(gamma) z,   |P - E_i|^2 = L^2               (eq. 1)
+    b_i = -w_i . d_i + sqrt((w_i . d_i)^2 - |w_i|^2 + L^2),   w_i = a e_i - P                       (eq. 2)
 
 the root whose carriage stands outside of (gamma = 0) or above (upright) the platform. For gamma = 0, with the radial
 and tangential coordinates u, v of P, b_i = u_i - a + D_i, D_i = sqrt(L^2 - v_i^2 - Z^2), and J of db = J dp (eqs. 4,
 10) has the determinant
 
-    det J = -Z kappa / (D_1 D_2 D_3),   kappa = sum_i [ sqrt(3)/2 (D_j D_k + v_j v_k) + (v_k D_j - v_j D_k) / 2 ],  (i,
-    j, k) cyclic
+    det J = -Z kappa / (D_1 D_2 D_3),   (i, j, k) cyclic,
+    kappa = sum_i [ sqrt(3)/2 (D_j D_k + v_j v_k) + (v_k D_j - v_j D_k) / 2 ]
 
 # ASSUME The scan has lost eqs. (1) to (9) and Table 1; these are ours. R and r enter only as R - r, and along
 horizontal rails an error of R - r is a common one of the sliders. Lengths in mm, angles in rad.

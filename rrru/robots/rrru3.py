@@ -3,8 +3,8 @@
 Robot frame: origin at the centre of the static platform, z DOWN. Leg i stands at azimuth phi_i; with u the radial and v
 the tangential coordinate of the platform's centre in leg i,
 
-    X = u + r - R - L1 cos(theta),  Z = z - L1 sin(theta),  rho = L2 + sqrt(L3^2 - v^2),  X^2 + Z^2 - rho^2 = 0
-    (eq. 8)
+    X = u + r - R - L1 cos(theta),  Z = z - L1 sin(theta),  rho = L2 + sqrt(L3^2 - v^2),
+    X^2 + Z^2 - rho^2 = 0                                                                           (eq. 8)
 
 R and r enter only as r - R: of the 14 published errors, tied across the legs to 8, 7 can be identified. Lengths in mm,
 angles in rad.
