@@ -18,7 +18,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
-_DPI = 300
+_DPI = 200
 # characters in a line of a legend that stands in a panel's place
 _NARROW = 24
 
