@@ -1,19 +1,18 @@
-"""Causes of a gap that the library does not hold: what virtual robots get whose diagnosis has to be "unexplained".
-Lengths mm, angles rad.
+"""Causes of a gap that the library does not hold, so that a diagnosis has to say "unexplained". Lengths mm, angles rad.
 
-They are used by the plant alone. All are effects as the library's are, and enter at the same places; sizes and places
-are assumed.
+Effects as the library's are, used by the plant alone; sizes and places are assumed.
 """
 
 import numpy as np
 
 from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
 
 # a rest this long ends a run
 _REST_S = 10.0
-_GRAVITY_M_S2 = 9.80665
-_PLATFORM_KG = 4.8
+# with half of each forearm
+_PLATFORM_KG = Masses().platform_kg + 1.5 * Masses().forearm_kg
 _ANCHOR_MM = np.array([100.0, 900.0, 0.0])
 _SLACK_MM = 1080.0
 _PERIODS_S = (7.3, 19.0, 41.0)
@@ -25,9 +24,7 @@ def _shifted(shift_mm):
 
 
 def _rehoming(motion, values):
-    """Drives that find their zero anew before every run, off by up to the repeatability (rad) of their reference
-    switch.
-    """
+    """Drives that find their zero anew before every run, off by up to their switch's repeatability (rad)."""
     run = np.cumsum(np.diff(motion.time_s, prepend=motion.time_s[0]) > _REST_S)
     offset = np.random.default_rng(int(values[3])).uniform(-1.0, 1.0, (run[-1] + 1, 3))
     return Contribution(drive=values[:3] * offset[run])
@@ -44,26 +41,18 @@ def _tripod_creep(motion, values):
 
 
 def _cable_pull(motion, values):
-    """A cable to a fixed anchor, slack when near, pulls the platform off like a spring: mm of platform per mm of
-    stretch.
-    """
+    """A cable to a fixed anchor, slack when near, pulls the platform off like a spring: mm per mm of stretch."""
     reach = _ANCHOR_MM - motion.position_mm
     length = np.linalg.norm(reach, axis=1, keepdims=True)
     return _shifted(values[0] * np.maximum(length - _SLACK_MM, 0.0) * reach / length)
 
 
 def _floor_tilt(motion, values):
-    """The base tilts on a soft floor under the moment of platform and payload: rad per N mm about x and y, tracker
-    standing elsewhere.
-    """
-    moment = (
-        (_PLATFORM_KG + np.nan_to_num(motion.payload_kg))[:, None]
-        * _GRAVITY_M_S2
-        * motion.position_mm[:, [1, 0]]
-        * [1.0, -1.0]
-    )
-    turn = np.concatenate([values * moment, np.zeros((len(motion), 1))], axis=1)
-    return _shifted(np.cross(turn, motion.position_mm))
+    """The base, not the tracker, tilts on a soft floor under platform and payload: rad per N mm about x and y."""
+    weight = (_PLATFORM_KG + np.nan_to_num(motion.payload_kg))[:, None] * (GRAVITY_MM_S2 / 1000.0)
+    moment = weight * motion.position_mm[:, [1, 0]] * [1.0, -1.0]
+    tilt = np.concatenate([values * moment, np.zeros((len(motion), 1))], axis=1)
+    return _shifted(np.cross(tilt, motion.position_mm))
 
 
 def _pulley_ripple(motion, values):

@@ -3,9 +3,12 @@
 Those below withheld/ pass between the rules, chunk by chunk of the robots.
 """
 
+from dataclasses import replace
+
+from rrru.campaign.schemas import TABLES as CAMPAIGN_TABLES
 from rrru.store.schema import read_tables
 
-TABLES = read_tables("""
+_TABLES = read_tables("""
 robot                  str    name of the robot or field campaign
 kind                   str    paper (each trajectory once), full (reverse runs, speeds, payloads) or file {paper,
     full, file}
@@ -22,24 +25,6 @@ What was drawn for each robot: read by the virtual robot and by the scoring, nev
 --
 robot kind truth truth_leg strength weakest
 drawn                  str    all of the robot, as JSON: trajectories, seven deviations (rad, mm), causes
-
-## withheld_measurements | withheld/measurements/{chunk}.parquet | robot run point
-One row per commanded point of each robot: all that the diagnosis is given.
---
-robot kind
-run                    int    number of the pass, from 1 in the order driven
-trajectory             str    name of the trajectory
-point                  int    number of the point in its run, from 1
-time_s                 float? time since the campaign's start; null where the file has none
-command_{xyz}_mm       float  commanded position, robot frame
-theta1_rad             float  commanded drive angle of leg 1
-theta2_rad             float  commanded drive angle of leg 2
-theta3_rad             float  commanded drive angle of leg 3
-measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
-speed_mm_s             float? speed of the run; null where the file has none
-payload_kg             float? payload on the platform; null where the file has none
-status                 str    every point is kept; outlier and unsolved are left out of fits, near_singularity only
-    with use_near_singularity: false {ok, outlier, near_singularity, unsolved}
 
 ## withheld_states | withheld/states/{chunk}.parquet | robot
 The sims of the diagnosis: calibrated without and corrected with effects.
@@ -106,3 +91,14 @@ truth                  str    as in withheld_scores
 verdict                str    as in withheld_scores
 robots                 int    how many
 """)
+_ANSWERS = _TABLES[0]
+_MEASURED = next(table for table in CAMPAIGN_TABLES if table.name == "measurements")
+_MEASUREMENTS = replace(
+    _MEASURED,
+    name="withheld_measurements",
+    path="withheld/measurements/{chunk}.parquet",
+    description="One row per commanded point of each robot: all that the diagnosis is given.",
+    columns=(*_ANSWERS.columns[:2], *_MEASURED.columns),
+    key=("robot", "run", "point"),
+)
+TABLES = (_ANSWERS, _MEASUREMENTS, *_TABLES[1:])

@@ -7,8 +7,11 @@ from rrru.studies.withheld.verdicts import in_order, is_outside
 
 _BINS = 10
 _NEAR = 0.05
+_PREDICTED = f"share closed predicted within {_NEAR:g}"
 _STRONG = "acts == 'one' and strength >= 1.5"
 _WEAK = "acts == 'one' and 0.3 <= strength <= 1.0"
+_WEAK_GROUP = "one effect, gap 0.3 to 1 x noise"
+_ALL_ACTS = ("none", "one", "two", "outside")
 
 
 def wilson(hits, count):
@@ -39,23 +42,11 @@ _LABEL = (
     ("two effects, each >= 1 x noise", "both named exactly", "acts == 'two' and weakest >= 1", "right", None),
     ("two effects", "at least one named, nothing wrong", "acts == 'two'", "nothing_wrong", None),
     ("one leg at fault, gap >= 1.5 x noise", "leg named", f"{_STRONG} and truth_leg > 0", "leg_right", 0.95),
-    (
-        "one effect, gap 0.3 to 1 x noise, oracle detects it",
-        "named exactly",
-        f"{_WEAK} and oracle_detects",
-        "right",
-        0.9,
-    ),
-    ("one effect, gap 0.3 to 1 x noise", "oracle detects it", _WEAK, "oracle_detects", None),
-    ("one effect, gap 0.3 to 1 x noise", "named exactly", _WEAK, "right", None),
+    (f"{_WEAK_GROUP}, oracle detects it", "named exactly", f"{_WEAK} and oracle_detects", "right", 0.9),
+    (_WEAK_GROUP, "oracle detects it", _WEAK, "oracle_detects", None),
+    (_WEAK_GROUP, "named exactly", _WEAK, "right", None),
     ("all", "expected calibration error", "", None, 0.05),
-    (
-        "one effect named, gap >= 1.5 x noise",
-        "share closed predicted within 0.05",
-        f"{_STRONG} and right",
-        "predicted",
-        0.9,
-    ),
+    ("one effect named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
 )
 _EFFECT = (
     ("all", "unexplained", "", "right", 0.95),
@@ -65,10 +56,7 @@ _EFFECT = (
 _FIELD = (
     ("all", "named exactly", "", "right", None),
     ("one leg at fault", "leg named", "truth_leg > 0", "leg_right", None),
-    *(
-        (f"truth: {acts}", "named exactly", f"acts == '{acts}'", "right", None)
-        for acts in ("none", "one", "two", "outside")
-    ),
+    *((f"truth: {acts}", "named exactly", f"acts == '{acts}'", "right", None) for acts in _ALL_ACTS),
 )
 
 

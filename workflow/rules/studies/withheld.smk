@@ -3,13 +3,7 @@ from rrru.studies.withheld.chunks import chunks
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
-WITHHELD_TABLES = [
-    "withheld_verdicts",
-    "withheld_scores",
-    "withheld_limits",
-    "withheld_summary",
-    "withheld_confusion",
-]
+WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "summary", "confusion")]
 WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
 FIGURES["withheld"] = WITHHELD_FIGURES
 
