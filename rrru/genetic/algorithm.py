@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
+import pandas as pd
 import pygad
 
 from rrru.errors import ConfigError, FitError
@@ -46,6 +47,19 @@ class GeneticResult:
     stopped: str
     best_history: np.ndarray
     mean_history: np.ndarray
+
+    def row(self):
+        """Objective, counts and reason to stop, by the tables' names."""
+        counts = {"generations": self.generations, "evaluations": self.evaluations, "stopped": self.stopped}
+        return {"objective_mm": self.objective} | counts
+
+    def history(self):
+        """Frame of the convergence: every generation up to 100, every 10th after it, and the last."""
+        every = np.arange(self.generations + 1)
+        kept = every[(every <= 100) | (every % 10 == 0) | (every == self.generations)]
+        return pd.DataFrame(
+            {"generation": kept, "best_mm": self.best_history[kept], "mean_mm": self.mean_history[kept]}
+        )
 
 
 def minimise(objective, low, high, settings, seed):

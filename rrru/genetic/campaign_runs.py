@@ -1,155 +1,114 @@
 """The genetic algorithm on the calibrations of one campaign, beside the optimum that it should find."""
 
+from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
 import pandas as pd
 
-from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
-from rrru.genetic.sweep import kept_generations
+from rrru.genetic.settings import GeneticSettings
 from rrru.robots.protocol import identifiable_truth
 from rrru.seeds import run_seed
 
 
-def study_set(
-    measurements,
-    tied,
-    identifiable,
-    calibration,
-    patterns,
-    settings,
-    seeds,
-    study_seed,
-    labels=(),
-    use_near_singularity=True,
-):
-    """Runs of the genetic algorithm on one calibration set.
+@dataclass(frozen=True)
+class Runs:
+    """Runs of one campaign: GeneticSettings, the number of runs, and what their seeds are made of."""
 
-    tied, identifiable: the mechanism with the searched and with the identifiable error parameters, 8 and 7 of the
-    3-RRRU; seeds: number of runs, seeded by the study's seed and the labels. Returns (runs, history, timings) as frames
-    without the campaign's name, or None where the campaign has too few points for the set.
+    settings: GeneticSettings
+    seeds: int
+    study_seed: int
+    labels: tuple = ()
+
+
+def study_set(searched, identified, calibration, runs):
+    """Frames by table name, without the campaign's name: the Runs on one calibration set, called `calibration`.
+
+    searched, identified: Residuals of its points under the searched and under the identifiable parameters, of the
+    3-RRRU 8 and 7; each run is polished locally in the latter.
     """
-    residuals = select(measurements, tied, patterns, use_near_singularity)
-    if residuals is None:
-        return None
-    reduced = select(measurements, identifiable, patterns, use_near_singularity)
-    fit, fit_seconds = _timed(lambda: least_squares(reduced))
-    best, polish_seconds = _timed(lambda: least_mean_distance(reduced, fit.deviations))
-    optimum = best.mean_mm
-    names, bounds = tied.parameters.names, (tied.parameters.low, tied.parameters.high)
+    parameters, mechanism = searched.mechanism.parameters, identified.mechanism
+    fit, fit_seconds = _timed(lambda: least_squares(identified))
+    best, polish_seconds = _timed(lambda: least_mean_distance(identified, fit.deviations))
     # the compiled objective is loaded before anything is timed
-    residuals.mean_distance(tied.parameters.nominal[None])
-    runs, history, seconds = [], [], []
-    for number in range(1, seeds + 1):
-        seed = run_seed(study_seed, "genetic", *labels, calibration, number)
+    searched.mean_distance(parameters.nominal[None])
+    frames, seconds = {"genetic": [], "genetic_history": [], "genetic_parameters": []}, []
+    for number in range(1, runs.seeds + 1):
+        seed = run_seed(runs.study_seed, "genetic", *runs.labels, calibration, number)
         start = perf_counter()
-        result = minimise(residuals.mean_distance, *bounds, settings, seed)
+        result = minimise(searched.mean_distance, parameters.low, parameters.high, runs.settings, seed)
         seconds.append(perf_counter() - start)
-        values = dict(zip(names, result.deviations.tolist(), strict=True))
-        shared = identifiable_truth(identifiable, values)
-        polish = least_mean_distance(reduced, identifiable.parameters.vector(shared))
-        runs.append(
-            {
-                "calibration": calibration,
-                "seed": number,
-                "objective_mm": result.objective,
-                "generations": result.generations,
-            }
-            | {
-                "evaluations": result.evaluations,
-                "stopped": result.stopped,
-                "polished_mm": polish.mean_mm,
-                "optimum_mm": optimum,
-            }
-            | {"polish_evaluations": polish.evaluations, "excess": _excess(result.objective, optimum)}
-            | {"polished_excess": _excess(polish.mean_mm, optimum)}
-            | values
-            | shared
-        )
-        kept = kept_generations(result.generations)
-        columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}
-        history.append(pd.DataFrame({"calibration": calibration, "seed": number} | columns))
-    timings = pd.DataFrame(
-        {
-            "calibration": calibration,
-            "method": ["least_squares", "least_mean_distance", "genetic"],
-            "seconds": [fit_seconds, fit_seconds + polish_seconds, float(np.median(seconds))],
+        shared = identifiable_truth(mechanism, parameters.mapping(result.deviations))
+        polish = least_mean_distance(identified, mechanism.parameters.vector(shared))
+        row = result.row() | {
+            "polished_mm": polish.mean_mm,
+            "optimum_mm": best.mean_mm,
+            "polish_evaluations": polish.evaluations,
+            "excess": _excess(result.objective, best.mean_mm),
+            "polished_excess": _excess(polish.mean_mm, best.mean_mm),
         }
-    )
-    return pd.DataFrame(runs), pd.concat(history, ignore_index=True), timings
+        found = dict(zip(parameters, result.deviations, strict=True)) | {
+            one: shared[one.name] for one in mechanism.parameters if one.name not in parameters.names
+        }
+        parts = pd.DataFrame([row]), result.history(), parameter_rows(found)
+        for name, part in zip(frames, parts, strict=True):
+            frames[name].append(part.assign(seed=number))
+    spent = {"least_squares": fit_seconds, "least_mean_distance": fit_seconds + polish_seconds}
+    timings = pd.DataFrame((spent | {"genetic": float(np.median(seconds))}).items(), columns=["method", "seconds"])
+    whole = {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()} | {"timings": timings}
+    return {name: frame.assign(calibration=calibration) for name, frame in whole.items()}
 
 
-def typical_parameters(runs, names):
-    """Rows of `parameters` for method "genetic": of each calibration the run whose objective is the (lower) median of
-    the seeds.
+def parameter_rows(found):
+    """Columns parameter, unit and value of {Parameter: value}."""
+    rows = [(parameter.name, parameter.unit, value) for parameter, value in found.items()]
+    return pd.DataFrame(rows, columns=["parameter", "unit", "value"])
 
-    runs: rows of `genetic` of one campaign; names: identifiable parameters. A single run is what the paper has.
+
+def typical_parameters(runs, found, names):
+    """Rows of `parameters` for method "genetic": of each calibration the run of (lower) median objective.
+
+    runs, found: rows of `genetic` and `genetic_parameters` of one campaign; names: of the parameters. A single run is
+    what the paper has.
     """
-    frames = []
-    for calibration, part in runs.groupby("calibration", sort=False):
-        typical = part.sort_values(["objective_mm", "seed"]).iloc[(len(part) - 1) // 2]
-        frames.append(
-            pd.DataFrame(
-                {
-                    "calibration": calibration,
-                    "method": "genetic",
-                    "parameter": names,
-                    "value": [typical[n] for n in names],
-                }
-            )
-        )
-    return pd.concat(frames, ignore_index=True)
+    ranked = runs.sort_values(["calibration", "objective_mm", "seed"])
+    place = ranked.groupby("calibration").cumcount()
+    middle = (ranked.groupby("calibration")["seed"].transform("size") - 1) // 2
+    key = ["calibration", "seed"]
+    chosen = runs[key].merge(ranked.loc[place == middle, key])
+    rows = chosen.merge(pd.DataFrame({"parameter": names}), how="cross").merge(found, on=[*key, "parameter"])
+    return rows.assign(method="genetic")[["calibration", "method", "parameter", "value"]]
 
 
-def against_least_squares(runs, calibrations, parameters, truth):
+def against_least_squares(runs, found, calibrations, parameters, truth):
     """Rows of `genetic_against_least_squares` of one campaign (without its name).
 
-    runs, calibrations, parameters: rows of `genetic`, `calibrations` and `parameters` of that campaign; truth: the true
-    errors by identifiable name, or None where nobody knows them.
+    runs, found, calibrations, parameters: rows of `genetic`, `genetic_parameters`, `calibrations` and `parameters` of
+    that campaign; truth: the true deviations by identifiable name, or None where nobody knows them.
     """
-    units = dict(zip(parameters["parameter"], parameters["unit"], strict=True))
     result = []
     for calibration, part in runs.groupby("calibration", sort=False):
-        optimum = part["optimum_mm"].iloc[0]
-        fits = calibrations[calibrations["calibration"] == calibration]
+        fits, fitted, own = (table[table["calibration"] == calibration] for table in (calibrations, parameters, found))
         for row in fits.itertuples():
-            values = parameters[(parameters["calibration"] == calibration) & (parameters["method"] == row.method)]
-            found = dict(zip(values["parameter"], values["value"], strict=True))
-            result.append(
-                {
-                    "calibration": calibration,
-                    "method": row.method,
-                    "runs": 1,
-                    "mean_mm": row.mean_mm,
-                    "worst_mean_mm": row.mean_mm,
-                }
-                | {"excess": _excess(row.mean_mm, optimum), "evaluations": float(row.evaluations)}
-                | _parameter_error(pd.DataFrame([found]), truth, units)
-            )
+            errors = _parameter_error(fitted[fitted["method"] == row.method], truth)
+            reached = {"runs": 1, "mean_mm": row.mean_mm, "worst_mean_mm": row.mean_mm}
+            label = {"calibration": calibration, "method": row.method, "evaluations": float(row.evaluations)}
+            result.append(label | reached | errors)
         for method, column, more in (
             ("genetic", "objective_mm", 0),
             ("genetic_polished", "polished_mm", part["polish_evaluations"]),
         ):
-            middle = part[column].median()
-            result.append(
-                {
-                    "calibration": calibration,
-                    "method": method,
-                    "runs": len(part),
-                    "mean_mm": middle,
-                    "worst_mean_mm": part[column].max(),
-                }
-                | {"excess": _excess(middle, optimum), "evaluations": float((part["evaluations"] + more).median())}
-                | (
-                    _parameter_error(part, truth, units)
-                    if method == "genetic"
-                    else {"angle_error_rad": np.nan, "length_error_mm": np.nan}
-                )
-            )
-    return pd.DataFrame(result)
+            errors = _parameter_error(own, truth if method == "genetic" else None)
+            evaluations = float((part["evaluations"] + more).median())
+            reached = {"runs": len(part), "mean_mm": part[column].median(), "worst_mean_mm": part[column].max()}
+            label = {"calibration": calibration, "method": method, "evaluations": evaluations}
+            result.append(label | reached | errors)
+    compared = pd.DataFrame(result)
+    optima = compared["calibration"].map(runs.groupby("calibration")["optimum_mm"].first())
+    return compared.assign(excess=[_excess(*pair) for pair in zip(compared["mean_mm"], optima, strict=True)])
 
 
 def _excess(value, optimum):
@@ -157,24 +116,22 @@ def _excess(value, optimum):
     return value / optimum - 1.0 if optimum > 1e-9 else np.nan
 
 
-def _parameter_error(values, truth, units):
-    """RMS deviation of angles and lengths from the truth over all rows of a frame of identifiable parameters."""
-    if truth is None:
-        return {"angle_error_rad": np.nan, "length_error_mm": np.nan}
+def _parameter_error(rows, truth):
+    """RMS deviation of angles and of lengths from the truth over rows of parameters; NaN where nobody knows it.
+
+    NaN too where the legs of the real robot differ, so that there is no true value.
+    """
+    units = {} if truth is None else rows.groupby("parameter")["unit"].first()
     error = {}
     for key, unit in (("angle_error_rad", "rad"), ("length_error_mm", "mm")):
-        names = [name for name in truth if units[name] == unit]
-        # NaN where the legs of the real robot differ, so that there is no true value
-        error[key] = float(np.sqrt(np.mean([(values[name] - truth[name]) ** 2 for name in names])))
+        names = [name for name in truth or () if units[name] == unit]
+        apart = [rows.loc[rows["parameter"] == name, "value"].to_numpy() - truth[name] for name in names]
+        error[key] = float(np.sqrt(np.mean(np.square(apart)))) if names else np.nan
     return error
 
 
 def _timed(function):
-    """Result of a call and the median of three wall times in s, compilation excluded."""
-    result = function()
-    seconds = []
-    for _ in range(3):
-        start = perf_counter()
-        function()
-        seconds.append(perf_counter() - start)
-    return result, float(np.median(seconds))
+    """Result of a call and the wall time in s of a second one, compilation excluded."""
+    result, start = function(), perf_counter()
+    function()
+    return result, perf_counter() - start

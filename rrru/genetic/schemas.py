@@ -28,21 +28,14 @@ optimum_mm             float  least mean distance within the bounds, found from 
 polish_evaluations     int    evaluations of the local polish
 excess                 float? objective_mm / optimum_mm - 1; null where the optimum is zero
 polished_excess        float? polished_mm / optimum_mm - 1; null where the optimum is zero
-dtheta1                float? error that the run found, rad; null for a robot without it
-dtheta2                float? error that the run found, rad; null for a robot without it
-dtheta3                float? error that the run found, rad; null for a robot without it
-dL1                    float? error that the run found, mm; null for a robot without it
-dL2                    float? error that the run found, mm; null for a robot without it
-dL3                    float? error that the run found, mm; null for a robot without it
-dR                     float? error that the run found, mm; null for a robot without it
-dr                     float? error that the run found, mm; null for a robot without it
-db1                    float? error that the run found, mm; null for a robot without it
-db2                    float? error that the run found, mm; null for a robot without it
-db3                    float? error that the run found, mm; null for a robot without it
-dL                     float? error that the run found, mm; null for a robot without it
-dl1                    float? error that the run found, mm; null for a robot without it
-dl2                    float? error that the run found, mm; null for a robot without it
-da                     float? dr - dR, the part of both that can be identified, mm; null for a robot without it
+
+## genetic_parameters | tables/genetic_parameters.parquet | campaign calibration seed parameter
+Deviations that the runs in `genetic` found: those searched, and da = dr - dR, the part of both that can be identified.
+--
+campaign calibration seed
+parameter              str    name of the parameter
+unit                   str    unit of the value {rad, mm}
+value                  float  deviation from the nominal value
 
 ## genetic_history | tables/genetic_history.parquet | campaign calibration seed generation
 Convergence of the runs in `genetic`: every generation up to 100, every 10th after it, and the last.
@@ -71,14 +64,14 @@ seconds                float  wall time of one calibration (median over the seed
 One row per run of the sweeps of the crossover and migration fraction.
 --
 parameter population value seed objective_mm generations evaluations stopped
-dtheta1                float  error that the run found, rad
-dtheta2                float  error that the run found, rad
-dtheta3                float  error that the run found, rad
-dL1                    float  error that the run found, mm
-dL2                    float  error that the run found, mm
-dL3                    float  error that the run found, mm
-dR                     float  error that the run found, mm
-dr                     float  error that the run found, mm
+
+## sweep_parameters | tables/sweep_parameters.parquet | parameter population value seed name
+Deviations that the runs in `sweep_runs` found.
+--
+parameter population value seed
+name                   str    name of the robot's parameter
+unit                   str    unit of the deviation {rad, mm}
+deviation              float  deviation from the nominal value
 
 ## sweep_history | tables/sweep_history.parquet | parameter population value seed generation
 Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th after it, and the last.

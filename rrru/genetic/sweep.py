@@ -6,53 +6,37 @@ from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from rrru.errors import ConfigError
 from rrru.genetic.algorithm import minimise
 from rrru.seeds import run_seed
 
 SWEPT = ("crossover_fraction", "migration_fraction")
-_EVERY_UNTIL, _THEN_EVERY = 100, 10
 _LEVEL = 0.05
 _RESAMPLES = 4999
 
 
-def population_kind(settings):
-    """Name of a population's structure in the tables: "one" or "islands"."""
-    return "one" if len(settings.populations) == 1 else "islands"
+def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
+    """Frames by table name of the runs of the genetic algorithm at one value of one setting, one per seed number.
 
-
-def run_sweep(objective, low, high, settings, parameter, value, seeds, names, study_seed=0):
-    """Runs of the genetic algorithm at one value of one setting, one per seed number.
-
-    objective, low, high: see `genetic.minimise`; settings: GeneticSettings, of which `parameter` (one of SWEPT) is set
-    to `value`; seeds: seed numbers, each run's own seed being run_seed(study_seed, parameter, population, value,
-    number); names: of the p errors.
-
-    Returns two tables. runs, a row per seed: parameter, value, population ("one", "islands"), seed (number),
-    objective_mm, generations, evaluations, stopped, and a column per name. history: parameter, value, population, seed,
-    generation, best_mm, mean_mm, with every generation up to 100, every 10th after it, and the last. Raises ConfigError
-    for another parameter or a value that is not allowed.
+    objective, settings: see `algorithm.minimise`; parameters: ParameterSet; parameter: of the settings, one of SWEPT,
+    set to `value`; seeds: seed numbers, each run's own seed being run_seed(study_seed, parameter, population, value,
+    number) with population "one" or "islands". Raises ConfigError for another parameter or a value that is not allowed.
     """
     if parameter not in SWEPT:
         raise ConfigError(f"swept parameter is {parameter!r}; allowed: {', '.join(SWEPT)}")
     settings = replace(settings, **{parameter: value})
-    kind = population_kind(settings)
-    runs, history = [], []
+    kind = "one" if len(settings.populations) == 1 else "islands"
+    frames = {"sweep_runs": [], "sweep_history": [], "sweep_parameters": []}
     for number in seeds:
-        result = minimise(objective, low, high, settings, run_seed(study_seed, parameter, kind, value, number))
+        seed = run_seed(study_seed, parameter, kind, value, number)
+        result = minimise(objective, parameters.low, parameters.high, settings, seed)
+        found = {"name": parameters.names, "unit": parameters.units, "deviation": result.deviations}
+        parts = pd.DataFrame([result.row()]), result.history(), pd.DataFrame(found)
         labels = {"parameter": parameter, "value": float(value), "population": kind, "seed": int(number)}
-        runs.append(
-            labels
-            | {"objective_mm": result.objective, "generations": result.generations}
-            | {"evaluations": result.evaluations, "stopped": result.stopped}
-            | dict(zip(names, result.deviations.tolist(), strict=True))
-        )
-        kept = kept_generations(result.generations)
-        columns = {"generation": kept, "best_mm": result.best_history[kept], "mean_mm": result.mean_history[kept]}
-        history.append(pd.DataFrame(labels | columns))
-    return pd.DataFrame(runs), pd.concat(history, ignore_index=True)
+        for name, part in zip(frames, parts, strict=True):
+            frames[name].append(part.assign(**labels))
+    return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
 def setting_effect(runs):
@@ -86,6 +70,8 @@ def setting_pairs(runs, seed=0):
     group), distinguishable (p_holm below 5 %). The best value was picked from the same runs, which makes the
     differences look somewhat too large. `seed` is of the bootstrap.
     """
+    from scipy import stats
+
     rows = []
     for (parameter, population), group in runs.groupby(["parameter", "population"]):
         samples = {value: part.to_numpy() for value, part in group.groupby("value")["objective_mm"]}
@@ -108,16 +94,12 @@ def setting_pairs(runs, seed=0):
     return pd.DataFrame(rows)
 
 
-def kept_generations(last):
-    """Generations whose history is kept: every one up to 100, every 10th after it, and the last."""
-    kept = np.arange(last + 1)
-    return kept[(kept <= _EVERY_UNTIL) | (kept % _THEN_EVERY == 0) | (kept == last)]
-
-
 def _kruskal(group):
     """Statistic, p value and epsilon squared of the Kruskal-Wallis test of the objective over the values of a group of
     runs.
     """
+    from scipy import stats
+
     samples = [part.to_numpy() for _, part in group.groupby("value")["objective_mm"]]
     if len(samples) < 2 or group["objective_mm"].nunique() < 2:
         return {"statistic": 0.0, "p_value": 1.0, "epsilon_squared": 0.0}
@@ -131,6 +113,8 @@ def _kruskal(group):
 
 def _median_difference(sample, reference, seed):
     """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it cannot be had."""
+    from scipy import stats
+
     if not np.isfinite([*sample, *reference]).all():
         return np.nan, np.nan, np.nan
     difference = float(np.median(sample) - np.median(reference))

@@ -3,34 +3,46 @@
 from dataclasses import dataclass
 
 import numba
+import numba.experimental.function_type  # registers the protocol below
 import numpy as np
 from numba import types
 from numba.extending import intrinsic
 
 # a kernel writes the values (m,) of deviations (m, p); legs (3, k, 1 + p) and points (rows, n) are the robot's own
-KERNEL = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.float64[:, ::1], types.float64[::1])
+SIGNATURE = types.void(types.float64[:, ::1], types.float64[:, :, ::1], types.float64[:, ::1], types.float64[::1])
+
+
+class Kernel(types.WrapperAddressProtocol):
+    """A function compiled for SIGNATURE, which compiled functions take as an argument without being compiled for it."""
+
+    def __init__(self, function):
+        self.function = numba.njit(cache=True, error_model="numpy")(function)
+        self.function.compile(SIGNATURE.args)
+        result = self.function.get_compile_result(SIGNATURE)
+        self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+
+    def __wrapper_address__(self):
+        """Where the machine code lies."""
+        return self._address
+
+    def signature(self):
+        """SIGNATURE, for numba."""
+        return SIGNATURE
 
 
 @dataclass(frozen=True)
 class CompiledObjective:
-    """A kernel, `numba.cfunc` of the signature KERNEL, and the arrays that it is given; callable from Python."""
+    """A Kernel and the arrays that it is given; callable from Python."""
 
-    kernel: object
+    kernel: Kernel
     legs: np.ndarray
     points: np.ndarray
 
     def __call__(self, deviations):
         """Values (m,) of deviations (m, p); inf where a point leaves the reach."""
-        deviations = np.ascontiguousarray(deviations, dtype=float)
         values = np.empty(len(deviations))
-        _call(self.kernel, deviations, self.legs, self.points, values)
+        self.kernel.function(np.ascontiguousarray(deviations, dtype=float), self.legs, self.points, values)
         return values
-
-
-@numba.njit(cache=True)
-def _call(kernel, deviations, legs, points, values):
-    """The kernel called from Python."""
-    kernel(deviations, legs, points, values)
 
 
 @intrinsic

@@ -180,11 +180,6 @@ def calibrations():
     return check("calibrations", pd.DataFrame(rows))
 
 
-def _found():
-    """Columns of the errors that a run of the genetic algorithm found."""
-    return {name: 0.0 for name in (*PARAMETERS[:-1], "dR", "dr")}
-
-
 def genetic(seeds=5):
     """`genetic` and `genetic_history`; the first run ends at the optimum itself, the second starts infeasible."""
     runs, history = [], []
@@ -207,10 +202,8 @@ def genetic(seeds=5):
                 "excess": best[-1] / OPTIMUM_MM - 1.0,
                 "polished_excess": 0.0,
             }
-            runs.append(label | numbers | excess | _found() | {"da": 0.0})
-    return check("genetic", pd.DataFrame(runs).reindex(columns=TABLES["genetic"].names)), check(
-        "genetic_history", pd.concat(history, ignore_index=True)
-    )
+            runs.append(label | numbers | excess)
+    return check("genetic", pd.DataFrame(runs)), check("genetic_history", pd.concat(history, ignore_index=True))
 
 
 def sweeps(scatter_mm=0.3, seeds=6):
@@ -239,7 +232,7 @@ def sweeps(scatter_mm=0.3, seeds=6):
                         "evaluations": 3000,
                         "stopped": "stalled",
                     }
-                    runs.append(label | {"value": value, "seed": seed} | numbers | _found())
+                    runs.append(label | {"value": value, "seed": seed} | numbers)
                 if k:
                     numbers = {
                         "best_value": 0.1,

@@ -9,10 +9,12 @@ import pytest
 from rrru.errors import ConfigError
 from rrru.genetic import sweep
 from rrru.genetic.algorithm import minimise
+from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
+from rrru.parameters import Parameter, ParameterSet
 from rrru.seeds import run_seed
 
-LOW, HIGH, NAMES = [-1.0, -2.0], [1.0, 2.0], ("a_mm", "b_rad")
+PARAMETERS = ParameterSet((Parameter("a", "mm", 0.0, -1.0, 1.0), Parameter("b", "rad", 0.0, -2.0, 2.0)))
 
 
 def valley(deviations):
@@ -21,7 +23,7 @@ def valley(deviations):
 
 def swept(parameter="crossover_fraction", value=0.5, seeds=range(3), study_seed=7, **settings):
     settings = GeneticSettings(**({"generations": 25} | settings))
-    return sweep.run_sweep(valley, LOW, HIGH, settings, parameter, value, seeds, NAMES, study_seed)
+    return sweep.run_sweep(valley, PARAMETERS, settings, parameter, value, seeds, study_seed)
 
 
 def table(groups, parameter="crossover_fraction", population="one"):
@@ -42,33 +44,34 @@ def table(groups, parameter="crossover_fraction", population="one"):
 
 
 def test_a_sweep_s_rows_are_single_runs():
-    runs, history = swept(value=0.3, seeds=(4, 9), populations=(10, 10))
-    assert list(runs.columns) == [
-        *("parameter", "value", "population", "seed", "objective_mm", "generations", "evaluations", "stopped"),
-        *NAMES,
-    ]
-    assert list(history.columns) == ["parameter", "value", "population", "seed", "generation", "best_mm", "mean_mm"]
-    for row in runs.itertuples():
+    tables = swept(value=0.3, seeds=(4, 9), populations=(10, 10))
+    for name, frame in tables.items():
+        schema = next(table for table in TABLES if table.name == name)
+        assert sorted(frame.columns) == sorted(schema.names)
+    for row in tables["sweep_runs"].itertuples():
         settings = GeneticSettings(0.3, populations=(10, 10), generations=25)
-        single = minimise(valley, LOW, HIGH, settings, run_seed(7, "crossover_fraction", "islands", 0.3, row.seed))
+        seed = run_seed(7, "crossover_fraction", "islands", 0.3, row.seed)
+        single = minimise(valley, PARAMETERS.low, PARAMETERS.high, settings, seed)
         assert (row.population, row.objective_mm, row.evaluations) == ("islands", single.objective, single.evaluations)
-        assert (row.a_mm, row.b_rad) == tuple(single.deviations)
-        own = history[history["seed"] == row.seed]
+        found, own = (tables[name][tables[name]["seed"] == row.seed] for name in ("sweep_parameters", "sweep_history"))
+        assert found[["name", "unit"]].to_numpy().tolist() == [["a", "mm"], ["b", "rad"]]
+        np.testing.assert_array_equal(found["deviation"], single.deviations)
         np.testing.assert_array_equal(own["best_mm"], single.best_history)
         np.testing.assert_array_equal(own["mean_mm"], single.mean_history)
 
 
 def test_a_sweep_repeats_itself_and_its_seeds_do_not_depend_on_each_other():
     first, again, part = swept(), swept(), swept(seeds=[2])
-    pd.testing.assert_frame_equal(first[0], again[0])
-    pd.testing.assert_frame_equal(first[1], again[1])
-    pd.testing.assert_frame_equal(first[0].tail(1).reset_index(drop=True), part[0])
+    for name, frame in first.items():
+        pd.testing.assert_frame_equal(frame, again[name])
+        pd.testing.assert_frame_equal(frame[frame["seed"] == 2].reset_index(drop=True), part[name])
 
 
 def test_long_histories_are_thinned_but_keep_the_last_generation():
-    runs, history = swept(seeds=[0], generations=137, stall_generations=0)
+    tables = swept(seeds=[0], generations=137, stall_generations=0)
+    history = tables["sweep_history"]
     assert history["generation"].tolist() == [*range(101), 110, 120, 130, 137]
-    assert history["best_mm"].iloc[-1] == runs["objective_mm"].iloc[0]
+    assert history["best_mm"].iloc[-1] == tables["sweep_runs"]["objective_mm"].iloc[0]
 
 
 def test_another_parameter_is_refused():

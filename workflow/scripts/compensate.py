@@ -14,7 +14,8 @@ def main(settings, inputs, outputs):
     """Write the campaign's errors point by point and summed up."""
     nominal = settings["nominal"]
     measurements, mechanism = tables.read(inputs["measurements"]), setup.mechanism(nominal)
-    typical = typical_parameters(tables.read(inputs["genetic"]), mechanism.parameters.names)
+    genetic = (tables.read(inputs[name]) for name in ("genetic", "genetic_parameters"))
+    typical = typical_parameters(*genetic, mechanism.parameters.names)
     parameters = pd.concat([tables.read(inputs["parameters"])[typical.columns], typical], ignore_index=True)
     drive = None
     if settings["virtual"]:

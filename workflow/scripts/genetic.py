@@ -3,7 +3,8 @@
 import pandas as pd
 from tqdm import tqdm
 
-from rrru.genetic import campaign_runs
+from rrru.fit.campaign_fit import select
+from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
 from rrru.store import tables
@@ -15,36 +16,22 @@ def main(settings, inputs, outputs):
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
     measurements = tables.read(inputs["measurements"])
     name, nominal, calibration = settings["campaign"], settings["nominal"], settings["calibration"]
-    tied, identifiable = setup.mechanism(nominal, "tied"), setup.mechanism(nominal)
+    robots = setup.mechanism(nominal, "tied"), setup.mechanism(nominal)
+    genetic = settings["genetic"]
+    runs = Runs(GeneticSettings.from_config(genetic), genetic["seeds"], settings["seed"], (name,))
     results = []
     for label, patterns in tqdm(calibration["sets"].items(), desc=f"genetic {name}", unit="set"):
-        result = campaign_runs.study_set(
-            measurements,
-            tied,
-            identifiable,
-            label,
-            patterns,
-            GeneticSettings.from_config(settings["genetic"]),
-            settings["genetic"]["seeds"],
-            settings["seed"],
-            (name,),
-            calibration["use_near_singularity"],
+        searched, identified = (
+            select(measurements, robot, patterns, calibration["use_near_singularity"]) for robot in robots
         )
-        if result is not None:
-            results.append(result)
-    runs, history, timings = (pd.concat(parts, ignore_index=True) for parts in zip(*results, strict=True))
+        if searched is not None:
+            results.append(study_set(searched, identified, label, runs))
+    frames = {table: pd.concat([part[table] for part in results], ignore_index=True) for table in results[0]}
     truth = setup.true_deviations(nominal, settings["virtual"])
     fits = (tables.read(inputs[table]) for table in ("calibrations", "parameters"))
-    compared = campaign_runs.against_least_squares(runs, *fits, truth)
-    # robots have different parameters, the table has those of all
-    names = next(table.names for table in TABLES if table.name == "genetic")
-    frames = {
-        "genetic": runs.reindex(columns=[column for column in names if column != "campaign"]),
-        "genetic_history": history,
-        "genetic_against_least_squares": compared,
-        "timings": timings,
-    }
-    tables.write_all(TABLES, {key: frame.assign(campaign=name) for key, frame in frames.items()}, outputs)
+    compared = against_least_squares(frames["genetic"], frames["genetic_parameters"], *fits, truth)
+    frames["genetic_against_least_squares"] = compared
+    tables.write_all(TABLES, {table: frame.assign(campaign=name) for table, frame in frames.items()}, outputs)
 
 
 if __name__ == "__main__":

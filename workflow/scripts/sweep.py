@@ -25,19 +25,17 @@ def main(settings, inputs, outputs):
     swept = [
         run_sweep(
             residuals.mean_distance,
-            mechanism.parameters.low,
-            mechanism.parameters.high,
+            mechanism.parameters,
             genetic,
             parameter,
             float(value),
             range(1, section["seeds"] + 1),
-            mechanism.parameters.names,
-            study_seed=settings["seed"],
+            settings["seed"],
         )
         for value in tqdm(section["values"], desc=f"{parameter} {population}", unit="value")
     ]
-    runs, history = (pd.concat(frames, ignore_index=True) for frames in zip(*swept, strict=True))
-    tables.write_all(TABLES, {"sweep_runs": runs, "sweep_history": history}, outputs)
+    frames = {name: pd.concat([part[name] for part in swept], ignore_index=True) for name in swept[0]}
+    tables.write_all(TABLES, frames, outputs)
 
 
 if __name__ == "__main__":

@@ -10,16 +10,12 @@ from rrru.store.job import run
 
 def main(settings, inputs, outputs):
     """Write the runs and their history, the test over all values and that of every value against the best."""
-    runs, history = (
-        pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
-        for name in ("sweep_runs", "sweep_history")
-    )
     frames = {
-        "sweep_runs": runs,
-        "sweep_history": history,
-        "sweep_effect": setting_effect(runs),
-        "sweep_pairs": setting_pairs(runs, settings["seed"]),
+        name: pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
+        for name in ("sweep_runs", "sweep_history", "sweep_parameters")
     }
+    runs = frames["sweep_runs"]
+    frames |= {"sweep_effect": setting_effect(runs), "sweep_pairs": setting_pairs(runs, settings["seed"])}
     tables.write_all(TABLES, frames, outputs)
 
 

@@ -26,18 +26,19 @@ class Reproduced:
     redraws: int
 
 
-def published_rows(settings, errors, calibrations, parameters, genetic, sweep_runs):
+def published_rows(settings, errors, calibrations, parameters, genetic, genetic_parameters, sweep_runs):
     """Rows of `published` for paper A.
 
     settings: the configuration's `genetic`, `reproduce` and `calibration`, with the campaign's `nominal` robot and
     what is `virtual` of it; the others: the tables of those names. Numbers that this study does not have are null.
     """
     chosen, nominal, virtual = Reproduced(**settings["reproduce"]), settings["nominal"], settings["virtual"]
-    errors, calibrations, parameters, genetic = (
-        table[table["campaign"] == chosen.campaign] for table in (errors, calibrations, parameters, genetic)
+    errors, calibrations, parameters, genetic, found = (
+        table[table["campaign"] == chosen.campaign]
+        for table in (errors, calibrations, parameters, genetic, genetic_parameters)
     )
     names = setup.mechanism(nominal).parameters.names
-    parameters = pd.concat([parameters, typical_parameters(genetic, (*names, "dR", "dr"))], ignore_index=True)
+    parameters = pd.concat([parameters, typical_parameters(genetic, found, (*names, "dR", "dr"))], ignore_index=True)
     runs = genetic[genetic["calibration"] == chosen.line_calibration]
     numbers, order_notes = _error_numbers(errors, chosen)
     here = {

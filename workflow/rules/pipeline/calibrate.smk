@@ -1,5 +1,5 @@
 CALIBRATION_TABLES = ["calibrations", "parameters", "correlations", "observability"]
-GENETIC_TABLES = ["genetic", "genetic_history", "genetic_against_least_squares"]
+GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
 # tables of the whole study that are the campaigns' parts, one below the other
 CAMPAIGN_TABLES = ["campaigns", "singularity", *CALIBRATION_TABLES, *GENETIC_TABLES, "errors", "error_summary"]
 TARGETS += named(CAMPAIGN_TABLES).values()
@@ -50,7 +50,7 @@ rule genetic:
 # every calibration applied to every trajectory
 rule compensate:
     input:
-        **named(["measurements", "parameters", "genetic"], part),
+        **named(["measurements", "parameters", "genetic", "genetic_parameters"], part),
     output:
         **named(["errors", "error_summary"], part),
     log:

@@ -3,7 +3,8 @@ from rrru.studies.rrru3 import settings as paper_a_settings
 paper_a_settings.check(config)
 
 SWEPT = ["crossover_fraction", "migration_fraction"]
-SWEEP_TABLES = ["sweep_runs", "sweep_history", "sweep_effect", "sweep_pairs"]
+SWEEP_RUNS = ["sweep_runs", "sweep_history", "sweep_parameters"]
+SWEEP_TABLES = [*SWEEP_RUNS, "sweep_effect", "sweep_pairs"]
 REPRODUCED = config["reproduce"]["campaign"]
 _SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations"]
 _PAPER_A = "rrru.studies.rrru3.figures"
@@ -17,7 +18,7 @@ PAPER_A_FIGURES = {
 }
 PAPERS["A"] = {
     "study": "rrru.studies.rrru3",
-    "tables": ["errors", "calibrations", "parameters", "genetic", "sweep_runs"],
+    "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs"],
     "settings": {
         "nominal": parts.nominal(config, REPRODUCED),
         "virtual": parts.virtual(config, REPRODUCED),
@@ -58,7 +59,7 @@ rule sweep:
     input:
         measurements=part("measurements", REPRODUCED),
     output:
-        **named(["sweep_runs", "sweep_history"], sweep_part),
+        **named(SWEEP_RUNS, sweep_part),
     log:
         f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}.log",
     wildcard_constraints:
@@ -80,7 +81,7 @@ rule sweep_tables:
     input:
         **{
             name: expand(sweep_part(name), parameter=SWEPT, population=sorted(config["sweep"]["populations"]))
-            for name in ("sweep_runs", "sweep_history")
+            for name in SWEEP_RUNS
         },
     output:
         **named(SWEEP_TABLES),
