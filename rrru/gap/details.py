@@ -16,7 +16,7 @@ _LIKELY = 0.5
 _EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan, "note": ""}
 
 
-def details_of(attribution, verdict, steps, residual_mm, generator, draws):
+def details_of(attribution, steps, residual_mm, generator, draws):
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
     case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
     exact = case.measured_mm - case.exact(attribution.state) if attribution.state.effects else None

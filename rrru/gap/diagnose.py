@@ -84,7 +84,7 @@ def diagnose(
     row = _row(attribution, verdict, steps, worst_spot(case.motion.position_mm[case.used], residual), further)
     tables = {}
     if details:
-        tables = details_of(attribution, verdict, steps, residual, generator, settings.draws)
+        tables = details_of(attribution, steps, residual, generator, settings.draws)
         tables["gap_next_runs"] = further.assign(rank=np.arange(1, len(further) + 1))
     return Diagnosis(row, tables, attribution.state, attribution)
 

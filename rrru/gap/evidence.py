@@ -142,15 +142,8 @@ class ModelEvidence:
     @cached_property
     def _priors(self):
         """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
-        return {
-            name: _Prior(
-                self._layout[0][name],
-                np.ones(columns.shape[-1]),
-                np.full(columns.shape[-1], np.inf),
-                np.zeros(columns.shape[-1], dtype=bool),
-            )
-            for name, columns in self.linear.shape_columns.items()
-        }
+        numbers = {name: self._layout[0][name] for name in self.linear.shape_columns}
+        return {name: _Prior(k, np.ones(len(k)), np.full(len(k), np.inf), k < 0) for name, k in numbers.items()}
 
     def _prior(self, term):
         """The prior of one term's coefficients."""

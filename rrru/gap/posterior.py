@@ -100,8 +100,8 @@ class Posterior:
 
 def posterior(evidence, hypotheses, prior):
     """Posterior of the hypotheses that `rrru.gap.search.search` has found."""
-    library = evidence.library
-    log_weight = np.array([h.evidence + _log_prior_terms(library, h.terms, prior) for h in hypotheses])
+    log_prior = _LogPrior(evidence.library, prior)
+    log_weight = np.array([h.evidence + log_prior.terms(h.terms) for h in hypotheses])
     # single effects stay, however improbable: tables show what each does alone
     single = np.array([len(h.terms) <= 1 for h in hypotheses])
     worth = single | (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE)
@@ -112,36 +112,40 @@ def posterior(evidence, hypotheses, prior):
         # an unknown function is unexplained whatever else is
         known = hypothesis.effects.isdisjoint(UNKNOWN)
         unexplained[row] = prior.tolerance * evidence.explained(hypothesis) < LEVELS if known else True
-        log_weight[row] += _log_prior_levels(unexplained[row], prior)
+        log_weight[row] += log_prior.levels(unexplained[row])
     return Posterior(kept, np.exp(log_weight - log_sum_exp(log_weight.ravel())), unexplained)
 
 
-def _log_prior_terms(library, terms, prior):
-    """Logarithm of the prior probability of a set of terms, alike for all sets of one size."""
-    known = [term for term in terms if term.effect not in UNKNOWN]
-    functions = sum(name in UNKNOWN for name in library)
-    total = np.log(prior.counts[len(known)]) - np.log(comb(len(library) - functions, len(known)))
-    total += (len(terms) - len(known)) * np.log(prior.unexplained / max(functions, 1))
-    for term in known:
-        choices = variants(library[term.effect])
-        kinds = {c.legs if isinstance(c.legs, str) else "one" for c in choices}
-        total -= np.log(len(kinds)) + np.log(len(library[term.effect].coordinates.shapes))
-        if term.legs not in (EACH, SAME):
-            total -= np.log(3.0)
-    return total
+class _LogPrior:
+    """Logarithms of prior probabilities under a library."""
 
+    def __init__(self, library, prior):
+        self._prior, self._effects = prior, {}
+        self._functions = sum(name in UNKNOWN for name in library)
+        for name in library.keys() - UNKNOWN.keys():
+            kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
+            self._effects[name] = np.log(len(kinds)) + np.log(len(library[name].coordinates.shapes))
 
-def _log_prior_levels(unexplained, prior):
-    """Logarithm of the prior (levels,) of the discrepancy's level: half of what is not unexplained is none at all."""
-    if unexplained.all():
-        # its unknown function has paid for it
-        return np.log(np.where(np.arange(len(unexplained)) == 0, 0.5, 0.5 / (len(unexplained) - 1)))
-    result = np.empty(len(unexplained))
-    within = ~unexplained
-    spare = within.sum() - 1
-    result[within] = np.log((1.0 - prior.unexplained) * (0.5 / spare if spare else 1.0))
-    if spare:
-        result[0] = np.log((1.0 - prior.unexplained) * 0.5)
-    if unexplained.any():
-        result[unexplained] = np.log(prior.unexplained / unexplained.sum())
-    return result
+    def terms(self, terms):
+        """Of a set of terms, alike for all sets of one size."""
+        known = [term for term in terms if term.effect not in UNKNOWN]
+        total = np.log(self._prior.counts[len(known)]) - np.log(comb(len(self._effects), len(known)))
+        total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
+        for term in known:
+            total -= self._effects[term.effect]
+            if term.legs not in (EACH, SAME):
+                total -= np.log(3.0)
+        return total
+
+    def levels(self, unexplained):
+        """Of the discrepancy's levels (levels,): half of what is not unexplained is none at all."""
+        if unexplained.all():
+            # its unknown function has paid for it
+            return np.log(np.where(np.arange(len(unexplained)) == 0, 0.5, 0.5 / (len(unexplained) - 1)))
+        explained, spare = 1.0 - self._prior.unexplained, np.count_nonzero(~unexplained) - 1
+        result = np.full(len(unexplained), explained * (0.5 / spare if spare else 1.0))
+        if spare:
+            result[0] = explained * 0.5
+        if unexplained.any():
+            result[unexplained] = self._prior.unexplained / unexplained.sum()
+        return np.log(result)

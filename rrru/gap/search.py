@@ -1,6 +1,7 @@
 """The search over sets of effects: which hypotheses carry the posterior probability."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -23,7 +24,7 @@ class Hypothesis:
     evidence: np.ndarray
     strengths: np.ndarray
 
-    @property
+    @cached_property
     def effects(self):
         """Names of the effects, as a set."""
         return frozenset(term.effect for term in self.terms)

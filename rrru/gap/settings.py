@@ -49,19 +49,14 @@ class GapSettings:
 
 
 def _with_known(effect, values):
-    """The effect with parameters of its shapes fixed to known values; raises ConfigError for a parameter that no shape
-    holds.
-    """
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError where no shape holds one."""
     coordinates = effect.coordinates
     unknown = [key for key in values if key not in coordinates.shapes[0]]
     if unknown:
         allowed = ", ".join(coordinates.shapes[0]) or "none"
         raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
-    shapes = tuple(
-        dict(pairs)
-        for pairs in dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
-    )
-    return replace(effect, coordinates=replace(coordinates, shapes=shapes))
+    fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
+    return replace(effect, coordinates=replace(coordinates, shapes=tuple(map(dict, fixed))))
 
 
 def check(config):

@@ -1,5 +1,4 @@
-"""What a gap may look like that no law of the library makes: smooth functions, with a fair number of free coefficients
-each.
+"""What a gap may look like that no law of the library makes: smooth functions with many free coefficients each.
 
 They compete with the library on the same data. A law that acts has few numbers and wins; where one of these wins, the
 gap follows the drives, the time, the place or the load in a way that the library does not hold, and the verdict says
@@ -18,10 +17,9 @@ _DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
 
 @dataclass(frozen=True)
 class Unknown:
-    """A smooth function; basis: motion to (n, k) functions of about unit size, per_leg: added to each actuator value,
-    else to each axis.
+    """A smooth function; basis: motion, or a drive's values per_leg, to (n, k) functions of about unit size.
 
-    typical: size of its coefficients in the drive's unit or mm.
+    per_leg: added to each actuator value, else to each axis; typical: size of coefficients in the drive's unit or mm.
     """
 
     name: str
@@ -35,13 +33,8 @@ class Unknown:
     @property
     def coordinates(self):
         """One coefficient per function and leg or axis, in the drive's unit or mm."""
-        total = 3 * self.count
-        return Coordinates(
-            np.full(total, self.typical),
-            np.zeros(total, dtype=int),
-            np.zeros(total, dtype=bool),
-            lambda values, _: values,
-        )
+        legs = np.zeros(3 * self.count, dtype=int)
+        return Coordinates(np.full(len(legs), self.typical), legs, legs > 0, lambda values, _: values)
 
     def contribute(self, motion, values):
         """Changes under coefficients (3 k,)."""
@@ -75,11 +68,6 @@ def _of_place(motion):
     return np.stack([np.ones_like(x), x, y, z, x * x, y * y, z * z, x * y, y * z, z * x], axis=-1)
 
 
-def _of_place_linearly(motion):
-    """The four functions (n, 4) of first degree of the commanded position."""
-    return _of_place(motion)[:, :4]
-
-
 def _of_load(motion):
     """The payload (n, 4) alone and with the commanded position."""
     load = motion.payload_kg / max(np.nanmax(motion.payload_kg), 1e-9)
@@ -91,7 +79,13 @@ UNKNOWN = {
     for function in (
         Unknown("unknown_drive", "the drives", _of_angle, len(_DRIVE_ORDERS), (), True, 1e-4),
         Unknown("unknown_drift", "the time", _of_time, len(_TIME_ORDERS), ("time_s",)),
-        Unknown("unknown_affine", "the place as a rigid motion or a change of scale does", _of_place_linearly, 4, ()),
+        Unknown(
+            "unknown_affine",
+            "the place as a rigid motion or a change of scale does",
+            lambda motion: _of_place(motion)[:, :4],
+            4,
+            (),
+        ),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
         Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
     )
