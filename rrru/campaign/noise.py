@@ -1,7 +1,6 @@
 """The measuring noise of a campaign where nobody has stated it, and single points that the instrument got wrong."""
 
 import numpy as np
-from scipy.fft import dct
 
 from rrru.campaign import measurements as rows
 
@@ -13,6 +12,8 @@ _OUTLYING, _MOST = 8.0, 0.1
 
 def along_runs(values, run):
     """Cosine transform of (n, ...) along each run (n,), orthonormal, and the half-wave number (n,) of each row."""
+    from scipy.fft import dct
+
     result, wave = np.empty_like(values), np.empty(len(run))
     for label in np.unique(run):
         here = np.flatnonzero(run == label)

@@ -14,19 +14,6 @@ _NEGLIGIBLE = 25.0
 
 
 @dataclass(frozen=True)
-class Prior:
-    """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
-
-    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
-    inaccuracy.
-    """
-
-    counts: tuple = (0.3, 0.55, 0.13, 0.02)
-    unexplained: float = 0.1
-    tolerance: float = 0.04
-
-
-@dataclass(frozen=True)
 class Posterior:
     """Hypotheses with weights (h, levels) that sum to one, and where these count as unexplained (h, levels)."""
 

@@ -4,7 +4,19 @@ from dataclasses import dataclass, field, replace
 
 from rrru.effects.library import EFFECTS, SLIDER_EFFECTS, find
 from rrru.errors import ConfigError
-from rrru.gap.posterior import Prior
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
+
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    inaccuracy.
+    """
+
+    counts: tuple = (0.3, 0.55, 0.13, 0.02)
+    unexplained: float = 0.1
+    tolerance: float = 0.04
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from scipy.special import logsumexp
 
 from rrru.effects.library import EFFECTS
 from rrru.gap.evidence import LEVELS
-from rrru.gap.posterior import Posterior, Prior, posterior
+from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis
+from rrru.gap.settings import Prior
 from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
 from rrru.gap.verdict import decide, label
 

@@ -15,9 +15,10 @@ from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
 from rrru.gap.evidence import LEVELS, ModelEvidence
-from rrru.gap.posterior import Prior, posterior
+from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
+from rrru.gap.settings import Prior
 from rrru.gap.terms import Term, spread, variants
 from rrru.gap.verdict import decide
 from rrru.parameters import ParameterSet
