@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from rrru.campaign.measurements import vectors
-from rrru.studies.delta.paper_c import RESULTS
+from rrru.studies.delta.paper import RESULTS
 from rrru.studies.delta.zero_offset import Distances, one_step
 
 # paper C, 3.2 and 3.3: errors on the plane z = 0 in mm
