@@ -1,7 +1,6 @@
 """Ingest of a measured campaign: an instrument's CSV or parquet file becomes a measurement table or is refused."""
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -9,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
+from rrru.campaign.ingest.cells import read_cells
 from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, path_length, resolution
 from rrru.campaign.ingest.columns import KNOWN, MM, RAD, REQUIRED, convert, resolve
 from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts, frame_limit
@@ -16,7 +16,6 @@ from rrru.campaign.ingest.outliers import flag_outliers, reproduced
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, DRIVES, MEASURED, Sheet
-from rrru.campaign.ingest.text import looks_like, text_cells
 from rrru.campaign.measurements import command, measured, vector_columns
 from rrru.errors import ConfigError, FitError
 from rrru.robots.protocol import Mechanism
@@ -116,7 +115,7 @@ def ingest(spec: IngestSpec, mechanism: Mechanism) -> Ingested:
 def _read(spec: IngestSpec, mechanism: Mechanism) -> tuple[Sheet, list[str]]:
     """The file as a sheet with numbered runs and points, and what the user should know about its columns."""
     problems, notes = Problems(spec.path), []
-    names, rows, cells = _cells(Path(spec.path), problems)
+    names, rows, cells = read_cells(Path(spec.path), problems)
     found, extra = resolve(spec, names, DRIVES[mechanism.drive_unit], problems)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
@@ -126,49 +125,6 @@ def _read(spec: IngestSpec, mechanism: Mechanism) -> tuple[Sheet, list[str]]:
     frame, more = number_runs(frame)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
-
-
-def _cells(path: Path, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
-    """Names of the file's columns, numbers of its rows, and {name: cells (n,)}."""
-    suffix = path.suffix.lower()
-    try:
-        if not path.exists():
-            problems.refuse_now(value="no such file", allowed="an existing .csv or .parquet file")
-        if not path.is_file():
-            value = "a directory" if path.is_dir() else "no regular file"
-            problems.refuse_now(value=value, allowed="a .csv or .parquet file")
-        if suffix not in (".csv", ".parquet"):
-            allowed = ".csv or .parquet; a spreadsheet can be saved as .csv"
-            problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=allowed)
-        data = path.read_bytes()
-    except OSError as error:
-        problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
-    if suffix == ".parquet":
-        return _parquet_cells(data, problems)
-    names, rows, cells = text_cells(data, problems)
-    return names, rows, dict(zip(names, zip(*cells, strict=True), strict=True))
-
-
-def _parquet_cells(data: bytes, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
-    """As `_cells` for a parquet file's bytes; the columns that pandas adds for its index are left out."""
-    import pyarrow
-    import pyarrow.parquet
-
-    if not data.startswith(b"PAR1"):
-        seen = looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
-        problems.refuse_now(value=seen, allowed="a parquet file; comma-separated text has the extension .csv")
-    try:
-        table = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data)).read()
-        names = [name for name in table.column_names if not re.fullmatch(r"__index_level_\d+__", name)]
-        columns = zip(table.column_names, table.columns, strict=True)
-        cells = {name: column.to_pylist() for name, column in columns if name in names}
-    except (pyarrow.ArrowException, OSError, ValueError) as error:
-        cause = str(error).strip().splitlines()[0]
-        value = f"a damaged or truncated parquet file of {len(data)} bytes ({cause})"
-        problems.refuse_now(value=value, allowed="a whole parquet file")
-    if not table.num_rows:
-        problems.refuse_now(value=f"columns ({', '.join(names)}) and no row", allowed="one row per measured point")
-    return names, list(range(1, table.num_rows + 1)), cells
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

@@ -1,7 +1,12 @@
-"""The cells of a comma-separated file as text; every fault of the file itself shows before a number is looked at."""
+"""The cells of a CSV or parquet file; every fault of the file itself shows before a number is looked at."""
 
 import csv
 import io
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from rrru.campaign.ingest.problems import Problems
 
 _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", " ": "spaces"}
 _SIGNATURES = (
@@ -18,12 +23,55 @@ _OTHER_ENCODING = f"{_COMMA_SEPARATED}; save the file again with the encoding UT
 _TWO_FIELDS = "; a decimal comma makes two fields of one number"
 
 
-def looks_like(data):
+def read_cells(path: Path, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
+    """Names of the file's columns, numbers of its rows, and {name: cells (n,)}."""
+    suffix = path.suffix.lower()
+    try:
+        if not path.exists():
+            problems.refuse_now(value="no such file", allowed="an existing .csv or .parquet file")
+        if not path.is_file():
+            value = "a directory" if path.is_dir() else "no regular file"
+            problems.refuse_now(value=value, allowed="a .csv or .parquet file")
+        if suffix not in (".csv", ".parquet"):
+            allowed = ".csv or .parquet; a spreadsheet can be saved as .csv"
+            problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=allowed)
+        data = path.read_bytes()
+    except OSError as error:
+        problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
+    if suffix == ".parquet":
+        return _parquet_cells(data, problems)
+    names, rows, cells = _text_cells(data, problems)
+    return names, rows, dict(zip(names, zip(*cells, strict=True), strict=True))
+
+
+def _parquet_cells(data: bytes, problems: Problems) -> tuple[list[str], list[int], dict[str, Sequence]]:
+    """As `read_cells` for a parquet file's bytes; the columns that pandas adds for its index are left out."""
+    import pyarrow
+    import pyarrow.parquet
+
+    if not data.startswith(b"PAR1"):
+        seen = _looks_like(data) or (f"text or other data ({data[:30]!r})" if data else "an empty file")
+        problems.refuse_now(value=seen, allowed="a parquet file; comma-separated text has the extension .csv")
+    try:
+        table = pyarrow.parquet.ParquetFile(pyarrow.BufferReader(data)).read()
+        names = [name for name in table.column_names if not re.fullmatch(r"__index_level_\d+__", name)]
+        columns = zip(table.column_names, table.columns, strict=True)
+        cells = {name: column.to_pylist() for name, column in columns if name in names}
+    except (pyarrow.ArrowException, OSError, ValueError) as error:
+        cause = str(error).strip().splitlines()[0]
+        value = f"a damaged or truncated parquet file of {len(data)} bytes ({cause})"
+        problems.refuse_now(value=value, allowed="a whole parquet file")
+    if not table.num_rows:
+        problems.refuse_now(value=f"columns ({', '.join(names)}) and no row", allowed="one row per measured point")
+    return names, list(range(1, table.num_rows + 1)), cells
+
+
+def _looks_like(data):
     """Name of the file format that the first bytes give away, or None."""
     return next((name for signature, name in _SIGNATURES if data.startswith(signature)), None)
 
 
-def text_cells(data, problems):
+def _text_cells(data, problems):
     """Names of the columns, numbers of the data rows and their cells (lists of text) of a CSV file's bytes.
 
     Rows with another number of fields than the header are noted and left out, as are empty lines at the end. Raises
@@ -52,7 +100,7 @@ def text_cells(data, problems):
 
 def _decode(data, problems):
     """Text of the bytes; a UTF-8 byte-order mark is accepted."""
-    if known := looks_like(data):
+    if known := _looks_like(data):
         problems.refuse_now(value=known, allowed=_COMMA_SEPARATED)
     head = data[:4096]
     if data.startswith(_UTF16) or b"\0" in head:
