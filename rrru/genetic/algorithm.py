@@ -103,11 +103,7 @@ def minimise(objective, low, high, settings, seed):
 
 
 class _BatchGA(pygad.GA):
-    """PyGAD's loop with the two methods that visit every individual in Python replaced by array forms (0.15 to 0.014 ms
-    a generation).
-
-    Both are public; what they return is the same, as nothing here is cached between generations.
-    """
+    """PyGAD's loop with the two public methods that visit every individual in Python replaced by array forms."""
 
     def cal_pop_fitness(self):
         """Fitness of the whole population, shape (n,), in one call."""

@@ -43,13 +43,10 @@ def study_set(searched, identified, calibration, runs):
         seconds.append(perf_counter() - start)
         shared = identifiable_truth(mechanism, parameters.mapping(result.deviations))
         polish = least_mean_distance(identified, mechanism.parameters.vector(shared))
-        row = result.row() | {
-            "polished_mm": polish.mean_mm,
-            "optimum_mm": best.mean_mm,
-            "polish_evaluations": polish.evaluations,
-            "excess": _excess(result.objective, best.mean_mm),
-            "polished_excess": _excess(polish.mean_mm, best.mean_mm),
-        }
+        polished = {"polished_mm": polish.mean_mm, "polish_evaluations": polish.evaluations}
+        above = {"excess": result.objective, "polished_excess": polish.mean_mm}
+        row = result.row() | polished | {"optimum_mm": best.mean_mm}
+        row |= {name: _excess(value, best.mean_mm) for name, value in above.items()}
         found = dict(zip(parameters, result.deviations, strict=True)) | {
             one: shared[one.name] for one in mechanism.parameters if one.name not in parameters.names
         }

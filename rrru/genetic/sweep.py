@@ -1,6 +1,4 @@
-"""Sweeps of the genetic algorithm's settings over many seeds, and whether a setting's effect can be told from the
-seeds' scatter.
-"""
+"""Sweeps of the genetic algorithm's settings over many seeds, and whether their effect shows above the scatter."""
 
 from dataclasses import replace
 
@@ -50,7 +48,8 @@ def setting_effect(runs):
     rows = []
     for (parameter, population), group in runs.groupby(["parameter", "population"]):
         mutates = group["value"] < 1.0 if parameter == "crossover_fraction" else np.full(len(group), True)
-        every, mutating = _kruskal(group), _kruskal(group[mutates])
+        every = _kruskal(group)
+        mutating = every if mutates.all() else _kruskal(group[mutates])
         rows.append(
             {"parameter": parameter, "population": population, "settings": group["value"].nunique(), "runs": len(group)}
             | every
@@ -61,8 +60,7 @@ def setting_effect(runs):
 
 
 def setting_pairs(runs, seed=0):
-    """How far each setting is from the best one: a row per value but the best, of each (parameter, population) of a
-    table of runs.
+    """How far each setting is from the best one: a row per value but the best, of each (parameter, population) of runs.
 
     Columns: parameter, population, value, best_value (lowest median objective), median_mm, difference_mm (of the
     medians, value minus best) with its 95 % percentile-bootstrap interval difference_low_mm, difference_high_mm (NaN
@@ -78,48 +76,39 @@ def setting_pairs(runs, seed=0):
         best = min(samples, key=lambda value: np.median(samples[value]))
         pairs = []
         for value, sample in samples.items():
-            if value == best:
-                continue
-            difference, low, high = _median_difference(
-                sample, samples[best], run_seed(seed, parameter, population, value)
-            )
-            pairs.append(
-                {"parameter": parameter, "population": population, "value": value, "best_value": best}
-                | {"median_mm": float(np.median(sample)), "difference_mm": difference}
-                | {"difference_low_mm": low, "difference_high_mm": high}
-                | {"p_value": float(stats.mannwhitneyu(sample, samples[best]).pvalue)}
-            )
+            if value != best:
+                own = run_seed(seed, parameter, population, value)
+                label = {"parameter": parameter, "population": population, "value": value, "best_value": best}
+                test = {"p_value": float(stats.mannwhitneyu(sample, samples[best]).pvalue)}
+                difference = _median_difference(sample, samples[best], own)
+                pairs.append(label | {"median_mm": float(np.median(sample))} | difference | test)
         for pair, corrected in zip(pairs, _holm([pair["p_value"] for pair in pairs]), strict=True):
             rows.append(pair | {"p_holm": corrected, "distinguishable": corrected < _LEVEL})
     return pd.DataFrame(rows)
 
 
 def _kruskal(group):
-    """Statistic, p value and epsilon squared of the Kruskal-Wallis test of the objective over the values of a group of
-    runs.
-    """
+    """Kruskal-Wallis test of the objective over the values of a group of runs: statistic, p value, epsilon squared."""
     from scipy import stats
 
     samples = [part.to_numpy() for _, part in group.groupby("value")["objective_mm"]]
     if len(samples) < 2 or group["objective_mm"].nunique() < 2:
         return {"statistic": 0.0, "p_value": 1.0, "epsilon_squared": 0.0}
     test = stats.kruskal(*samples)
-    return {
-        "statistic": float(test.statistic),
-        "p_value": float(test.pvalue),
-        "epsilon_squared": float(test.statistic / (len(group) - 1)),
-    }
+    share = float(test.statistic / (len(group) - 1))
+    return {"statistic": float(test.statistic), "p_value": float(test.pvalue), "epsilon_squared": share}
 
 
 def _median_difference(sample, reference, seed):
     """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it cannot be had."""
     from scipy import stats
 
+    names = ("difference_mm", "difference_low_mm", "difference_high_mm")
     if not np.isfinite([*sample, *reference]).all():
-        return np.nan, np.nan, np.nan
+        return dict.fromkeys(names, np.nan)
     difference = float(np.median(sample) - np.median(reference))
     if min(len(sample), len(reference)) < 2:
-        return difference, np.nan, np.nan
+        return dict(zip(names, (difference, np.nan, np.nan), strict=True))
     interval = stats.bootstrap(
         (sample, reference),
         lambda a, b, axis=-1: np.median(a, axis=axis) - np.median(b, axis=axis),
@@ -129,7 +118,7 @@ def _median_difference(sample, reference, seed):
         vectorized=True,
         rng=np.random.default_rng(seed),
     ).confidence_interval
-    return difference, float(interval.low), float(interval.high)
+    return dict(zip(names, (difference, float(interval.low), float(interval.high)), strict=True))
 
 
 def _holm(p_values):

@@ -106,14 +106,12 @@ def test_the_setting_without_mutation_is_set_aside_for_crossover_only():
 
 def test_scatter_alone_is_called_an_effect_as_seldom_as_promised():
     random = np.random.default_rng(2)
-    called = [
-        sweep.setting_effect(table({value: random.exponential(size=20) for value in range(10)}, "migration_fraction"))[
-            "distinguishable_mutating"
-        ].iloc[0]
-        for _ in range(200)
-    ]
-    # 5 % of 200 runs, standard deviation 3.1
-    assert 0 < sum(called) < 10 + 3 * 3.1
+    keys = {"parameter": "migration_fraction", "population": np.repeat(np.arange(200), 200)}
+    runs = pd.DataFrame(keys | {"value": np.tile(np.repeat(np.arange(10), 20), 200)})
+    effects = sweep.setting_effect(runs.assign(objective_mm=random.exponential(size=len(runs))))
+    # 5 % of 200 tables, standard deviation 3.1
+    assert len(effects) == 200
+    assert 0 < effects["distinguishable_mutating"].sum() < 10 + 3 * 3.1
 
 
 @pytest.mark.parametrize(
@@ -162,8 +160,8 @@ def test_the_bootstrap_interval_covers_as_often_as_promised():
     random = np.random.default_rng(4)
     covered = 0
     for trial in range(60):
-        low, high = sweep._median_difference(random.normal(1.0, 1.0, 25), random.normal(0.0, 1.0, 25), trial)[1:]
-        covered += low <= 1.0 <= high
+        found = sweep._median_difference(random.normal(1.0, 1.0, 25), random.normal(0.0, 1.0, 25), trial)
+        covered += found["difference_low_mm"] <= 1.0 <= found["difference_high_mm"]
     # 95 % of 60 is 57, standard deviation 1.7; the percentile interval of medians errs to the wide side
     assert covered >= 52
 
