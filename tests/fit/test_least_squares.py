@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import analyse
-from rrru.fit.least_squares import least_squares
+from rrru.fit.least_squares import last_kept, least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
 from rrru.robots.rrru3 import Rrru3
@@ -206,3 +206,19 @@ def test_points_that_cannot_be_fitted_are_named(rich_poses):
         Residuals(Rrru3(), theta, measured, points)
     with pytest.raises(FitError, match="the nominal robot cannot take 200 of 200 poses"):
         Residuals(Rrru3(L3_mm=100.0), theta, points, points)
+
+
+def test_the_last_answer_is_kept_for_the_same_deviations_only():
+    class Asked:
+        count = 0
+
+        @last_kept
+        def square(self, deviations):
+            self.count += 1
+            return deviations**2
+
+    one, other = Asked(), Asked()
+    for value in (np.array([1.0, 2.0]), np.array([1.0, 2.0]), np.array([1.0, 3.0])):
+        np.testing.assert_array_equal(one.square(value), value**2)
+    np.testing.assert_array_equal(other.square(np.array([2.0])), [4.0])
+    assert one.count == 2 and other.count == 1

@@ -53,10 +53,8 @@ def seen_dots(view, rotation, translation_mm, noise_px=0.0, generator=None):
 def drawn_errors(config, truth, noise_px, count, label):
     """Errors (n, 3) of the optical centres of `delta_truth` by how they are found, for `count` draws of the chain."""
     robot, view = twin(config), scene(config)
-    size, lattice = (
-        (view.camera.width_px, view.camera.height_px),
-        vision.Lattice(view.target.pitch_mm, view.target.diameter_mm),
-    )
+    camera, target = view.camera, view.target
+    size, lattice = (camera.width_px, camera.height_px), vision.Lattice(target.pitch_mm, target.diameter_mm)
 
     def draw(number):
         own, generator = view.with_plate(robot.generator("target", label, number)), robot.generator(label, number)

@@ -68,28 +68,15 @@ class Scene:
 def scene(config):
     """The scene of the configuration's `delta` section."""
     section = config["delta"]
-    given, mount, plate = dict(section["camera"]), section["mount"], dict(section["target"])
+    given, mount, plate, tilted = (dict(section[key]) for key in ("camera", "mount", "target", "tilted_views"))
     given |= {key: tuple(given[key]) for key in ("centre_offset_px", "distortion")}
-    camera_turn, target_turn = (
-        Rotation.from_rotvec(part["turn_deg"], degrees=True).as_matrix() for part in (mount, plate)
-    )
-    dot_error = plate.pop("dot_error_mm")
-    plate.pop("turn_deg")
-    target, offset = Target(**plate, offsets_mm=None), np.array(mount["offset_mm"])
+    mount_turn, turn = (Rotation.from_rotvec(part.pop("turn_deg"), degrees=True).as_matrix() for part in (mount, plate))
+    dot_error, offset, above = plate.pop("dot_error_mm"), np.array(mount["offset_mm"]), section["distance_mm"]
+    target = Target(**plate, offsets_mm=None)
     # the dots' middle lies below the camera when the platform is in the middle of its poses
-    middle = offset + np.array([0.0, 0.0, section["poses"]["z_mm"] - section["distance_mm"]])
-    bare = Scene(
-        Camera(**given),
-        target,
-        camera_turn @ _LOOKING_DOWN,
-        target_turn,
-        middle - target_turn @ target.middle_mm,
-        offset,
-        section["distance_mm"],
-        dot_error,
-        section["tilted_views"]["count"],
-        section["tilted_views"]["tilt_deg"],
-    )
+    place = offset + np.array([0.0, 0.0, section["poses"]["z_mm"] - above]) - turn @ target.middle_mm
+    turns = mount_turn @ _LOOKING_DOWN, turn
+    bare = Scene(Camera(**given), target, *turns, place, offset, above, dot_error, tilted["count"], tilted["tilt_deg"])
     return bare.with_plate(twin(config).generator("target"))
 
 
