@@ -15,7 +15,7 @@ from rrru.errors import UnreachableError
 from rrru.robots import singularity
 from rrru.robots.first_order import FirstOrder
 from rrru.seeds import stream
-from rrru.studies.withheld.outside import OUTSIDE
+from rrru.studies.withheld.outside import CAUSES, OUTSIDE
 from rrru.studies.withheld.robots import PASSES, Acting, Robot, true_gap_mm
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
@@ -105,20 +105,16 @@ def _safe(section, mechanism):
     """Whether the trajectories stay clear of both singularities."""
     points = np.concatenate([trajectory.curve(np.linspace(0.0, 1.0, 100)) for trajectory in from_config(section)])
     theta = mechanism.inverse(points)
-    measures = [
-        measure(mechanism, points, theta)
-        for measure in (singularity.translational_measure, singularity.constraint_measure)
-    ]
-    return bool(np.isfinite(theta).all() and np.min(measures) > _SAFE)
+    measures = (singularity.translational_measure, singularity.constraint_measure)
+    return bool(np.isfinite(theta).all() and min(of(mechanism, points, theta).min() for of in measures) > _SAFE)
 
 
 def draw_acting(robot, name, single, span, generator, conditions):
     """A cause of a strength drawn log-uniform from a span; single: it may sit on one leg alone, as a third of them do.
 
-    Draws that would break a parameter's bounds or lose a pose are made again, the strength only where no draw can have
-    it.
+    Draws that would break a bound or lose a pose are made again, the strength only where no draw can have it.
     """
-    coordinates = (EFFECTS[name] if name in EFFECTS else OUTSIDE[name]).coordinates
+    coordinates = CAUSES[name].coordinates
     for _ in range(_DRAWS):
         strength = float(np.exp(generator.uniform(*np.log(span))))
         for _ in range(_DRAWS):

@@ -8,10 +8,9 @@ from matplotlib.ticker import LogLocator, MultipleLocator
 from rrru.errors import ConfigError
 from rrru.figures import style
 from rrru.studies.withheld.summary import wilson
-from rrru.studies.withheld.verdicts import UNEXPLAINED
+from rrru.studies.withheld.verdicts import PREFIX, UNEXPLAINED, is_outside
 
 NONE, OUTSIDE, SEVERAL = "none", "outside the library", "two or more"
-_OUTSIDE_MARK = "outside:"
 _CHECKS = {
     "label": ("label withheld", style.LINES),
     "effect": ("effect withheld", style.SPIRAL),
@@ -61,8 +60,8 @@ def withheld(tables, options):
 def _truth(truth, check):
     """The row of a truth: one effect (of the effect check: the one taken out), none, outside, or several."""
     if check == "effect":
-        truth = truth.removeprefix(_OUTSIDE_MARK)
-    return OUTSIDE if truth.startswith((_OUTSIDE_MARK, UNEXPLAINED)) else SEVERAL if "+" in truth else truth
+        truth = truth.removeprefix(f"{PREFIX}:")
+    return OUTSIDE if is_outside(truth) else SEVERAL if "+" in truth else truth
 
 
 def _verdict(verdict):

@@ -6,6 +6,7 @@ Effects as the library's are, used by the plant alone; sizes and places are assu
 import numpy as np
 
 from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.library import EFFECTS
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
 
@@ -91,3 +92,5 @@ OUTSIDE = {
         _make(_pulley_ripple, _RIPPLES, 3e-4),
     )
 }
+# whatever may act in a robot of the check
+CAUSES = EFFECTS | OUTSIDE

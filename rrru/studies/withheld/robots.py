@@ -8,7 +8,6 @@ import numpy as np
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.effects.effect import ActiveEffect
-from rrru.effects.library import EFFECTS
 from rrru.errors import FitError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
@@ -16,7 +15,7 @@ from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
-from rrru.studies.withheld.outside import OUTSIDE
+from rrru.studies.withheld.outside import CAUSES, OUTSIDE
 from rrru.studies.withheld.verdicts import PREFIX
 
 # no calibration shall hit a bound
@@ -86,7 +85,7 @@ class Acting:
     @property
     def law(self):
         """The cause itself, known in its true shape alone."""
-        law = EFFECTS[self.effect] if self.effect in EFFECTS else OUTSIDE[self.effect]
+        law = CAUSES[self.effect]
         return replace(law, coordinates=replace(law.coordinates, shapes=(self.shape,)))
 
     @property
