@@ -1,5 +1,11 @@
 """Poses that many tests share."""
 
+import os
+
+# one thread for linear algebra, as snakemake gives its scripts: sums are the same and two workers do not compete
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 import numpy as np
 import pytest
 

@@ -5,7 +5,7 @@ from rrru.studies.checks import check_once
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])
 # sections of all that is diagnosed, by name; a study adds its own campaigns
-DIAGNOSED = dict(config["campaigns"])
+DIAGNOSED = {name: config["campaigns"][name] for name in CAMPAIGNS}
 # what `snakemake` makes; every study adds its own
 TARGETS = []
 # figures {name: ("module:function", tables)} by study; every study adds its own

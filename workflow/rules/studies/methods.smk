@@ -1,7 +1,7 @@
 from rrru.studies.methods import parts as method_parts
 
 METHOD_TABLES = ["methods", "method_points"]
-METHOD_ROBOTS = sorted(config["methods"]["regions"])
+METHOD_ROBOTS = list(config["methods"]["regions"])
 METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TABLES)}
 FIGURES["method"] = METHOD_FIGURES
 
