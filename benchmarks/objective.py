@@ -62,7 +62,8 @@ def main():
         theirs, positions = _fsolve_rate(residuals, deviations[0], len(residuals))
         apart = np.abs(positions - residuals.model(deviations[0])).max()
         print(
-            f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, positions apart {apart:.1e} mm"
+            f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, "
+            f"positions apart {apart:.1e} mm"
         )
 
 

@@ -9,7 +9,7 @@ from rrru.errors import ConfigError
 
 
 def part(config, *keys):
-    """The configuration with nothing in it but the values under dotted keys such as "robots.rrru3"; absent ones are left out."""
+    """The values under dotted keys such as "robots.rrru3", nested as in the configuration; absent ones are left out."""
     result = {}
     for key in keys:
         source, target, steps = config, result, key.split(".")

@@ -20,7 +20,10 @@ EFFECTS = (
     *("frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth", "servo_lag"),
 )
 NOISE_MM = 0.035
-NEXT = "line_1 in reverse, 300 mm/s, payload 5 kg (separates link_flexure / drive_compliance, 14 nats); spiral in reverse, 80 mm/s"
+NEXT = (
+    "line_1 in reverse, 300 mm/s, payload 5 kg (separates link_flexure / drive_compliance, 14 nats); "
+    "spiral in reverse, 80 mm/s"
+)
 _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 0.98}
 
 

@@ -51,11 +51,12 @@ def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tm
 
 
 _TALL = {"L_mm": 290.0, "R_mm": 140.0, "r_mm": 33.0}
+_DIMENSIONS = ", ".join(f"{key}: {value}" for key, value in _TALL.items())
 _CAMPAIGNS = f"""
 campaigns:
   bare: {{robot: rrru3, ingest: bare.csv}}
   sliders: {{robot: ptt3, ingest: sliders.csv, noise_mm: 0.005}}
-  tall: {{robot: ptt3, ingest: tall.csv, dimensions: {{{", ".join(f"{k}: {v}" for k, v in _TALL.items())}, rail_inclination_deg: 90}}}}
+  tall: {{robot: ptt3, ingest: tall.csv, dimensions: {{{_DIMENSIONS}, rail_inclination_deg: 90}}}}
 genetic: {{seeds: 1, generations: 20}}
 """
 _TARGETS = ("bare/gap_verdicts", "sliders/gap_verdicts", "sliders/error_summary", "tall/parameters")

@@ -1,7 +1,8 @@
-"""Diagnosis of one campaign's gap between the calibrated sim and what was measured."""
+"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figure."""
 
 import pandas as pd
 
+from rrru.figures.drawing import draw_all
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES
 from rrru.gap.settings import GapSettings
@@ -12,17 +13,17 @@ from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the verdict and everything behind it."""
+    """Write the verdict and everything behind it, and draw it."""
     nominal, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
     robot = MeasuredRobot(nominal, masses, settings["noise_mm"], settings["campaign"])
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(tables.read(inputs["measurements"]), robot, chosen)
+    points = result.tables.pop("gap_points")
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
-    named = {
-        name: frames[name] if name == "gap_points" else frames[name].assign(campaign=settings["campaign"])
-        for name in outputs
-    }
-    tables.write_all(TABLES, named, outputs)
+    frames = {name: frame.assign(campaign=settings["campaign"]) for name, frame in frames.items()}
+    frames["gap_points"] = points
+    tables.write_all(TABLES, frames, outputs)
+    draw_all(settings["figures"], {name: outputs[name] for name in frames}, settings["options"], outputs)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,8 @@ def run(main, snakemake):
 
     _plain_run(recorded, snakemake)
     loaded = sorted(name for name in sys.modules if name.split(".")[0] == "rrru")
-    row = {"rule": snakemake.rule, "modules": loaded, "code": snakemake.params.code}
+    script = Path(main.__code__.co_filename).name.partition(".")[2]
+    row = {"rule": snakemake.rule, "script": script, "modules": loaded, "code": snakemake.params.code}
     row |= {"handed": sorted(leaves(snakemake.params.settings), key=str), "read": sorted(seen, key=str)}
     file = Path(os.environ["RRRU_RECORD"]) / f"{snakemake.rule}_{os.getpid()}.json"
     file.write_text(json.dumps(row))

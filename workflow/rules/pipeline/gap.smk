@@ -24,6 +24,8 @@ def diagnosed(wildcards):
         "masses": parts.masses(config, section),
         "noise_mm": section.get("noise_mm") or None,
         "use_near_singularity": config["calibration"]["use_near_singularity"],
+        "figures": GAP_FIGURE,
+        "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},
         **reads("seed", "gap"),
     }
 
@@ -33,37 +35,22 @@ def own_effects():
     return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
 
 
-# one job per campaign; it sees the measurements and what the configuration says of the robot
+# one job per campaign, its figure included: starting another would take longer than drawing it. It sees the measurements
+# and what the configuration says of the robot
 rule diagnose:
     input:
         measurements=part("measurements"),
     output:
         **named([*GAP_TABLES, "gap_points"], part),
+        **drawn(GAP_FIGURE, "figures/{campaign}"),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
         settings=diagnosed,
         own_effects=[hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()],
-        code=code("diagnose"),
+        code=code("diagnose", GAP_FIGURE),
     script:
         "../../scripts/diagnose.py"
-
-
-rule gap_figure:
-    input:
-        **named(shown(GAP_FIGURE), part),
-    output:
-        **drawn(GAP_FIGURE, "figures/{campaign}"),
-    log:
-        f"{RESULTS}/logs/figures/{{campaign}}_gap.log",
-    params:
-        settings=lambda wildcards: {
-            "figures": GAP_FIGURE,
-            "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(DIAGNOSED[wildcards.campaign])},
-        },
-        code=code("figure", GAP_FIGURE),
-    script:
-        "../../scripts/figure.py"
 
 
 use rule gather as gather_gap with:
