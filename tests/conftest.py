@@ -6,11 +6,11 @@ import os
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-import numpy as np
-import pytest
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
 
-from rrru.robots import singularity
-from rrru.robots.rrru3 import Rrru3
+from rrru.robots import singularity  # noqa: E402
+from rrru.robots.rrru3 import Rrru3  # noqa: E402
 
 
 @pytest.fixture(scope="session")
@@ -28,6 +28,8 @@ def rich_poses():
     return points[clear][:200], theta[clear][:200]
 
 
+# before pytest-xdist reads the groups
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """A module's tests stay on one worker, so that what they share is made once; the workflow's begin first."""
     for item in items:

@@ -8,10 +8,10 @@ import rrru
 
 _HEAD = """# What a run writes
 
-`tables/` holds the tables of the whole study, `campaigns/` each campaign's own parts of them, `figures/` every figure as
-PDF and PNG, `timings/` wall times (the only files whose bytes differ from run to run), `logs/` one log per job, `sweep/`
-the parts of the sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page is made from
-the `schemas.py` beside each package.
+`tables/` holds the tables of the whole study, `campaigns/` each campaign's own parts of them, `figures/` every figure
+as PDF and PNG, `timings/` wall times (the only files whose bytes differ from run to run), `logs/` one log per job,
+`sweep/` the parts of the sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page
+is made from the `schemas.py` beside each package.
 """
 
 

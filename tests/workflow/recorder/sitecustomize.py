@@ -25,21 +25,28 @@ class Recorded(dict):
         return super().__getitem__(key)
 
     def get(self, key, default=None):
-        return self[key] if key in self else default
+        """As of a dict."""
+        if key in self:
+            return self[key]
+        return default
 
     def __iter__(self):
         return iter(list(super().__iter__()))
 
     def keys(self):
+        """As of a dict."""
         return list(super().__iter__())
 
     def values(self):
+        """As of a dict."""
         return [self[key] for key in self]
 
     def items(self):
+        """As of a dict."""
         return [(key, self[key]) for key in self]
 
     def pop(self, key, *default):
+        """As of a dict."""
         self.seen.add((*self.path, key))
         return super().pop(key, *default)
 

@@ -5,17 +5,6 @@ CAMPAIGN_TABLES = ["campaigns", "singularity", *CALIBRATION_TABLES, *GENETIC_TAB
 TARGETS += named(CAMPAIGN_TABLES).values()
 
 
-def calibrated(*keys):
-    """What a rule about one campaign's calibrations reads: its robots, and the configuration under dotted keys."""
-
-    def settings(wildcards):
-        name = wildcards.campaign
-        robots = {"nominal": parts.nominal(config, name), "virtual": parts.virtual(config, name)}
-        return {"campaign": name, **robots, **reads(*keys)}
-
-    return settings
-
-
 rule calibrate:
     input:
         **named(["measurements", "campaigns"], part),

@@ -1,3 +1,6 @@
+import hashlib
+from pathlib import Path
+
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
 from rrru.studies.checks import check_once
@@ -31,6 +34,11 @@ def table(name):
     return f"{RESULTS}/tables/{name}.parquet"
 
 
+def under(folder):
+    """The paths of tables in a folder of the results, as a function of their names."""
+    return lambda name: f"{RESULTS}/{folder}/{name}.parquet"
+
+
 def named(names, place=table):
     """Paths by name."""
     return {name: place(name) for name in names}
@@ -55,3 +63,71 @@ def code(script, *figures):
 def reads(*keys):
     """The part of the configuration under dotted keys: all that a rule's script is given of it."""
     return parts.part(config, *keys)
+
+
+def campaign_file(wildcards):
+    """The file of an ingested campaign, nothing for a virtual one."""
+    return config["campaigns"][wildcards.campaign].get("ingest", [])
+
+
+def campaign_settings(wildcards):
+    """What one campaign is made from."""
+    name, calibration = wildcards.campaign, config["calibration"]
+    return {
+        "campaign": name,
+        "section": config["campaigns"][name],
+        "nominal": parts.nominal(config, name),
+        "virtual": parts.virtual(config, name),
+        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity", "sets")},
+    }
+
+
+def calibrated(*keys):
+    """What a rule about one campaign's calibrations reads: its robots, and the configuration under dotted keys."""
+
+    def settings(wildcards):
+        name = wildcards.campaign
+        robots = {"nominal": parts.nominal(config, name), "virtual": parts.virtual(config, name)}
+        return {"campaign": name, **robots, **reads(*keys)}
+
+    return settings
+
+
+def diagnosed(wildcards):
+    """What a diagnosis is told: what is known of the robot, never the truth of a virtual one."""
+    section = DIAGNOSED[wildcards.campaign]
+    return {
+        "campaign": wildcards.campaign,
+        "robot": parts.robot(config, section),
+        "masses": parts.masses(config, section),
+        "noise_mm": section.get("noise_mm") or None,
+        "use_near_singularity": config["calibration"]["use_near_singularity"],
+        "figures": GAP_FIGURE,
+        "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},
+        **reads("seed", "gap"),
+    }
+
+
+def own_effects_digests():
+    """Digests of these files, so that editing one reruns what it changes."""
+    return [hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()]
+
+
+def own_effects():
+    """The files that hold the user's own effects."""
+    return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
+
+
+def figure_options(campaign):
+    """What the figures of a campaign show."""
+    reproduce = config["reproduce"]
+    return {
+        "campaign": campaign,
+        "z_down": parts.z_down(config["campaigns"][campaign]),
+        "calibration_lines": reproduce["line_calibration"],
+        "calibration_spiral": reproduce["spiral_calibration"],
+        "sweep_campaign": REPRODUCED,
+        "sweep_calibration": reproduce["line_calibration"],
+        "method": reproduce["method"],
+        "mode": "closed_loop",
+    }

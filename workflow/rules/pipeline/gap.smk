@@ -1,6 +1,3 @@
-import hashlib
-from pathlib import Path
-
 CHECKS.append("rrru.gap.settings:check")
 GAP_TABLES = [
     "gap_verdicts",
@@ -15,26 +12,6 @@ GAP_TABLES = [
 GAP_FIGURE = {"gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_attribute", "gap_shrink", "gap_points"])}
 
 
-def diagnosed(wildcards):
-    """What a diagnosis is told: what is known of the robot, never the truth of a virtual one."""
-    section = DIAGNOSED[wildcards.campaign]
-    return {
-        "campaign": wildcards.campaign,
-        "robot": parts.robot(config, section),
-        "masses": parts.masses(config, section),
-        "noise_mm": section.get("noise_mm") or None,
-        "use_near_singularity": config["calibration"]["use_near_singularity"],
-        "figures": GAP_FIGURE,
-        "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},
-        **reads("seed", "gap"),
-    }
-
-
-def own_effects():
-    """The files that hold the user's own effects."""
-    return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
-
-
 # one job per campaign, its figure included: starting another would take longer than drawing it. It sees the measurements
 # and what the configuration says of the robot
 rule diagnose:
@@ -47,7 +24,7 @@ rule diagnose:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
         settings=diagnosed,
-        own_effects=[hashlib.sha256(file.read_bytes()).hexdigest() for file in own_effects() if file.is_file()],
+        own_effects=own_effects_digests(),
         code=code("diagnose", GAP_FIGURE),
     script:
         "../../scripts/diagnose.py"

@@ -24,15 +24,10 @@ PAPERS["C"] = {
 }
 
 
-def delta_part(name):
-    """Path of a table that one step hands to the next."""
-    return f"{RESULTS}/delta/{name}.parquet"
-
-
 rule delta_images:
     output:
         images=f"{RESULTS}/delta/images.npz",
-        delta_truth=delta_part("truth"),
+        delta_truth=under("delta")("truth"),
     log:
         f"{RESULTS}/logs/delta_images.log",
     params:
@@ -48,7 +43,7 @@ rule delta_vision:
         images=f"{RESULTS}/delta/images.npz",
     output:
         **named(DELTA_IMAGE_TABLES),
-        delta_lens=delta_part("lens"),
+        delta_lens=under("delta")("lens"),
         delta_timings=f"{RESULTS}/timings/delta/steps.parquet",
     log:
         f"{RESULTS}/logs/delta_vision.log",
@@ -62,8 +57,8 @@ rule delta_vision:
 rule delta_calibrate:
     input:
         **named(["delta_centres", "delta_dots"]),
-        delta_lens=delta_part("lens"),
-        delta_truth=delta_part("truth"),
+        delta_lens=under("delta")("lens"),
+        delta_truth=under("delta")("truth"),
     output:
         **named(DELTA_TABLES),
     log:
@@ -78,7 +73,7 @@ rule delta_calibrate:
 rule delta_twin:
     input:
         delta_dots=table("delta_dots"),
-        delta_truth=delta_part("truth"),
+        delta_truth=under("delta")("truth"),
     output:
         twin=f"{RESULTS}/twin/delta.yaml",
     log:

@@ -6,18 +6,13 @@ METHOD_FIGURES = {"methods": ("rrru.studies.methods.figures:methods", METHOD_TAB
 FIGURES["method"] = METHOD_FIGURES
 
 
-def method_part(name, robot="{robot}"):
-    """Path of one robot's part of a table of the comparison."""
-    return f"{RESULTS}/methods/{robot}/{name}.parquet"
-
-
 # the Delta is also given what its images have shown
 rule compare_methods:
     input:
         calibrations=lambda wildcards: table("delta_calibrations") if wildcards.robot == "delta" else [],
         poses=lambda wildcards: table("delta_poses") if wildcards.robot == "delta" else [],
     output:
-        **named(METHOD_TABLES, method_part),
+        **named(METHOD_TABLES, under("methods/{robot}")),
         method_timings=f"{RESULTS}/timings/methods_{{robot}}.parquet",
     log:
         f"{RESULTS}/logs/methods/{{robot}}.log",
@@ -32,7 +27,7 @@ rule compare_methods:
 
 use rule gather as gather_methods with:
     input:
-        **{name: [method_part(name, robot) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
+        **{name: [under(f"methods/{robot}")(name) for robot in METHOD_ROBOTS] for name in METHOD_TABLES},
     output:
         **named(METHOD_TABLES),
     log:

@@ -34,32 +34,12 @@ CAMPAIGN_FIGURES = {
 }
 
 
-def figure_options(campaign):
-    """What the figures of a campaign show."""
-    reproduce = config["reproduce"]
-    return {
-        "campaign": campaign,
-        "z_down": parts.z_down(config["campaigns"][campaign]),
-        "calibration_lines": reproduce["line_calibration"],
-        "calibration_spiral": reproduce["spiral_calibration"],
-        "sweep_campaign": REPRODUCED,
-        "sweep_calibration": reproduce["line_calibration"],
-        "method": reproduce["method"],
-        "mode": "closed_loop",
-    }
-
-
-def sweep_part(name, parameter="{parameter}", population="{population}"):
-    """Path of one sweep's part of a table."""
-    return f"{RESULTS}/sweep/{parameter}/{population}/{name}.parquet"
-
-
 # all values and seeds of one swept setting
 rule sweep:
     input:
         measurements=part("measurements", REPRODUCED),
     output:
-        **named(SWEEP_RUNS, sweep_part),
+        **named(SWEEP_RUNS, under("sweep/{parameter}/{population}")),
     log:
         f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}.log",
     wildcard_constraints:
@@ -80,7 +60,11 @@ rule sweep:
 rule sweep_tables:
     input:
         **{
-            name: expand(sweep_part(name), parameter=SWEPT, population=sorted(config["sweep"]["populations"]))
+            name: expand(
+                under("sweep/{parameter}/{population}")(name),
+                parameter=SWEPT,
+                population=sorted(config["sweep"]["populations"]),
+            )
             for name in SWEEP_RUNS
         },
     output:

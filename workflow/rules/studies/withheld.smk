@@ -6,30 +6,25 @@ WITHHELD = chunks(config["withheld"])
 WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "summary", "confusion")]
 WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
 FIGURES["withheld"] = WITHHELD_FIGURES
+# what is known of every robot
+WITHHELD_ROBOT = {
+    "robot": parts.robot(config, {"robot": "rrru3"}),
+    "masses": parts.masses(config, {}),
+    **reads("seed", "withheld.noise_mm"),
+}
 
 
 wildcard_constraints:
     chunk="|".join(WITHHELD) or "none",
 
 
-def withheld_part(name, chunk="{chunk}"):
-    """Path of a chunk's part of a table."""
-    return f"{RESULTS}/withheld/{name.removeprefix('withheld_')}/{chunk}.parquet"
-
-
-def withheld_robot(*keys):
-    """What is known of every robot, and the configuration under dotted keys."""
-    known = {"robot": parts.robot(config, {"robot": "rrru3"}), "masses": parts.masses(config, {})}
-    return {**known, **reads("seed", "withheld.noise_mm", *keys)}
-
-
 rule withheld_robots:
     output:
-        **named(["withheld_answers", "withheld_measurements"], withheld_part),
+        **named(["withheld_answers", "withheld_measurements"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_robots/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {"members": WITHHELD[wildcards.chunk], **withheld_robot("motion")},
+        settings=lambda wildcards: {"members": WITHHELD[wildcards.chunk], **WITHHELD_ROBOT, **reads("motion")},
         code=code("withheld_robots"),
     script:
         "../../scripts/withheld_robots.py"
@@ -38,17 +33,18 @@ rule withheld_robots:
 # it sees the measurements and which effects its library lacks, never an answer
 rule withheld_diagnose:
     input:
-        **named(["withheld_measurements"], withheld_part),
+        **named(["withheld_measurements"], under("withheld/{chunk}")),
     output:
-        **named(["withheld_verdicts", "withheld_states"], withheld_part),
+        **named(["withheld_verdicts", "withheld_states"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
             "taken_out": {member.name: member.effect for member in WITHHELD[wildcards.chunk]},
-            **withheld_robot("gap"),
+            **WITHHELD_ROBOT,
+            **reads("gap"),
         },
-        own_effects=lambda wildcards: own_effects(),
+        own_effects=own_effects_digests(),
         code=code("withheld_diagnose"),
     script:
         "../../scripts/withheld_diagnose.py"
@@ -56,14 +52,17 @@ rule withheld_diagnose:
 
 rule withheld_score:
     input:
-        **named(["withheld_answers", "withheld_measurements", "withheld_verdicts", "withheld_states"], withheld_part),
+        **named(
+            ["withheld_answers", "withheld_measurements", "withheld_verdicts", "withheld_states"],
+            under("withheld/{chunk}"),
+        ),
     output:
-        **named(["withheld_scores", "withheld_limits"], withheld_part),
+        **named(["withheld_scores", "withheld_limits"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        settings=withheld_robot("motion", "gap"),
-        own_effects=lambda wildcards: own_effects(),
+        settings={**WITHHELD_ROBOT, **reads("motion", "gap")},
+        own_effects=own_effects_digests(),
         code=code("withheld_score"),
     script:
         "../../scripts/withheld_score.py"
@@ -72,7 +71,7 @@ rule withheld_score:
 rule withheld_summary:
     input:
         **{
-            name: [withheld_part(name, chunk) for chunk in WITHHELD]
+            name: [under(f"withheld/{chunk}")(name) for chunk in WITHHELD]
             for name in ("withheld_verdicts", "withheld_scores", "withheld_limits")
         },
         field=[part("gap_verdicts", campaign) for campaign in config["withheld"]["field"]],
