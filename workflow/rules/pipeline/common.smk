@@ -83,7 +83,7 @@ def campaign_settings(wildcards):
 
 
 def calibrated(*keys):
-    """What a rule about one campaign's calibrations reads: its robots, and the configuration under dotted keys."""
+    """What a job about one campaign's calibrations reads, its robots and the configuration under dotted keys."""
 
     def settings(wildcards):
         name = wildcards.campaign
