@@ -21,7 +21,7 @@ Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Funda
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _TILTS = (("tilt_x", "rad", -0.03, 0.03), ("tilt_z", "rad", -0.03, 0.03))

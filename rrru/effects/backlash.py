@@ -24,7 +24,7 @@ the play of its nut in mm (paper B, section 3.1).
 import numba
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 

@@ -22,7 +22,7 @@ assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _KINDS = (("azimuth", "rad", -0.03, 0.03), ("radius", "mm", -30.0, 30.0), ("height", "mm", -30.0, 30.0))

@@ -26,7 +26,7 @@ Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsi
 on 50 kN m/rad make 3e-4 rad.
 """
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 

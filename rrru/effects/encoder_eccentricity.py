@@ -19,8 +19,8 @@ Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 201
 assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
-from rrru.effects.effect import Contribution, Effect
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
+from rrru.effects.protocol import Contribution, Effect
 from rrru.parameters import ParameterSet
 
 _PARAMETERS = ParameterSet(harmonic_parameters("eccentricity over grating radius; up to some arc minutes, assumed"))

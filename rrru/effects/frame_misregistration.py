@@ -21,7 +21,7 @@ Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _KINDS = (("shift", "mm", 100.0), ("turn", "rad", 0.1))

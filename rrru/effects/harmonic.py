@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.effects.effect import Coordinates, leg_parameters
+from rrru.effects.protocol import Coordinates, leg_parameters
 from rrru.parameters import LEGS
 
 

@@ -22,7 +22,7 @@ Paper A, section 3.3, blames it for what calibration leaves; its size is assumed
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(

@@ -22,7 +22,7 @@ workshop holds on welded or clamped links of this length, ISO 2768-1 class m (+-
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rrru.effects.effect import PLACES, ActiveEffect, Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import PLACES, ActiveEffect, Contribution, Effect, plain_coordinates
 from rrru.errors import ConfigError
 from rrru.parameters import ParameterSet
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.effect import Motion
+from rrru.effects.protocol import Motion
 from rrru.robots.dynamics import drive_rates, held_force, loads
 from rrru.robots.rrru3 import Rrru3
 

@@ -19,7 +19,7 @@ assumed: 0.3 mm over 300 mm.
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _TURNS = tuple((kind, "rad", -0.05, 0.05) for kind in ("lean", "rise", "swing"))

@@ -21,7 +21,7 @@ second.
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _SOURCE = "inverse of the position loop's gain, assumed"

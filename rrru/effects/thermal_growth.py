@@ -22,7 +22,7 @@ aluminium has 2.3e-5 per kelvin, so that 10 K make 2.3e-4; time constants from h
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _PARAMETERS = ParameterSet(

@@ -21,8 +21,8 @@ is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
+from rrru.effects.protocol import Contribution, Effect
 from rrru.parameters import Parameter, ParameterSet
 
 

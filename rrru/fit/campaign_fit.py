@@ -12,7 +12,7 @@ from rrru.errors import ConfigError, FitError
 from rrru.fit.least_squares import Fit, least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 
 
 @dataclass(frozen=True)

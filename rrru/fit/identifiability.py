@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 
 # A direction whose singular value is smaller than this share of the largest is not seen: it would need millimetre data
 # true to nanometres.

@@ -8,7 +8,7 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import last_kept
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs
-from rrru.effects.effect import Contribution, Motion
 from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
 from rrru.gap.unknown import UNKNOWN, unknown_functions
 from rrru.plant.closure import corrected_sim

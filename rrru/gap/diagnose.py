@@ -17,7 +17,7 @@ from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.verdict import Verdict, decide
 from rrru.robots.dynamics import Masses
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 from rrru.seeds import stream
 
 # fewer points fit any effect, and left-out ones are extrapolated

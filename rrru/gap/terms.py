@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.effect import LEGS
+from rrru.effects.protocol import LEGS
 
 # on which legs a law acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rrru.effects.effect import Contribution, Coordinates
+from rrru.effects.protocol import Contribution, Coordinates
 
 _DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
 

@@ -10,7 +10,7 @@ from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
-from rrru.robots.protocol import identifiable_truth
+from rrru.robots.mechanism import identifiable_truth
 from rrru.seeds import run_seed
 
 

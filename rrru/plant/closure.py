@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.effect import PLACES
+from rrru.effects.protocol import PLACES
 from rrru.plant.spatial import SpatialGeometry, into_frame
 from rrru.robots.first_order import base_shift
 from rrru.robots.rrru3 import Rrru3

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from rrru.effects.effect import together
 from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import together
 from rrru.errors import UnreachableError
 
 PASSES = ("forward_1", "reverse", "forward_2")

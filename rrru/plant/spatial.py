@@ -14,7 +14,7 @@ import numba
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.effects.effect import PLACES
+from rrru.effects.protocol import PLACES
 
 # The rotation part of a closure residual counts as the distance it makes at this arm.
 _ARM_MM = 500.0

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from rrru.campaign.measurements import actuator_columns, vector_columns
-from rrru.effects.effect import PLACES, together
 from rrru.effects.library import active_effects
 from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import PLACES, together
 from rrru.errors import ConfigError
 from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure

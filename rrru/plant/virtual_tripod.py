@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.effects.effect import together
+from rrru.effects.protocol import together
 from rrru.errors import ConfigError
 from rrru.plant.closure import TripodGeometry
 from rrru.plant.virtual_robot import DrivenRobot, shared_parts

@@ -6,7 +6,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
 from rrru.plant import virtual_robot, virtual_tripod
-from rrru.robots.protocol import MECHANISMS, identifiable_truth, make_mechanism
+from rrru.robots.mechanism import MECHANISMS, identifiable_truth, make_mechanism
 from rrru.seeds import stream
 
 

@@ -12,7 +12,7 @@ from rrru.compensate import evaluate
 from rrru.errors import ConfigError, FitError
 from rrru.fit.campaign_fit import CalibrationSettings, deviation_vector, fit_sets, tables
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots.protocol import identifiable_truth
+from rrru.robots.mechanism import identifiable_truth
 
 _ERRORS = {"dtheta1": 0.002, "dtheta2": -0.001, "dL1": 0.4, "dL3": -0.2, "dR": -1.2, "dr": 0.9}
 _SETTINGS = CalibrationSettings({"lines": ["line_*"], "spiral": ["spiral"], "absent": ["circle"]})

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from rrru.effects.backlash import play
-from rrru.effects.effect import ActiveEffect, Contribution, Motion
 from rrru.effects.library import EFFECTS, active_effects
+from rrru.effects.protocol import ActiveEffect, Contribution, Motion
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, REVERSE, SPIRAL, plan_of

@@ -13,7 +13,7 @@ from tests.effects.robots import FORWARD, ROBOT, drive, drive_error, plan_of
 
 _OWN = """
 import numpy as np
-from rrru.effects.effect import Contribution, plain_coordinates
+from rrru.effects.protocol import Contribution, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 class Creep:

@@ -7,8 +7,8 @@ import pytest
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
-from rrru.effects.effect import Motion
 from rrru.effects.library import LIBRARY, SLIDER_EFFECTS, active_effects, find
+from rrru.effects.protocol import Motion
 from rrru.errors import ConfigError
 from rrru.plant.closure import corrected_sim
 from rrru.plant.virtual_tripod import VirtualTripod

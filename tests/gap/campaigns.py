@@ -9,8 +9,8 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.effect import ActiveEffect
 from rrru.effects.library import EFFECTS
+from rrru.effects.protocol import ActiveEffect
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.gap.case import make_case

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.effect import ActiveEffect, Contribution
 from rrru.effects.library import EFFECTS, find
+from rrru.effects.protocol import ActiveEffect, Contribution
 from rrru.errors import ConfigError, FitError
 from rrru.gap.settings import GapSettings
 from rrru.parameters import Parameter, ParameterSet

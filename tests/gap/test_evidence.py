@@ -14,7 +14,7 @@ from scipy.special import log_ndtr, logsumexp
 from scipy.stats import multivariate_normal, norm
 
 from rrru.campaign.noise import along_runs
-from rrru.effects.effect import Coordinates
+from rrru.effects.protocol import Coordinates
 from rrru.gap import evidence_kernels as kernels
 from rrru.gap.case import Linear
 from rrru.gap.evidence import LEVELS, STRENGTHS, ModelEvidence, spectrum

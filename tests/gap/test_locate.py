@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from rrru.effects.effect import Contribution, Coordinates, plain_coordinates
 from rrru.effects.library import EFFECTS
+from rrru.effects.protocol import Contribution, Coordinates, plain_coordinates
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import State
 from rrru.gap.identify import identify

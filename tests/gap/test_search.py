@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.effect import Contribution, Coordinates
 from rrru.effects.library import EFFECTS
+from rrru.effects.protocol import Contribution, Coordinates
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State

@@ -8,8 +8,8 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.effect import Contribution
 from rrru.effects.library import active_effects
+from rrru.effects.protocol import Contribution
 from rrru.errors import ConfigError
 from rrru.plant import virtual_robot
 from rrru.plant.virtual_robot import VirtualRobot

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrru.effects.effect import PLACES, Contribution
+from rrru.effects.protocol import PLACES, Contribution
 from rrru.plant.spatial import SpatialGeometry
 from rrru.robots.first_order import FirstOrder
 from rrru.robots.rrru3 import Rrru3

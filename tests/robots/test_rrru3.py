@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
 from rrru.robots import singularity
-from rrru.robots.protocol import identifiable_truth
+from rrru.robots.mechanism import identifiable_truth
 from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 

@@ -14,7 +14,7 @@ from tests.workflow.folder import dry_run, run
 
 _DRIFT = """
 import numpy as np
-from rrru.effects.effect import Contribution
+from rrru.effects.protocol import Contribution
 from rrru.parameters import Parameter, ParameterSet
 
 class Drift:

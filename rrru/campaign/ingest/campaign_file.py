@@ -18,7 +18,7 @@ from rrru.campaign.ingest.registration import Registration, register
 from rrru.campaign.ingest.sheet import COMMAND, DRIVES, MEASURED, Sheet
 from rrru.campaign.measurements import command, measured, vector_columns
 from rrru.errors import ConfigError, FitError
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 
 _CHOICES = {
     "unit": tuple(MM),

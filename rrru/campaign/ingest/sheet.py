@@ -7,7 +7,7 @@ import pandas as pd
 
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.measurements import actuator_columns
-from rrru.robots.protocol import Mechanism
+from rrru.robots.mechanism import Mechanism
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from rrru.effects.effect import Motion
+from rrru.effects.protocol import Motion
 from rrru.errors import UnreachableError
 from rrru.studies.ptt3.experiments import Experiment
 from rrru.studies.ptt3.learning import learning

@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from rrru.campaign.plan import Plan, make_run
-from rrru.effects.effect import Contribution
+from rrru.effects.protocol import Contribution
 from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.plant.virtual_robot import VirtualRobot, non_repeatability
 from rrru.robots import singularity

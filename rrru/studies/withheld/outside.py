@@ -5,8 +5,8 @@ Effects as the library's are, used by the plant alone; sizes and places are assu
 
 import numpy as np
 
-from rrru.effects.effect import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.effects.library import EFFECTS
+from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
-from rrru.effects.effect import ActiveEffect
+from rrru.effects.protocol import ActiveEffect
 from rrru.errors import FitError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares

@@ -8,7 +8,7 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
-from rrru.robots.protocol import make_mechanism
+from rrru.robots.mechanism import make_mechanism
 from rrru.studies.ptt3 import bench, driving, experiments, parts, results
 from rrru.studies.ptt3.learning import METHODS, learning
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from rrru.robots.dynamics import Masses
-from rrru.robots.protocol import make_mechanism
+from rrru.robots.mechanism import make_mechanism
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.robots import Conditions
 

@@ -12,7 +12,7 @@ from rrru.fit.identifiability import analyse
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.robots import singularity
-from rrru.robots.protocol import MECHANISMS, make_mechanism
+from rrru.robots.mechanism import MECHANISMS, make_mechanism
 
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))
 
