@@ -28,11 +28,16 @@ def rich_poses():
     return points[clear][:200], theta[clear][:200]
 
 
-# before pytest-xdist reads the groups
-@pytest.hookimpl(tryfirst=True)
+def _group(item):
+    """The tests that stay on one worker, so that what they share is made once: a module's, and all of the workflow."""
+    return "workflow" if item.path.parent.name == "workflow" else item.module.__name__
+
+
+def pytest_itemcollected(item):
+    """Mark a test's group before pytest-xdist reads it."""
+    item.add_marker(pytest.mark.xdist_group(_group(item)))
+
+
 def pytest_collection_modifyitems(items):
-    """A module's tests stay on one worker, so that what they share is made once; the workflow's begin first."""
-    for item in items:
-        folder, name = item.path.parent.name, item.module.__name__
-        item.add_marker(pytest.mark.xdist_group("workflow" if folder == "workflow" else name))
-    items.sort(key=lambda item: item.path.parent.name != "workflow")
+    """The workflow's tests, which take longest, begin first."""
+    items.sort(key=lambda item: _group(item) != "workflow")

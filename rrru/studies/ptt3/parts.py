@@ -21,10 +21,14 @@ def check(config):
     travel, reach = section["bench"]["turns"] * section["bench"]["lead_mm"], section["bench"]["range_mm"]
     if travel > reach:
         raise ConfigError(f"ptt.bench: turns times lead_mm is {travel:g} mm; allowed: up to range_mm, {reach:g} mm")
+
+
+def check_robot(config):
+    """Raise ConfigError where the experiments' robot has a deviation or an effect that does not exist."""
     # not at the top: it imports all that a robot needs
     from rrru.studies.ptt3.experiments import experiment
 
-    experiment(config, next(iter(known)))
+    experiment(config, next(iter(config["ptt"]["experiments"])))
 
 
 def campaign_section(settings, name):

@@ -94,8 +94,10 @@ def taught():
 )
 def test_what_does_not_fit_together_is_refused(sections, word):
     parts.check(SETTINGS)
+    parts.check_robot(SETTINGS)
     with pytest.raises(ConfigError, match=word):
-        parts.check(changed(**sections))
+        for check in (parts.check, parts.check_robot):
+            check(changed(**sections))
 
 
 def test_an_experiment_is_a_campaign_like_any_other():

@@ -1,6 +1,7 @@
 from rrru.studies.ptt3 import parts as ptt_parts
 
-CHECKS.append("rrru.studies.ptt3.parts:check")
+ptt_parts.check(config)
+CHECKS.append("rrru.studies.ptt3.parts:check_robot")
 
 PTT_EXPERIMENTS = sorted(config["ptt"]["experiments"])
 # experiments that are diagnosed together, as one campaign
