@@ -28,16 +28,6 @@ def rich_poses():
     return points[clear][:200], theta[clear][:200]
 
 
-def _group(item):
-    """The tests that stay on one worker, so that what they share is made once: a module's, and all of the workflow."""
-    return "workflow" if item.path.parent.name == "workflow" else item.module.__name__
-
-
-def pytest_itemcollected(item):
-    """Mark a test's group before pytest-xdist reads it."""
-    item.add_marker(pytest.mark.xdist_group(_group(item)))
-
-
 def pytest_collection_modifyitems(items):
     """The workflow's tests, which take longest, begin first."""
-    items.sort(key=lambda item: _group(item) != "workflow")
+    items.sort(key=lambda item: item.path.parent.name != "workflow")

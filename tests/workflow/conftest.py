@@ -1,5 +1,8 @@
 """The one run that the workflow's tests share."""
 
+import fcntl
+import os
+
 import pytest
 
 from tests.workflow.folder import MINIMAL, run
@@ -12,17 +15,28 @@ _CHECKED = "withheld: {field: [field_09], field_answers: answers.csv}\n"
 def shared(tmp_path_factory):
     """Folder of a whole minimal run on two cores, the check on withheld effects and a twin's search included.
 
-    `build/minimal` holds its results, `record` what its scripts have read, `output` what it has said.
+    `build/minimal` holds its results, `record` what its scripts have read, `output` what it has said. It is made by the
+    first of pytest's workers that asks; the others wait for it.
     """
-    folder = tmp_path_factory.mktemp("shared")
-    (folder / "record").mkdir()
+    own = tmp_path_factory.getbasetemp()
+    base = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+    folder = base / "shared"
+    with (base / "shared.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (folder / "output").exists():
+            _make(folder)
+    return folder
+
+
+def _make(folder):
+    """The shared run in a folder."""
+    (folder / "record").mkdir(parents=True, exist_ok=True)
     (folder / "answers.csv").write_text(_ANSWERS)
     (folder / "field.yaml").write_text(_CHECKED)
     targets = ("all", "withheld", "build/minimal/twin/delta.yaml")
     code, output = run(folder, *targets, overlays=(MINIMAL, "field.yaml"), record=folder / "record")
     assert code == 0, output
     (folder / "output").write_text(output)
-    return folder
 
 
 @pytest.fixture(scope="session")
