@@ -32,6 +32,17 @@ def nominal(config, name):
     return robot(config, config["campaigns"][name]) | {"bounds": config["calibration"]["bounds"]}
 
 
+def source(config, name):
+    """A campaign's section without what only drives it."""
+    return {key: value for key, value in config["campaigns"][name].items() if key not in ("trajectories", "passes")}
+
+
+def truth(config, name):
+    """The true deviations of a virtual campaign's robot by name; None for a measured one."""
+    section = config["campaigns"][name]
+    return config["virtual_robots"][section["virtual"]]["errors"] if "virtual" in section else None
+
+
 def virtual(config, name):
     """What drives a virtual campaign: robot, trajectories, passes, motion, noise and seed; None for a measured one."""
     section = config["campaigns"][name]

@@ -20,8 +20,8 @@ def mechanism(nominal, parameter_set=None):
     if "bounds" in nominal:
         bounds = nominal["bounds"]
         limits = {"angle_limit_rad": bounds["angle_rad"], "length_limit_mm": bounds["length_mm"]}
-    chosen = parameter_set or nominal.get("parameter_set") or MECHANISMS[name].TRACKED
-    return make_mechanism(name, nominal["dimensions"], parameter_set=chosen, **limits)
+    own = nominal.get("parameter_set") or MECHANISMS[name].TRACKED
+    return make_mechanism(name, nominal["dimensions"], parameter_set=parameter_set or own, **limits)
 
 
 @dataclass(frozen=True)
@@ -81,6 +81,6 @@ def virtual_campaign(nominal, virtual):
     return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
 
 
-def true_deviations(nominal, virtual):
-    """The virtual robot's true deviations by the names of the mechanism's parameters, None for a measured campaign."""
-    return identifiable_truth(mechanism(nominal), virtual["robot"]["errors"]) if virtual else None
+def true_deviations(nominal, truth):
+    """True deviations by the names of the mechanism's parameters from those of the real robot, None where unknown."""
+    return None if truth is None else identifiable_truth(mechanism(nominal), truth)

@@ -27,7 +27,7 @@ def jobs(tmp_path_factory):
 
 def _of(jobs, table):
     """Files of all jobs that hold a part of one table."""
-    return {path for _, _, outputs in jobs for path in outputs if Path(path).parent.name == table}
+    return {path for _, _, outputs in jobs for path in outputs if Path(path).stem == f"withheld_{table}"}
 
 
 def test_the_plan_holds_the_check(jobs):
@@ -44,8 +44,8 @@ def test_no_diagnosis_is_given_an_answer(jobs):
     assert {rule for rule, inputs, _ in jobs if inputs & answers} == {"withheld_score"}
     for rule, inputs, outputs in jobs:
         if rule == "withheld_diagnose":
-            assert {Path(path).parent.name for path in inputs} == {"measurements"}
-            assert {Path(path).parent.name for path in outputs} == {"verdicts", "states"}
+            assert {Path(path).stem for path in inputs} == {"withheld_measurements"}
+            assert {Path(path).stem for path in outputs} == {"withheld_verdicts", "withheld_states"}
         if rule == "diagnose":
             assert {Path(path).name for path in inputs} == {"measurements.parquet"}
     # what is measured reaches the diagnosis, and nothing that was scored does

@@ -13,7 +13,7 @@ def main(settings, inputs, outputs):
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
     fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), calibration, info["noise_mm"])
-    truth = setup.true_deviations(nominal, settings["virtual"])
+    truth = setup.true_deviations(nominal, settings["truth"])
     tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 

@@ -27,7 +27,7 @@ def main(settings, inputs, outputs):
         if searched is not None:
             results.append(study_set(searched, identified, label, runs))
     frames = {table: pd.concat([part[table] for part in results], ignore_index=True) for table in results[0]}
-    truth = setup.true_deviations(nominal, settings["virtual"])
+    truth = setup.true_deviations(nominal, settings["truth"])
     fits = (tables.read(inputs[table]) for table in ("calibrations", "parameters"))
     compared = against_least_squares(frames["genetic"], frames["genetic_parameters"], *fits, truth)
     frames["genetic_against_least_squares"] = compared

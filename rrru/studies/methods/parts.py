@@ -25,6 +25,6 @@ def settings(config, name):
         },
         "real": config["loads"] | real(),
         "region": section["regions"][name],
-        "genetic": config["genetic"],
+        "genetic": {key: value for key, value in config["genetic"].items() if key != "seeds"},
         **{key: section[key] for key in _SHARED},
     }

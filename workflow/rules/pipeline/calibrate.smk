@@ -1,3 +1,5 @@
+# settings of the genetic algorithm itself
+GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key != "seeds"]
 CALIBRATION_TABLES = ["calibrations", "parameters", "correlations", "observability"]
 GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
 # tables of the whole study that are the campaigns' parts, one below the other
@@ -45,7 +47,7 @@ rule compensate:
     log:
         f"{RESULTS}/logs/compensate/{{campaign}}.log",
     params:
-        settings=calibrated(),
+        settings=calibrated(driven=True),
         code=code("compensate"),
     script:
         "../../scripts/compensate.py"

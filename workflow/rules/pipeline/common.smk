@@ -75,20 +75,22 @@ def campaign_settings(wildcards):
     name, calibration = wildcards.campaign, config["calibration"]
     return {
         "campaign": name,
-        "section": config["campaigns"][name],
+        "section": parts.source(config, name),
         "nominal": parts.nominal(config, name),
         "virtual": parts.virtual(config, name),
         **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity", "sets")},
     }
 
 
-def calibrated(*keys):
-    """What a job about one campaign's calibrations reads, its robots and the configuration under dotted keys."""
+def calibrated(*keys, driven=False):
+    """What a job about one campaign's calibrations reads, its robots (the real one: to be driven, or its
+    deviations) and the configuration under dotted keys.
+    """
 
     def settings(wildcards):
         name = wildcards.campaign
-        robots = {"nominal": parts.nominal(config, name), "virtual": parts.virtual(config, name)}
-        return {"campaign": name, **robots, **reads(*keys)}
+        real = {"virtual": parts.virtual(config, name)} if driven else {"truth": parts.truth(config, name)}
+        return {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
 
     return settings
 
@@ -118,16 +120,19 @@ def own_effects():
     return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
 
 
-def figure_options(campaign):
-    """What the figures of a campaign show."""
+def campaign_options(campaign):
+    """What the figures that every campaign gets are told."""
+    z_down = parts.z_down(config["campaigns"][campaign])
+    return {"campaign": campaign, "z_down": z_down, "method": config["reproduce"]["method"], "mode": "closed_loop"}
+
+
+def paper_options():
+    """What the figures of paper A are told."""
     reproduce = config["reproduce"]
     return {
-        "campaign": campaign,
-        "z_down": parts.z_down(config["campaigns"][campaign]),
+        **campaign_options(REPRODUCED),
         "calibration_lines": reproduce["line_calibration"],
         "calibration_spiral": reproduce["spiral_calibration"],
         "sweep_campaign": REPRODUCED,
         "sweep_calibration": reproduce["line_calibration"],
-        "method": reproduce["method"],
-        "mode": "closed_loop",
     }

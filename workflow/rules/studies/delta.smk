@@ -20,8 +20,15 @@ FIGURES["delta"] = DELTA_FIGURES
 PAPERS["C"] = {
     "study": "rrru.studies.delta",
     "tables": ["delta_points", "delta_camera", "delta_draws"],
-    "settings": config["delta"],
+    "settings": parts.part(
+        config["delta"],
+        *("camera.pixel_mm", "plane.z_mm", "poses.counts", "poses.z_mm"),
+        *(f"target.{key}" for key in ("columns", "rows", "diameter_mm", "pitch_mm")),
+    ),
 }
+# the robot and where it is sent; what it photographs, and with what
+_ROBOT = ["seed", "robots.delta", *(f"delta.{key}" for key in ("errors", "plane", "poses", "tracker_noise_mm"))]
+_SCENE = [*_ROBOT, *(f"delta.{key}" for key in ("camera", "distance_mm", "mount", "target", "tilted_views"))]
 
 
 rule delta_images:
@@ -31,7 +38,7 @@ rule delta_images:
     log:
         f"{RESULTS}/logs/delta_images.log",
     params:
-        settings=reads("seed", "robots.delta", "delta"),
+        settings=reads(*_SCENE),
         code=code("delta_images"),
     script:
         "../../scripts/delta_images.py"
@@ -48,7 +55,7 @@ rule delta_vision:
     log:
         f"{RESULTS}/logs/delta_vision.log",
     params:
-        settings=reads("seed", "robots.delta", "delta"),
+        settings=reads(*_ROBOT, "delta.target.diameter_mm", "delta.target.pitch_mm"),
         code=code("delta_vision"),
     script:
         "../../scripts/delta_vision.py"
@@ -64,7 +71,7 @@ rule delta_calibrate:
     log:
         f"{RESULTS}/logs/delta_calibrate.log",
     params:
-        settings=reads("seed", "robots.delta", "delta"),
+        settings=reads(*_SCENE, "delta.spread", "delta.length_error_mm"),
         code=code("delta_calibrate"),
     script:
         "../../scripts/delta_calibrate.py"
@@ -79,7 +86,7 @@ rule delta_twin:
     log:
         f"{RESULTS}/logs/delta_twin.log",
     params:
-        settings=reads("seed", "robots.delta", "delta"),
+        settings=reads(*_SCENE, "delta.search"),
         code=code("delta_twin"),
     script:
         "../../scripts/delta_twin.py"

@@ -37,7 +37,12 @@ DIAGNOSED |= {name: ptt_parts.campaign_section(config, name) for name in (*PTT_E
 PAPERS["B"] = {
     "study": "rrru.studies.ptt3",
     "tables": ["ptt_benefit", "ptt_spread", "ptt_training", "ptt_repeatability"],
-    "settings": config["ptt"],
+    "settings": parts.part(
+        config["ptt"],
+        *("bench.range_mm", "bench.resolution_mm", "bench.turns", "curve.points", "curve.radius_mm", "curve.z_mm"),
+        *("network.train", "positions_mm", "repeats"),
+        *(f"experiments.{name}.payload_kg" for name in config["ptt"]["experiments"]),
+    ),
 }
 
 

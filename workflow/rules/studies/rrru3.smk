@@ -22,7 +22,12 @@ PAPERS["A"] = {
     "settings": {
         "nominal": parts.nominal(config, REPRODUCED),
         "virtual": parts.virtual(config, REPRODUCED),
-        **reads("genetic", "reproduce", "calibration.sets", "calibration.use_near_singularity"),
+        **reads(
+            *(f"genetic.{key}" for key in ("crossover_fraction", "migration_fraction", "populations")),
+            *(f"calibration.sets.{config['reproduce'][key]}" for key in ("line_calibration", "spiral_calibration")),
+            "calibration.use_near_singularity",
+            "reproduce",
+        ),
     },
 }
 # figures that every campaign gets, the reproduced one in figures/ itself
@@ -50,7 +55,7 @@ rule sweep:
             **wildcards,
             "nominal": parts.nominal(config, REPRODUCED),
             "patterns": config["calibration"]["sets"][config["reproduce"]["line_calibration"]],
-            **reads("seed", "genetic", "sweep", "calibration.use_near_singularity"),
+            **reads("seed", *GENETIC_SETTINGS, "sweep", "calibration.use_near_singularity"),
         },
         code=code("sweep"),
     script:
@@ -105,7 +110,7 @@ rule paper_a_figures:
     log:
         f"{RESULTS}/logs/figures/paper_a.log",
     params:
-        settings={"figures": PAPER_A_FIGURES | CAMPAIGN_FIGURES, "options": figure_options(REPRODUCED)},
+        settings={"figures": PAPER_A_FIGURES | CAMPAIGN_FIGURES, "options": paper_options()},
         code=code("figure", PAPER_A_FIGURES, CAMPAIGN_FIGURES),
     script:
         "../../scripts/figure.py"
@@ -123,7 +128,7 @@ rule campaign_figures:
     params:
         settings=lambda wildcards: {
             "figures": CAMPAIGN_FIGURES,
-            "options": figure_options(wildcards.campaign),
+            "options": campaign_options(wildcards.campaign),
         },
         code=code("figure", CAMPAIGN_FIGURES),
     script:

@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from rrru.campaign.measurements import vectors
 from rrru.figures import style
 
 AXES = "xyz"
@@ -26,15 +25,15 @@ def ptt_path(tables, options):
     parts = experiments(tables["ptt_points"])
     figure = style.new(style.DOUBLE_MM, 88.0)
     panels = figure.subplots(2, len(parts), squeeze=False, sharex="row", sharey="row", height_ratios=(1.0, 0.8))
-    deviations = np.concatenate([vectors(rows, "before") for _, rows in parts])
-    span = np.ptp(vectors(parts[0][1], "command"), axis=0)
+    deviations = np.concatenate([_vectors(rows, "before") for _, rows in parts])
+    span = np.ptp(_vectors(parts[0][1], "command"), axis=0)
     across = style.magnification(deviations[:, :2], span[0], 0.2)
     upwards = style.magnification(deviations[:, 2], max(span[2], 1.0), 0.2)
     for column, (name, rows) in enumerate(parts):
-        command = vectors(rows, "command")
+        command = _vectors(rows, "command")
         above, height = panels[:, column]
         for label, prefix, look in (("before compensation", "before", _BEFORE), ("driven again", "after", _AFTER)):
-            moved = command + vectors(rows, prefix) * np.array([across, across, upwards])
+            moved = command + _vectors(rows, prefix) * np.array([across, across, upwards])
             above.plot(moved[:, 0], moved[:, 1], label=label, **look)
             height.plot(rows["point"], moved[:, 2], **look)
         above.plot(command[:, 0], command[:, 1], label="commanded", color=style.ORANGE, linewidth=2.4, zorder=0)
@@ -92,3 +91,8 @@ def ptt_network(tables, options):
     panels[-1].set_xlabel("point")
     style.legend_above(figure, panels[:1], columns=6)
     return figure
+
+
+def _vectors(rows, name):
+    """Values (n, 3) of a table's columns name_x_mm, name_y_mm and name_z_mm."""
+    return rows[[f"{name}_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
