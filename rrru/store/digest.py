@@ -17,7 +17,7 @@ def closure(*modules: str) -> list[Path]:
     modules: paths of Python files below the project's root, or dotted names such as "rrru.figures.gap". Packages other
     than this one do not count: they are the lock's.
     """
-    waiting = [_start(module) for module in modules]
+    waiting = [file for module in modules for file in _start(module)]
     found: set[Path] = set()
     while waiting:
         file = waiting.pop()
@@ -37,12 +37,20 @@ def code_digest(*modules: str) -> str:
     return digest.hexdigest()[:16]
 
 
-def _start(module: str) -> Path:
-    """The file that a path or a dotted name stands for."""
-    file = ROOT / module if module.endswith(".py") else _file(module)
-    if file is None:
+def _start(module: str) -> list[Path]:
+    """The file that a path stands for, or that of a dotted name and the `__init__.py` of every folder on the way."""
+    if module.endswith(".py"):
+        return [ROOT / module]
+    if _file(module) is None:
         raise ModuleNotFoundError(f"{module} is no module of this project")
-    return file
+    return _on_the_way(module)
+
+
+def _on_the_way(name: str) -> list[Path]:
+    """Files of a dotted name and of the packages that hold it, as far as they are modules of this project."""
+    parts = name.split(".")
+    files = (_file(".".join(parts[:k])) for k in range(1, len(parts) + 1))
+    return [file for file in files if file]
 
 
 @cache
@@ -52,10 +60,9 @@ def _imported(file: Path) -> tuple[Path, ...]:
     names = set(_IMPORT.findall(text))
     for module, targets in _FROM.findall(text):
         names.update(f"{module}.{word}" for word in re.findall(r"(\w+)(?:[ \t]+as[ \t]+\w+)?", targets))
-    parts = [name.split(".") for name in names]
     # what looks for modules finds those of its own folder
     beside = file.parent.glob("*.py") if "import pkgutil\n" in text else ()
-    return tuple(filter(None, {*beside, *(_file(".".join(p[:k])) for p in parts for k in range(1, len(p) + 1))}))
+    return tuple({*beside, *(file for name in names for file in _on_the_way(name))})
 
 
 @cache

@@ -109,7 +109,7 @@ def is_labelled(figure, panel, direction):
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure_is_complete_and_its_files_are_the_same_bytes_every_time(name, frames, tmp_path, monkeypatch):
     # fewer points in the picture, which takes a third of the time otherwise
-    monkeypatch.setattr(style, "_DPI", 150)
+    monkeypatch.setattr(style, "_DPI", 100)
     first, again = draw(name, frames), draw(name, frames)
     style.save(first, tmp_path / "first.pdf", tmp_path / "first.png")
     style.save(again, tmp_path / "again.pdf", tmp_path / "again.png")
