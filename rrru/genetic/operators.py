@@ -106,10 +106,8 @@ def scattered(population, parents, coin):
 @_compiled
 def gaussian(population, parents, step):
     """Mutants (k, p) of the parents' indices (k,) in a population (n, p), moved by step (k, p) and folded to 0..1."""
-    # ASSUME the paper names neither its mutation nor its bounds. MATLAB's Gaussian mutation knows no bounds, and its
-    # default with bounds ("adaptive feasible") is another operator. Genes are reflected at the bounds: with steps of
-    # one range, clipping would put nearly two of three mutated genes exactly onto a bound, finds worse minima, and
-    # makes "at the bound" meaningless as the sign of a bad fit.
+    # ASSUME the paper names neither mutation nor bounds; MATLAB's Gaussian one knows none. Reflected at the bounds:
+    # with steps of one range, clipping would put most mutated genes onto a bound, and finds worse minima.
     children = np.empty(step.shape)
     for i in range(step.shape[0]):
         for q in range(step.shape[1]):
@@ -120,10 +118,7 @@ def gaussian(population, parents, step):
 
 @_compiled
 def ranked(score):
-    """Indices (n,) of the scores (n,) from the best to the worst, of equal ones the earlier first (insertion sort).
-
-    For the small n of an island as fast as NumPy's sort, which takes seconds to compile.
-    """
+    """Indices (n,) of scores (n,) from the best to the worst, stable; NumPy's sort takes seconds to compile."""
     order = np.arange(score.size)
     for i in range(1, score.size):
         k, own = i, order[i]

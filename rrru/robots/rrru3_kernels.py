@@ -103,10 +103,7 @@ def forward(legs, turn, cosine, sine, start):
 
 @_compiled
 def tripod_mean_distance(ends, radii, measured):
-    """Mean distance (m,) in mm between measured points (n, 3) and `lower_intersection` of three spheres; inf without.
-
-    ends: (m, n, 3 spheres, 3) centres, radii: (m, 3), both in mm.
-    """
+    """Mean distance (m,) of points (n, 3) to `lower_intersection` of spheres at ends (m, n, 3, 3), radii (m, 3), in mm."""
     m, n = ends.shape[0], ends.shape[1]
     result = np.empty(m)
     along, rest, normal = np.empty(3), np.empty(3), np.empty(3)

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.fft import dct
+from scipy.stats import norm
 
 from rrru.campaign.noise import isolated
 from rrru.errors import ConfigError
 from rrru.gap import shrink
 from rrru.gap.attribute import calibrate, with_noise
 from rrru.gap.evidence import LEVELS, ModelEvidence
-from rrru.gap.heldout import HeldOut, resampled_rows
+from rrru.gap.heldout import HeldOut, Prediction, resampled_rows
 from rrru.gap.terms import Term
 from rrru.studies import campaigns
 from tests.gap.campaigns import (
@@ -200,3 +201,12 @@ def test_single_spikes_are_isolated_and_smooth_gaps_and_noise_are_not(full):
     assert np.flatnonzero(isolated(spiked, case.run, NOISE_MM)).tolist() == at
     frequent = noise + 5.0 * (generator.random((len(case), 1)) < 0.3)
     assert not isolated(frequent, case.run, NOISE_MM).any()
+
+
+def test_the_score_of_a_prediction_is_a_normal_density():
+    generator = np.random.default_rng(3)
+    residual, spread = generator.normal(size=(5, 3)), generator.normal(size=(5, 3, 2))
+    told = Prediction(residual, spread, 0.4)
+    width = np.sqrt(0.4**2 + (spread**2).sum(axis=(1, 2)) / 3.0)
+    expected = norm.logpdf(residual, scale=width[:, None]).sum(axis=1) + 1.5 * np.log(2.0 * np.pi)
+    np.testing.assert_allclose(told.log_score, expected, rtol=1e-12)

@@ -197,3 +197,11 @@ def test_a_generation_equals_the_loop(crossover_fraction, sizes):
         np.testing.assert_array_equal(known[start:stop], [np.nan if value is None else value for value in scores])
     assert next(one_by_one, None) is None
     assert next(steps, None) is None
+
+
+def test_ranks_are_those_of_a_stable_sort():
+    generator = np.random.default_rng(4)
+    for size in (1, 2, 9, 30):
+        score = generator.integers(0, 4, size).astype(float)
+        score[generator.random(size) < 0.2] = np.inf
+        np.testing.assert_array_equal(operators.ranked(score), np.argsort(score, kind="stable"))

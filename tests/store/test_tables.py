@@ -77,3 +77,13 @@ def test_the_glossary_describes_every_table_and_column():
     assert text == glossary.text(), "run `python -m rrru.studies.glossary`"
     for table in TABLES.values():
         assert table.path in text and all(f"`{column.name}`" in text for column in table.columns)
+
+
+def test_who_reads_a_table_while_it_is_written_anew_reads_the_old_one(tmp_path):
+    path = tmp_path / "t.parquet"
+    tables.write(TABLES["correlations"], _ROWS, path)
+    before = path.read_bytes()
+    with path.open("rb") as reader:
+        tables.write(TABLES["correlations"], _ROWS.assign(correlation=0.1), path)
+        assert reader.read() == before
+    assert path.read_bytes() != before

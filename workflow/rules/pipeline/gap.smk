@@ -12,8 +12,8 @@ GAP_TABLES = [
 GAP_FIGURE = {"gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_attribute", "gap_shrink", "gap_points"])}
 
 
-# one job per campaign, its figure included: starting another would take longer than drawing it. It sees the measurements
-# and what the configuration says of the robot
+# one job per campaign, its figure included: starting another would take longer than drawing it. It sees the
+# measurements and what the configuration says of the robot
 rule diagnose:
     input:
         measurements=part("measurements"),
