@@ -103,7 +103,7 @@ def forward(legs, turn, cosine, sine, start):
 
 @_compiled
 def tripod_mean_distance(ends, radii, measured):
-    """Mean distance (m,) of points (n, 3) to `lower_intersection` of spheres at ends (m, n, 3, 3), radii (m, 3), in mm."""
+    """Mean distance (m,) of points (n, 3) to `lower_intersection` of spheres at ends (m, n, 3, 3), radii (m, 3)."""
     m, n = ends.shape[0], ends.shape[1]
     result = np.empty(m)
     along, rest, normal = np.empty(3), np.empty(3), np.empty(3)
