@@ -93,11 +93,14 @@ def _start(legs, deviation, points, own, position):
                 own[leg, c] += legs[leg, c, 1 + q] * deviation[q]
         angle, arm = own[leg, 0], own[leg, 1]
         own[leg, 0], own[leg, 1], own[leg, 3] = arm * np.cos(angle), arm * np.sin(angle), own[leg, 3] * own[leg, 3]
+    # two parameters at once: half the passes over the positions
+    odd = deviation.size % 2
     for j in range(position.size):
-        position[j] = points[_START, j]
-    for q in range(deviation.size):
+        position[j] = fma(deviation[0], points[_SLOPE, j], points[_START, j]) if odd else points[_START, j]
+    for q in range(odd, deviation.size, 2):
         for j in range(position.size):
-            position[j] = fma(deviation[q], points[_SLOPE + q, j], position[j])
+            first = fma(deviation[q], points[_SLOPE + q, j], position[j])
+            position[j] = fma(deviation[q + 1], points[_SLOPE + q + 1, j], first)
 
 
 def _mean_distance(deviations, legs, points, values):
