@@ -16,7 +16,7 @@ import pygad
 
 from rrru.errors import ConfigError, FitError
 from rrru.genetic import operators
-from rrru.genetic.plan import Box, make_rules, mutation_sigma
+from rrru.genetic.plan import Box, draws_needed, make_rules, mutation_sigma
 from rrru.genetic.settings import is_number
 from rrru.robots.compiled import CompiledObjective
 
@@ -122,7 +122,7 @@ class _Run:
     def __init__(self, objective, low, high, settings):
         self.objective, self.box, self.settings = objective, Box(low, high), settings
         self.rules = make_rules(settings, looks_up=isinstance(objective, CompiledObjective))
-        self.draws = operators.draws_needed(self.rules.plan, low.size)
+        self.draws = draws_needed(self.rules.plan, low.size)
         self.score, self.done, self.stopped = None, 0, "generations"
         self.best = np.empty(int(settings.generations) + 1)
         self.mean = [np.empty(0)]
@@ -164,7 +164,7 @@ class _Run:
         genes, fitness, _ = ga.best_solution(ga.last_generation_fitness)
         children = ga.sol_per_pop - self.rules.plan[:, 2].sum()
         return GeneticResult(
-            deviations=operators.decoded(genes, self.box),
+            deviations=operators.decoded(genes[None], self.box)[0],
             objective=float(-fitness),
             generations=self.done,
             evaluations=int(ga.sol_per_pop + self.done * children),

@@ -16,13 +16,6 @@ SURVIVAL_RATE = 2.0
 _compiled = numba.njit(cache=True, error_model="numpy")
 
 
-def draws_needed(plan, genes):
-    """Numbers of uniform and of normal random numbers that `next_population` takes for individuals of `genes` genes."""
-    crossed = plan[:, 3]
-    mutated = plan[:, 1] - plan[:, 0] - plan[:, 2] - crossed
-    return int((1 + 2 * crossed + mutated + crossed * genes).sum()), int((mutated * genes).sum())
-
-
 @_compiled
 def shift_linear(score, parents):
     """Expected numbers of places (n,) of individuals with scores (n,) among `parents` parents ("shift linear" scaling).
@@ -91,29 +84,25 @@ def shuffled(values, uniform):
 
 
 @_compiled
-def scattered(population, parents, coin):
-    """Children (k, p) of consecutive pairs among the parents' indices (2 k,), with a population of shape (n, p).
+def scattered(population, parents, coin, children):
+    """Write children (k, p) of consecutive pairs among the parents' indices (2 k,), with a population of shape (n, p).
 
     A gene is the first parent's where coin (k, p) < 1/2, else the second's.
     """
-    children = np.empty(coin.shape)
     for i in range(coin.shape[0]):
         for q in range(coin.shape[1]):
             children[i, q] = population[parents[2 * i] if coin[i, q] < 0.5 else parents[2 * i + 1], q]
-    return children
 
 
 @_compiled
-def gaussian(population, parents, step):
-    """Mutants (k, p) of the parents' indices (k,) in a population (n, p), moved by step (k, p) and folded to 0..1."""
+def gaussian(population, parents, step, mutants):
+    """Write mutants (k, p) of parents' indices (k,) in a population (n, p): moved by step (k, p), folded to 0..1."""
     # ASSUME the paper names neither mutation nor bounds; MATLAB's Gaussian one knows none. Reflected at the bounds:
     # with steps of one range, clipping would put most mutated genes onto a bound, and finds worse minima.
-    children = np.empty(step.shape)
     for i in range(step.shape[0]):
         for q in range(step.shape[1]):
             folded = abs(population[parents[i], q] + step[i, q]) % 2.0
-            children[i, q] = 2.0 - folded if folded > 1.0 else folded
-    return children
+            mutants[i, q] = 2.0 - folded if folded > 1.0 else folded
 
 
 @_compiled
@@ -159,19 +148,20 @@ def migrate(population, score, plan, migrants):
 
 
 @_compiled
-def next_population(population, score, plan, uniform, normal, sigma):
-    """Next population (n, p) and what is known of its scores (n,): the elites' scores, NaN for the children.
+def next_population(population, score, plan, draws, children, known):
+    """Write the next population to children (n, p) and what is known of its scores (n,): the elites', else NaN.
 
-    uniform, normal: random numbers, see `draws_needed`; sigma: of the mutation. Each island's rows are its elites (best
-    first), its crossover children, its mutants; all parents are selected at once, shuffled, the first taken in pairs.
+    draws: uniform and normal random numbers, see `plan.draws_needed`, and the mutation's sigma. Each island's rows are
+    its elites (best first), crossover children and mutants; all parents are selected at once, shuffled, first in pairs.
     """
+    uniform, normal, sigma = draws
     genes = population.shape[1]
-    children = np.empty(population.shape)
-    known = np.full(score.size, np.nan)
+    known[:] = np.nan
     u, g = 0, 0
     for island in range(plan.shape[0]):
         start, stop, elites, crossed = plan[island]
-        mutated = stop - start - elites - crossed
+        first = start + elites + crossed
+        mutated = stop - first
         count = 2 * crossed + mutated
         own, own_score = population[start:stop], score[start:stop]
         rank = ranked(own_score)
@@ -183,11 +173,10 @@ def next_population(population, score, plan, uniform, normal, sigma):
         u += 1 + count
         coin = uniform[u : u + crossed * genes].reshape(crossed, genes)
         u += crossed * genes
-        _put(scattered(own, parents, coin), children, start + elites)
+        scattered(own, parents, coin, children[start + elites : first])
         step = sigma * normal[g : g + mutated * genes].reshape(mutated, genes)
         g += mutated * genes
-        _put(gaussian(own, parents[2 * crossed :], step), children, start + elites + crossed)
-    return children, known
+        gaussian(own, parents[2 * crossed :], step, children[first:stop])
 
 
 @_compiled
@@ -239,7 +228,8 @@ def advance(objective, legs, points, box, rules, draws, done, populations, score
         population, score, generation = populations[k], scores[k], done + k
         if generation > 0 and generation % rules.migration_interval == 0:
             population, score = migrate(population, score, rules.plan, rules.migrants)
-        children, known = next_population(population, score, rules.plan, uniform[k], normal[k], sigma[k])
+        children, known = populations[k + 1], scores[k + 1]
+        next_population(population, score, rules.plan, (uniform[k], normal[k], sigma[k]), children, known)
         if rules.looks_up:
             look_up(children, known, population, score)
         asked, count = np.empty_like(children), 0
@@ -254,9 +244,7 @@ def advance(objective, legs, points, box, rules, draws, done, populations, score
             if np.isnan(known[i]):
                 known[i] = values[count]
                 count += 1
-            scores[k + 1, i] = known[i]
             best[generation + 1] = min(best[generation + 1], known[i])
-        _put(children, populations[k + 1], 0)
         if has_stalled(best[: generation + 2], rules.stall_generations, rules.stall_tolerance):
             return k + 1
     return len(sigma)

@@ -51,6 +51,13 @@ def make_plan(populations, elite_share, crossover_fraction):
     return np.array(rows, dtype=np.int64)
 
 
+def draws_needed(plan, genes):
+    """Numbers of uniform and of normal random numbers that `operators.next_population` takes, of a number of genes."""
+    crossed = plan[:, 3]
+    mutated = plan[:, 1] - plan[:, 0] - plan[:, 2] - crossed
+    return int((1 + 2 * crossed + mutated + crossed * genes).sum()), int((mutated * genes).sum())
+
+
 def migrants_of(populations, fraction):
     """Numbers of individuals (islands,) that leave each island for the next, the last for the first."""
     following = (*populations[1:], populations[0])

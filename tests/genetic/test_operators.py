@@ -127,16 +127,24 @@ def test_shuffle_loses_nobody_at_the_edge_of_the_unit_interval():
     assert sorted(operators.shuffled(np.arange(56), np.zeros(56))) == list(range(56))
 
 
+def bred(operator, population, parents, numbers):
+    """Children (k, p) of an operator that is given numbers of that shape."""
+    children = np.empty(numbers.shape)
+    operator(population, parents, numbers, children)
+    return children
+
+
 def test_scattered_children_take_each_gene_from_the_parent_the_coin_names():
     population = np.arange(12.0).reshape(4, 3)
-    children = operators.scattered(population, np.array([0, 3, 2, 2]), np.array([[0.1, 0.9, 0.4], [0.9, 0.1, 0.6]]))
+    coin = np.array([[0.1, 0.9, 0.4], [0.9, 0.1, 0.6]])
+    children = bred(operators.scattered, population, np.array([0, 3, 2, 2]), coin)
     assert children.tolist() == [[0.0, 10.0, 2.0], [6.0, 7.0, 8.0]]
 
 
 def test_mutants_stay_inside_and_bounce_like_a_ball():
     random = np.random.default_rng(8)
     population, step = random.uniform(size=(50, 8)), 3.0 * random.normal(size=(50, 8))
-    mutants = operators.gaussian(population, np.arange(50), step)
+    mutants = bred(operators.gaussian, population, np.arange(50), step)
     expected = np.vectorize(matlab_ga.bounce)(population + step)
     np.testing.assert_allclose(mutants, expected, atol=1e-14)
     assert mutants.min() >= 0.0
@@ -145,7 +153,7 @@ def test_mutants_stay_inside_and_bounce_like_a_ball():
 
 def test_mutation_moves_every_gene_by_the_standard_deviation_it_is_given():
     step = 0.02 * np.random.default_rng(9).normal(size=(5000, 2))
-    moved = operators.gaussian(np.full((1, 2), 0.5), np.zeros(5000, dtype=np.int64), step) - 0.5
+    moved = bred(operators.gaussian, np.full((1, 2), 0.5), np.zeros(5000, dtype=np.int64), step) - 0.5
     assert moved.std() == pytest.approx(0.02, rel=0.03)
     assert moved.mean() == pytest.approx(0.0, abs=0.001)
 
@@ -153,9 +161,9 @@ def test_mutation_moves_every_gene_by_the_standard_deviation_it_is_given():
 def test_reflection_keeps_an_even_spread_even_where_clipping_would_pile_up():
     # the uniform distribution is the stationary one of a symmetric step between mirrors
     random = np.random.default_rng(10)
-    genes = operators.gaussian(random.uniform(size=(20_000, 1)), np.arange(20_000), random.normal(size=(20_000, 1)))[
-        :, 0
-    ]
+    genes = bred(
+        operators.gaussian, random.uniform(size=(20_000, 1)), np.arange(20_000), random.normal(size=(20_000, 1))
+    )[:, 0]
     assert np.histogram(genes, bins=10, range=(0.0, 1.0))[0] == pytest.approx(np.full(10, 2000), abs=5 * 43)
     assert np.isin(genes, (0.0, 1.0)).sum() == 0
 
@@ -179,9 +187,10 @@ def test_a_generation_equals_the_loop(crossover_fraction, sizes):
             for size, end in zip(sizes, ends, strict=True)
         ]
     )
-    uniforms, normals = (int(number) for number in operators.draws_needed(rows, 8))
+    uniforms, normals = (int(number) for number in plan.draws_needed(rows, 8))
     uniform, normal = random.uniform(size=uniforms), random.normal(size=normals)
-    after, known = operators.next_population(population, score, rows, uniform, normal, 0.7)
+    after, known = np.empty_like(population), np.empty_like(score)
+    operators.next_population(population, score, rows, (uniform, normal, 0.7), after, known)
     one_by_one, steps = iter(uniform.tolist()), iter(normal.tolist())
     for start, stop, _, _ in rows:
         people, scores = matlab_ga.generation(
