@@ -16,6 +16,10 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
+from rrru.figures.fonts import leave_out_layout
+
+leave_out_layout()
+
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
 _DPI = 200

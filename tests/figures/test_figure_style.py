@@ -1,7 +1,12 @@
-"""Numbers of the figures: round magnifications, short digits."""
+"""Numbers of the figures: round magnifications, short digits; the fonts in their files."""
+
+import re
+import zlib
+from io import BytesIO
 
 import numpy as np
 import pytest
+from fontTools.ttLib import TTFont
 
 from rrru.figures import style
 
@@ -20,3 +25,17 @@ def test_magnification_is_round(largest, span, factor):
 )
 def test_numbers_are_short(value, text):
     assert style.number(value) == text
+
+
+def test_a_pdf_holds_the_glyphs_that_it_shows_and_nothing_to_lay_them_out(tmp_path):
+    figure = style.new(style.SINGLE_MM, 40.0)
+    figure.subplots().set_axis_off()
+    figure.text(0.1, 0.5, "AV fi \N{MINUS SIGN}5.03 µm")
+    style.save(figure, tmp_path / "a.pdf", tmp_path / "a.png")
+    streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", (tmp_path / "a.pdf").read_bytes(), re.DOTALL)
+    files = [zlib.decompress(stream) for stream in streams if stream.startswith(b"\x78")]
+    # the ligature has a font of its own
+    fonts = [TTFont(BytesIO(file)) for file in files if file.startswith(b"\0\1\0\0")]
+    assert {"A", "V", "fi", "minus", "five", "m"} <= {name for font in fonts for name in font.getGlyphOrder()}
+    for font in fonts:
+        assert {"glyf", "hmtx", "head"} <= set(font.keys()) and not {"GDEF", "GPOS", "GSUB"} & set(font.keys())
