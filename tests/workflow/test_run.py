@@ -50,8 +50,8 @@ def test_every_number_of_the_paper_stands_beside_ours(results):
     assert len(spread) >= 17 and (spread["here_low"] <= spread["here_high"]).all()
 
 
-# one job of nearly every rule that computes, random numbers or several cores' order included. What needs all of them, the
-# papers' numbers and the sweeps' statistics, is left out: a second whole run would take three times as long
+# One job of nearly every rule that computes. What needs all jobs, the papers' numbers and the sweeps' statistics, is
+# left out: a second whole run would take three times as long
 _ONE_OF_EACH = (
     *(f"figures/field_09/{name}.png" for name in ("gap", "cross")),
     *("sweep/migration_fraction/islands/sweep_runs.parquet", "methods/ptt3/methods.parquet"),
