@@ -11,6 +11,7 @@ _FLOORS = {
     "errors": 1,
     "seeds": 1,
     "parameters": 2,
+    "objects": 2,
     "robots": 3,
     "effects": 4,
     "campaign": 4,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -29,15 +30,9 @@ def measured(measurements: pd.DataFrame) -> np.ndarray:
     return vectors(measurements, "measured")
 
 
-def actuator_columns(drive_unit: str) -> list[str]:
-    """Names of the columns of commanded actuator values: drive angles in "rad" or slider positions in "mm"."""
-    return [f"theta{k}_rad" if drive_unit == "rad" else f"slider{k}_mm" for k in (1, 2, 3)]
-
-
-def actuators(measurements: pd.DataFrame) -> np.ndarray:
-    """Commanded actuator values (n, 3), drive angles in rad or slider positions in mm."""
-    unit = "mm" if "slider1_mm" in measurements else "rad"
-    return measurements[actuator_columns(unit)].to_numpy(dtype=float)
+def actuators(measurements: pd.DataFrame, robot: Any) -> np.ndarray:
+    """Commanded actuator values (n, K) of a robot, angles in rad or lengths in mm."""
+    return measurements[robot.parts.columns].to_numpy(dtype=float)
 
 
 def on_trajectories(measurements: pd.DataFrame, patterns: Iterable[str]) -> np.ndarray:

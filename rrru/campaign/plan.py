@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.measurements import actuator_columns, vector_columns
+from rrru.campaign.measurements import vector_columns
 from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import sample
 
@@ -47,7 +47,7 @@ class Plan:
         table = told.loc[np.repeat(told.index, counts)].reset_index(drop=True)
         table.insert(2, "point", np.concatenate([np.arange(1, count + 1) for count in counts]))
         values = mechanism.require_reachable(target)
-        drives = dict(zip(actuator_columns(mechanism.drive_unit), values.T, strict=True))
+        drives = dict(zip(mechanism.parts.columns, values.T, strict=True))
         return table.assign(time_s=self.time_s(), **vector_columns("command", target), **drives)
 
     def time_s(self):

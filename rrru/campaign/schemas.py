@@ -1,6 +1,8 @@
 """Tables of the campaigns."""
 
-from rrru.store.schema import read_tables
+from dataclasses import replace
+
+from rrru.store.schema import Column, read_tables
 
 TABLES = read_tables("""
 run                    int    number of the pass, from 1 in the order driven
@@ -16,21 +18,13 @@ status                 str    every point is kept; outlier and unsolved are left
 campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
-One row per commanded point, robots with drive arms: what was commanded and what the instrument saw.
+One row per commanded point: what was commanded and what the instrument saw. After the commanded position stand the
+robot's own columns of commanded actuator values, here those of the 3-RRRU.
 --
 run trajectory point time_s command_{xyz}_mm
-theta1_rad             float  commanded drive angle of leg 1
-theta2_rad             float  commanded drive angle of leg 2
-theta3_rad             float  commanded drive angle of leg 3
-measured_{xyz}_mm speed_mm_s payload_kg status
-
-## slider_measurements | campaigns/{campaign}/measurements.parquet | run point
-One row per commanded point, robots with sliders: what was commanded and what the instrument saw.
---
-run trajectory point time_s command_{xyz}_mm
-slider1_mm             float  commanded position of slider 1
-slider2_mm             float  commanded position of slider 2
-slider3_mm             float  commanded position of slider 3
+theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
+theta2_rad             float  commanded drive angle of leg 2; 3-PTT: slider2_mm
+theta3_rad             float  commanded drive angle of leg 3; 3-PTT: slider3_mm
 measured_{xyz}_mm speed_mm_s payload_kg status
 
 ## truth | campaigns/{campaign}/truth.parquet | run point
@@ -52,7 +46,7 @@ trajectory             str    as in measurements
 point                  int    as in measurements
 translational_measure  float  0 where the platform can move with locked drives
 constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
-constraint_determinant float  changes its sign across a constraint singularity
+constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
 status                 str    as in measurements {ok, outlier, near_singularity, unsolved}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
@@ -90,3 +84,11 @@ min_translational_measure float  nearest approach to a translational singularity
 min_constraint_measure float  nearest approach to a constraint singularity
 notes                  str    what was computed or missing on ingest; empty where nothing was
 """)
+
+
+def measurement_table(robot):
+    """The table `measurements` with a robot's own columns of actuator values."""
+    table = next(table for table in TABLES if table.name == "measurements")
+    first, last = table.names.index("theta1_rad"), table.names.index("theta3_rad") + 1
+    own = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in robot.parts.drives]
+    return replace(table, columns=(*table.columns[:first], *own, *table.columns[last:]))

@@ -39,7 +39,7 @@ def before(measurements):
 
 def model_residual(measurements, mechanism, deviations):
     """Measured position minus the calibrated model's for the values that were sent: `errors` without names."""
-    model = mechanism.forward(rows.actuators(measurements), deviations, rows.command(measurements))
+    model = mechanism.forward(rows.actuators(measurements, mechanism), deviations, rows.command(measurements))
     return _errors(measurements, model)
 
 

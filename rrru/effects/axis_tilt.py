@@ -7,11 +7,11 @@ the rotation vector
 
 about the seat's own place: tilt_x about the radial axis lifts one end of the drive axis, tilt_z about the vertical
 swings it. The third entry, a turn about the drive axis itself, is a constant drive error and belongs to the
-calibration. It enters as a displacement at the place `base`, six numbers.
+calibration. It enters as a twist at the legs' feet, six numbers.
 
 The whole leg leans with its axis, and its U-joint with it: the platform, which three parallel legs hold upright, turns
 as well (up to a like angle), and more so near a constraint singularity. Eq. (8) does not know of this; the full spatial
-closure does. To first order (`rrru.robots.first_order`) the platform's motion is linear in the tilts.
+closure does. To first order (`rrru.robots.twist_map`) the platform's motion is linear in the tilts.
 
 Assumptions: rigid seat, constant over the campaign; axes of the other joints parallel to the drive axis as built.
 
@@ -21,18 +21,23 @@ Source: geometry; tolerances of drive axes as in Mooring, Roth and Driels, Funda
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _TILTS = (("tilt_x", "rad", -0.03, 0.03), ("tilt_z", "rad", -0.03, 0.03))
-_PARAMETERS = ParameterSet(leg_parameters("seat of the drive, size assumed", *_TILTS))
 
 
-def _seats(_, values):
-    """Displacement of the legs' seats under tilts about x and z of leg 1, then of legs 2 and 3, (6,) in rad."""
-    turn = np.zeros((3, 3))
-    turn[:, [0, 2]] = np.reshape(values, (3, 2))
-    return Contribution(displacement=base_displacement(np.zeros((3, 3)), turn))
+def for_robot(robot):
+    """The law for legs whose drives turn about an axis on the base, None without such."""
+    feet = robot.parts.feet
+    if not feet or "mm" in robot.parts.units:
+        return None
+    parameters = ParameterSet(leg_parameters("seat of the drive, size assumed", *_TILTS, count=len(feet)))
+    return Effect("axis_tilt", parameters, plain_coordinates(parameters, 1e-3), _seats)
 
 
-EFFECTS = (Effect("axis_tilt", _PARAMETERS, plain_coordinates(_PARAMETERS, 1e-3), _seats, drives=("rad",)),)
+def _seats(motion, values):
+    """Twists of the feet under tilts about x and z of leg 1, then of the others, (2 legs,) in rad."""
+    twists = np.zeros((len(motion.robot.parts.feet), 1, 6))
+    twists[:, 0, [3, 5]] = np.reshape(values, (-1, 2))
+    return motion.at(dict(zip(motion.robot.parts.feet, twists, strict=True)))

@@ -24,8 +24,15 @@ the play of its nut in mm (paper B, section 3.1).
 import numba
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import ParameterSet
+
+_SOURCE = {
+    "rad": "play of worm and harmonic drives: up to some arc minutes",
+    "mm": "paper B, eq. (19) measures it; size assumed",
+}
+_HIGHEST = {"rad": ("rad", 0.0, 0.02), "mm": ("mm", 0.0, 1.0)}
+_TYPICAL = {"rad": 5e-4, "mm": 0.02}
 
 
 @numba.njit(cache=True)
@@ -45,17 +52,11 @@ def play(path, half_width):
 
 
 def _played(motion, values):
-    """Changes (n, 3) of the actuator values under widths (3,) in their unit."""
-    return Contribution(drive=play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index])
+    """Changes of the actuator values under widths (K,) in their unit."""
+    return motion.at_drives(play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index])
 
 
-def _effect(drive_unit, highest, typical, source):
-    """The law for drives of one kind."""
-    parameters = ParameterSet(leg_parameters(source, ("width", drive_unit, 0.0, highest)))
-    return Effect("backlash", parameters, plain_coordinates(parameters, typical), _played, drives=(drive_unit,))
-
-
-EFFECTS = (
-    _effect("rad", 0.02, 5e-4, "play of worm and harmonic drives: up to some arc minutes"),
-    _effect("mm", 1.0, 0.02, "paper B, eq. (19) measures it; size assumed"),
-)
+def for_robot(robot):
+    """The law for all drives."""
+    parameters = ParameterSet(drive_parameters(robot, _SOURCE, ("width", _HIGHEST)))
+    return Effect("backlash", parameters, plain_coordinates(parameters, of_drives(robot, _TYPICAL)), _played)

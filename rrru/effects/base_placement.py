@@ -5,7 +5,7 @@ error p and a height error h it stands, turned by b about the vertical, at
 
     foot = Rz(b) (R + p, 0, 0) + (0, 0, h)
 
-so that, as a displacement at the place `base`,
+so that, as a twist at the legs' feet,
 
     shift = ((R + p) cos b - R, (R + p) sin b, h),    w = (0, 0, b)
 
@@ -22,21 +22,29 @@ assumed: a base drilled to 0.5 mm on a radius of 400 mm, that is about 1e-3 rad.
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _KINDS = (("azimuth", "rad", -0.03, 0.03), ("radius", "mm", -30.0, 30.0), ("height", "mm", -30.0, 30.0))
-_PARAMETERS = ParameterSet(leg_parameters("drilling of the base, size assumed", *_KINDS))
-_COORDINATES = plain_coordinates(_PARAMETERS, np.tile([1e-3, 0.5, 0.5], 3))
 
 
-def _feet(motion, values):
-    """Displacement of the legs' feet under azimuth (rad), radius and height (mm) of leg 1, then 2 and 3, (9,)."""
-    azimuth, radius, height = np.reshape(values, (3, 3)).T
-    foot = motion.lengths_mm[0] + radius
-    nothing = np.zeros(3)
-    shift = np.stack([foot * np.cos(azimuth) - motion.lengths_mm[0], foot * np.sin(azimuth), height], axis=-1)
-    return Contribution(displacement=base_displacement(shift, np.stack([nothing, nothing, azimuth], axis=-1)))
+def for_robot(robot):
+    """The law for all legs with a foot on the base, None without such."""
+    feet = robot.parts.feet
+    if not feet:
+        return None
+    parameters = ParameterSet(leg_parameters("drilling of the base, size assumed", *_KINDS, count=len(feet)))
+    return Effect(
+        "base_placement", parameters, plain_coordinates(parameters, np.tile([1e-3, 0.5, 0.5], len(feet))), _placed
+    )
 
 
-EFFECTS = (Effect("base_placement", _PARAMETERS, _COORDINATES, _feet),)
+def _placed(motion, values):
+    """Twists of the feet under azimuth (rad), radius and height (mm) of leg 1, then of the others, (3 legs,)."""
+    joints = {joint.name: joint for joint in motion.robot.legs.joints}
+    twists = {}
+    for site, (azimuth, radius, height) in zip(motion.robot.parts.feet, np.reshape(values, (-1, 3)), strict=True):
+        drawn = joints[site].shift_mm[0]
+        place = (drawn + radius) * np.cos(azimuth) - drawn, (drawn + radius) * np.sin(azimuth), height
+        twists[site] = np.array([[*place, 0.0, 0.0, azimuth]])
+    return motion.at(twists)

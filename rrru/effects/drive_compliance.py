@@ -26,23 +26,24 @@ Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsi
 on 50 kN m/rad make 3e-4 rad.
 """
 
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import ParameterSet
+
+_SOURCE = {
+    "rad": "torsion spring; a small drive's 1 kN m/rad as bound",
+    "mm": "screw, nut, bearing and carriage, size assumed",
+}
+_HIGHEST = {"rad": ("rad/(N mm)", 0.0, 1e-6), "mm": ("mm/N", 0.0, 0.05)}
+_TYPICAL = {"rad": 2e-8, "mm": 1e-3}
+
+
+def for_robot(robot):
+    """The law for all drives."""
+    parameters = ParameterSet(drive_parameters(robot, _SOURCE, ("compliance", _HIGHEST)))
+    coordinates = plain_coordinates(parameters, of_drives(robot, _TYPICAL))
+    return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",))
 
 
 def _wind_up(motion, values):
-    """Changes (n, 3) of the actuator values under compliances (3,), rad/(N mm) or mm/N."""
-    return Contribution(drive=values * motion.drive_load)
-
-
-def _effect(drive_unit, unit, highest, typical, source):
-    """The law for drives of one kind."""
-    parameters = ParameterSet(leg_parameters(source, ("compliance", unit, 0.0, highest)))
-    coordinates = plain_coordinates(parameters, typical)
-    return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",), (drive_unit,))
-
-
-EFFECTS = (
-    _effect("rad", "rad/(N mm)", 1e-6, 2e-8, "torsion spring; a small drive's 1 kN m/rad as bound"),
-    _effect("mm", "mm/N", 0.05, 1e-3, "screw, nut, bearing and carriage, size assumed"),
-)
+    """Changes of the actuator values under compliances (K,), rad/(N mm) or mm/N."""
+    return motion.at_drives(values * motion.drive_load)

@@ -20,16 +20,20 @@ assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Contribution, Effect
+from rrru.effects.protocol import Effect
 from rrru.parameters import ParameterSet
 
-_PARAMETERS = ParameterSet(harmonic_parameters("eccentricity over grating radius; up to some arc minutes, assumed"))
+_SOURCE = "eccentricity over grating radius; up to some arc minutes, assumed"
+
+
+def for_robot(robot):
+    """The law for robots whose drives all turn, None for others."""
+    if "mm" in robot.parts.units:
+        return None
+    parameters = ParameterSet(harmonic_parameters(len(robot.parts.drives), _SOURCE))
+    return Effect("encoder_eccentricity", parameters, harmonic_coordinates(parameters, 3e-4), _once_per_turn)
 
 
 def _once_per_turn(motion, values):
-    """Changes (n, 3) of the drive angles under amplitudes (3,) and phases (3,) in rad."""
-    return Contribution(drive=harmonic(motion.drive, 1.0, values))
-
-
-_COORDINATES = harmonic_coordinates(_PARAMETERS, 3e-4)
-EFFECTS = (Effect("encoder_eccentricity", _PARAMETERS, _COORDINATES, _once_per_turn, drives=("rad",)),)
+    """Changes of the drive angles under amplitudes (K,) and phases (K,) in rad."""
+    return motion.at_drives(harmonic(motion.drive, 1.0, values))

@@ -21,8 +21,9 @@ Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.legs import WORLD
 
 _KINDS = (("shift", "mm", 100.0), ("turn", "rad", 0.1))
 _PARAMETERS = ParameterSet(
@@ -35,9 +36,11 @@ _PARAMETERS = ParameterSet(
 _COORDINATES = plain_coordinates(_PARAMETERS, np.repeat([0.5, 5e-4], 3))
 
 
-def _moved(_, values):
-    """The frame's shift (mm) and rotation vector (rad), (6,)."""
-    return Contribution(frame=values)
+def _moved(motion, values):
+    """The world's twist by the frame's shift (mm) and rotation vector (rad), (6,)."""
+    return motion.at({WORLD: values[None]})
 
 
-EFFECTS = (Effect("frame_misregistration", _PARAMETERS, _COORDINATES, _moved),)
+def for_robot(_robot):
+    """The law, the same for every robot."""
+    return Effect("frame_misregistration", _PARAMETERS, _COORDINATES, _moved)

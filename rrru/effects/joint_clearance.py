@@ -22,35 +22,33 @@ Paper A, section 3.3, blames it for what calibration leaves; its size is assumed
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-_PARAMETERS = ParameterSet(
-    (
-        *leg_parameters("paper A, section 3.3 blames it; size assumed", ("clearance", "mm", 0.0, 2.0)),
-        Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
-        Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
-    )
+_SIZE = ("clearance", "mm", 0.0, 2.0)
+_SHAPE = (
+    Parameter("transition", "N", 0.0, 0.0, 100.0, "force within which the contact changes sides, assumed"),
+    Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
 )
 
 
-def _sides(motion, values):
-    """Shifts (n, 3, 3) of the platform's U-joint centres against the forearms.
+def for_robot(robot):
+    """The law for robots whose platform is pushed by links, None for others."""
+    members = robot.parts.members
+    if not members:
+        return None
+    sizes = leg_parameters("paper A, section 3.3 blames it; size assumed", _SIZE, count=len(members))
+    # a joint within the leg may be held
+    held = (0.0, 1.0) if robot.parts.held_from else (0.0,)
+    shapes = tuple({"transition": force, "held": share} for share in held for force in (0.2, 0.7, 2.0))
+    parameters = ParameterSet((*sizes, *_SHAPE))
+    coordinates = plain_coordinates(parameters, 0.05, shapes)
+    return Effect("joint_clearance", parameters, coordinates, _sides, ("force_n",))
 
-    values: clearances (3,) in mm, the transition in N and the share to which joint 3 is held.
-    """
-    transition, held = values[3:]
+
+def _sides(motion, values):
+    """Shifts along the members under clearances (members,) in mm, the transition in N and the share held."""
+    *clearance, transition, held = values
     force = motion.force_n + held * (motion.held_force_n - motion.force_n)
     side = np.tanh(force / transition) if transition > 0.0 else np.sign(force)
-    return Contribution(joint_mm=-(side * values[:3])[..., None] * motion.force_direction)
-
-
-def _effect(drive_unit, shares_held):
-    """The law for robots whose joint 3 may be held to these shares."""
-    shapes = tuple({"transition": force, "held": held} for held in shares_held for force in (0.2, 0.7, 2.0))
-    coordinates = plain_coordinates(_PARAMETERS, 0.05, shapes)
-    return Effect("joint_clearance", _PARAMETERS, coordinates, _sides, ("force_n",), (drive_unit,))
-
-
-# a slider's link has no joint of its own that could be held
-EFFECTS = (_effect("rad", (0.0, 1.0)), _effect("mm", (0.0,)))
+    return motion.along(motion.robot.parts.members, -side * clearance)

@@ -20,27 +20,23 @@ Source: paper A, section 2.2 (the 14 errors); the bounds are those of its calibr
 workshop holds on welded or clamped links of this length, ISO 2768-1 class m (+-0.8 mm from 400 to 1000 mm).
 """
 
-import numpy as np
-
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
+_SOURCE = "paper A, section 2.2, and workshop tolerance; bounds assumed"
 
-def _effect(drive_unit, links, source):
-    """The law for robots whose legs have these links: name of the parameters to the place among R, L1, L2, L3, r."""
-    parameters = ParameterSet(leg_parameters(source, *((name, "mm", -4.0, 4.0) for name in links)))
-    places = tuple(links.values())
+
+def for_robot(robot):
+    """The law for robots whose legs have links, None for others."""
+    links = robot.parts.links
+    if not links:
+        return None
+    groups = [group for leg in zip(*links.values(), strict=True) for group in leg]
+    kinds = ((name, "mm", -4.0, 4.0) for name in links)
+    parameters = ParameterSet(leg_parameters(_SOURCE, *kinds, count=len(groups) // len(links)))
 
     def lengths(motion, values):
-        """Changes (n, 3, 5) of the lengths under dL of the links of leg 1, then 2 and 3, (3 times the links,) in mm."""
-        length = np.zeros((len(motion), 3, 5))
-        length[..., places] = np.reshape(values, (3, len(places)))
-        return Contribution(length_mm=length)
+        """Shifts along the links under dL of the links of leg 1, then of the others, in mm."""
+        return motion.along(groups, values[None])
 
-    return Effect("leg_asymmetry", parameters, plain_coordinates(parameters, 0.3), lengths, drives=(drive_unit,))
-
-
-EFFECTS = (
-    _effect("rad", {"dL1_leg": 1, "dL2_leg": 2, "dL3_leg": 3}, "paper A, section 2.2; bounds assumed"),
-    _effect("mm", {"dL_leg": 3}, "workshop tolerance, assumed"),
-)
+    return Effect("leg_asymmetry", parameters, plain_coordinates(parameters, 0.3), lengths)

@@ -1,73 +1,81 @@
 """The library of effects by name, read from the files of this folder, and effects of one's own by `module:object`.
 
-A file of the library has a tuple EFFECTS of one Effect, or of one per kind of drives where the law differs.
+A file of the library has a function `for_robot`, from a robot to its Effect, None where it has no site for it.
 """
 
 import importlib
 import pkgutil
-import sys
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from rrru.effects.protocol import PLACES, ActiveEffect, Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import ActiveEffect, Contribution, Effect, plain_coordinates
 from rrru.errors import ConfigError
+from rrru.objects import load_object
 from rrru.parameters import ParameterSet
 
 # the order of tables and draws; what is not named here follows by its file's name
 _ORDER = (
     *("backlash", "drive_compliance", "link_flexure", "joint_clearance", "leg_asymmetry", "axis_tilt", "rail_tilt"),
     *("base_placement", "frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth"),
-    "servo_lag",
+    *("servo_lag", "bar_mismatch", "tool_offset", "joint_axis_error"),
 )
 # a user's effect that names no typical sizes gets this share of its bounds' width
 _TYPICAL_SHARE = 0.1
 
 
-def _effects():
-    """All effects of the folder's files in their order."""
-    names = {info.name for info in pkgutil.iter_modules([str(Path(__file__).parent)])} - {Path(__file__).stem}
-    ordered = (*(name for name in _ORDER if name in names), *sorted(names.difference(_ORDER)))
-    modules = (importlib.import_module(f"rrru.effects.{name}") for name in ordered)
-    return tuple(effect for module in modules for effect in getattr(module, "EFFECTS", ()))
+def _names():
+    """Names of the folder's effects in their order."""
+    files = {info.name for info in pkgutil.iter_modules([str(Path(__file__).parent)])}
+    names = {name for name in files - {Path(__file__).stem} if hasattr(_module(name), "for_robot")}
+    return (*(name for name in _ORDER if name in names), *sorted(names.difference(_ORDER)))
 
 
-# by unit of the actuator values; robots with screw- or belt-driven sliders have some laws in other units
-LIBRARY = {unit: {effect.name: effect for effect in _effects() if unit in effect.drives} for unit in ("rad", "mm")}
-EFFECTS, SLIDER_EFFECTS = LIBRARY["rad"], LIBRARY["mm"]
+def _module(name):
+    """The module of one file of the folder."""
+    return importlib.import_module(f"rrru.effects.{name}")
 
 
-def find(name, drive_unit="rad"):
-    """The effect of a library name or of `module:object`, an effect or a class without arguments.
+NAMES = _names()
+# an effect of so many numbers that it stands for most others is tried where it is asked for
+BY_DEFAULT = tuple(name for name in NAMES if name != "joint_axis_error")
 
-    The module lies in the working directory or is installed. drive_unit: "rad" or "mm", that of the robot's actuator
-    values. None for a name that is an effect of the other kind of drives only.
+
+def library(robot):
+    """The library's effects that a robot may have, by name."""
+    made = {name: _module(name).for_robot(robot) for name in NAMES}
+    return {name: effect for name, effect in made.items() if effect is not None}
+
+
+def find(name, robot):
+    """The effect on a robot of a library name or of `module:object`, an effect or a class without arguments.
+
+    The module lies in the working directory or is installed. None for a library's effect that the robot cannot have.
 
     A user's effect needs name, parameters and contribute; without `coordinates` these are the parameters with a tenth
     of their bounds' width as typical size, without `needs` nothing is needed. Raises ConfigError where there is none or
     where it is incomplete.
     """
-    if any(name in library for library in LIBRARY.values()):
-        return LIBRARY[drive_unit].get(name)
+    if name in NAMES:
+        return _module(name).for_robot(robot)
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name and all(part.isidentifier() for part in module_name.split("."))):
-        known = ", ".join(EFFECTS | SLIDER_EFFECTS)
+        known = ", ".join(NAMES)
         raise ConfigError(f"unknown effect {name!r}; known: {known}, or module:object for one of your own")
-    return _complete(name, _load(name, module_name, object_name))
+    return _complete(name, _load(name))
 
 
-def active_effects(section, drive_unit="rad"):
-    """Effects with their values from a mapping {effect: {parameter: value}}.
+def active_effects(section, robot):
+    """Effects of a robot with their values from a mapping {effect: {parameter: value}}.
 
     Raises ConfigError for unknown names and for values out of bounds.
     """
     result = []
     for name, values in dict(section or {}).items():
-        effect = find(name, drive_unit)
+        effect = find(name, robot)
         if effect is None:
-            known = ", ".join(LIBRARY[drive_unit])
-            raise ConfigError(f"effect {name!r} is none of a robot with drives in {drive_unit}; known: {known}")
+            raise ConfigError(f"effect {name!r} is none of a {robot.name}; known: {', '.join(library(robot))}")
         for key, value in values.items():
             allowed = effect.parameters[key]
             if not allowed.low <= value <= allowed.high:
@@ -77,19 +85,9 @@ def active_effects(section, drive_unit="rad"):
     return tuple(result)
 
 
-def _load(name, module_name, object_name):
+def _load(name):
     """The object that `module:object` stands for, an instance where it is a class."""
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
-    try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        place = f"{module_name!r} from {here} or the installed packages"
-        raise ConfigError(f"effect {name!r}: cannot import {place}: {error}") from error
-    if not hasattr(module, object_name):
-        raise ConfigError(f"effect {name!r}: module {module_name} has no {object_name!r}")
-    named = getattr(module, object_name)
+    named = load_object(f"effect {name!r}", name)
     if not isinstance(named, type):
         return named
     try:
@@ -106,7 +104,7 @@ def _complete(name, own):
         raise ConfigError(f"effect {name!r} lacks {', '.join(missing)}; needed: name, parameters, contribute")
     if not isinstance(own.parameters, ParameterSet) or not callable(own.contribute):
         raise ConfigError(f"effect {name!r}: parameters is no rrru.parameters.ParameterSet or contribute no function")
-    if own.name in EFFECTS | SLIDER_EFFECTS:
+    if own.name in NAMES:
         raise ConfigError(f"effect {name!r}: its name {own.name!r} belongs to the library; allowed: another one")
     coordinates = getattr(own, "coordinates", None)
     if coordinates is None:
@@ -123,20 +121,12 @@ def _checked(name, contribute, motion, values):
         raise ConfigError(f"effect {name!r}: contribute failed with {type(error).__name__}: {error}") from error
     if not isinstance(result, Contribution):
         raise ConfigError(f"effect {name!r}: contribute gave a {type(result).__name__}; allowed: a Contribution")
-    n = len(motion)
-    shapes = {"drive": (n, 3), "length_mm": (n, 3, 5), "joint_mm": (n, 3, 3)}
-    shapes |= {"displacement": (3, len(PLACES), 6), "frame": (6,)}
-    return Contribution(**{key: _full(name, key, getattr(result, key), shape) for key, shape in shapes.items()})
-
-
-def _full(name, key, value, shape):
-    """A contribution's part in full shape, or the number 0."""
-    if np.ndim(value) == 0 and value == 0.0:
-        return 0.0
+    shape = (len(motion), len(motion.robot.legs.sites), 6)
     try:
-        return np.broadcast_to(np.asarray(value, dtype=float), shape)
+        return Contribution(np.broadcast_to(np.asarray(result.twists, dtype=float), shape))
     except ValueError as error:
-        raise ConfigError(f"effect {name!r}: {key} has the shape {np.shape(value)}; allowed: {shape}") from error
+        given = np.shape(result.twists)
+        raise ConfigError(f"effect {name!r}: its twists have the shape {given}; allowed: {shape}") from error
 
 
 def _default_coordinates(name, parameters):

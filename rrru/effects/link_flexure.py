@@ -11,8 +11,8 @@ its weight, and further in proportion to a payload, which tells it from errors o
 so too, but with the drive's torque, so that the pattern over the workspace differs.
 
 Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
-leg is one two-force member from elbow to U-joint (`rrru.robots.dynamics.held_force`). Both are tried; `held` is 0 or 1,
-or a share between.
+leg is one two-force member from elbow to U-joint (`held_n` of `rrru.robots.dynamics.Loads`). Both are tried; `held` is
+0 or 1, or a share between.
 
 Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads
 are those at the commanded pose.
@@ -22,33 +22,26 @@ aluminium tube of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued en
 are assumed.
 """
 
-import numpy as np
-
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-_FOREARM = 3
-_PARAMETERS = ParameterSet(
-    (
-        *leg_parameters("axial spring of forearm and its joints, size assumed", ("flexure", "mm/N", 0.0, 0.1)),
-        Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it"),
-    )
-)
+_SIZE = ("flexure", "mm/N", 0.0, 0.1)
+_HELD = Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it")
+
+
+def for_robot(robot):
+    """The law for robots whose platform is pushed by links, None for others."""
+    members = robot.parts.members
+    if not members:
+        return None
+    sizes = leg_parameters("axial spring of forearm and its joints, size assumed", _SIZE, count=len(members))
+    # a joint within the leg may be held
+    shapes = ({"held": 0.0}, {"held": 1.0}) if robot.parts.held_from else ({"held": 0.0},)
+    parameters = ParameterSet((*sizes, _HELD))
+    return Effect("link_flexure", parameters, plain_coordinates(parameters, 2e-3, shapes), _shortened, ("force_n",))
 
 
 def _shortened(motion, values):
-    """Changes (n, 3, 5) of the lengths under compliances (3,) in mm/N and the share to which joint 3 is held."""
-    force = motion.force_n + values[3] * (motion.held_force_n - motion.force_n)
-    length = np.zeros((len(motion), 3, 5))
-    length[..., _FOREARM] = -values[:3] * force
-    return Contribution(length_mm=length)
-
-
-def _effect(drive_unit, *shares_held):
-    """The law for robots whose joint 3 may be held to these shares."""
-    coordinates = plain_coordinates(_PARAMETERS, 2e-3, tuple({"held": held} for held in shares_held))
-    return Effect("link_flexure", _PARAMETERS, coordinates, _shortened, ("force_n",), (drive_unit,))
-
-
-# a slider's link has no joint of its own that could be held
-EFFECTS = (_effect("rad", 0.0, 1.0), _effect("mm", 0.0))
+    """Shifts along the members under compliances (members,) in mm/N and the share to which joint 3 is held."""
+    force = motion.force_n + values[-1] * (motion.held_force_n - motion.force_n)
+    return motion.along(motion.robot.parts.members, -values[:-1] * force)

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.effects.protocol import Motion
-from rrru.robots.dynamics import drive_rates, held_force, loads
-from rrru.robots.rrru3 import Rrru3
+from rrru.robots.dynamics import drive_rates, loads
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,8 @@ class Course:
     payload_kg: np.ndarray
 
 
-def make_motion(mechanism, masses, course):
-    """Motion along a Course: rates and loads of the nominal mechanism with `rrru.robots.dynamics.Masses`.
+def make_motion(robot, masses, course):
+    """Motion along a Course: rates and loads of the nominal robot with `rrru.robots.dynamics.Masses`.
 
     Where the velocity is NaN the rates are; the loads then count the platform as at rest, and an unknown payload as
     none. The loads are those at the commanded position: a controller's own corrections are too small to change them.
@@ -37,16 +36,14 @@ def make_motion(mechanism, masses, course):
         np.asarray(values, dtype=float)
         for values in (course.position_mm, course.velocity_mm_s, course.acceleration_mm_s2, course.payload_kg)
     )
-    rate, drive_acceleration = drive_rates(mechanism, position, velocity, acceleration)
+    rate, drive_acceleration = drive_rates(robot, position, velocity, acceleration)
     known = (np.isfinite(velocity) & np.isfinite(acceleration)).all(axis=1, keepdims=True)
-    nominal, carried = mechanism.inverse(position), np.nan_to_num(payload)
+    nominal, carried = robot.inverse(position), np.nan_to_num(payload)
     inertial = np.where(known, acceleration, 0.0)
-    turning = np.where(known, drive_acceleration, 0.0)
-    force, direction, load = loads(mechanism, masses, position, nominal, turning, inertial, carried)
-    # only the 3-RRRU has a joint within its legs that friction can hold
-    free = not isinstance(mechanism, Rrru3)
-    held = force if free else held_force(mechanism, masses, position, nominal, inertial, carried)
+    turning = tuple(np.where(known, values, 0.0) for values in (rate, drive_acceleration))
+    load = loads(robot, masses, position, nominal, turning, inertial, carried)
     return Motion(
+        robot=robot,
         position_mm=position,
         drive=np.asarray(course.drive, dtype=float),
         drive_rate=rate,
@@ -55,9 +52,7 @@ def make_motion(mechanism, masses, course):
         path_index=np.asarray(course.path_index),
         time_s=np.asarray(course.time_s, dtype=float),
         payload_kg=payload,
-        force_n=force,
-        held_force_n=held,
-        force_direction=direction,
-        drive_load=load,
-        lengths_mm=mechanism.lengths_mm,
+        force_n=load.member_n,
+        held_force_n=load.held_n,
+        drive_load=load.drive,
     )

@@ -1,30 +1,46 @@
 """What an effect is: a physical law that knows the motion and says what it changes, and where. mm, rad, N, s."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from rrru.parameters import LEGS, Parameter, ParameterSet
+from rrru.parameters import Parameter, ParameterSet
 
-# where a displacement may act, along the chain of a leg
-PLACES = ("base", "elbow", "knee", "wrist", "cross", "platform")
+_ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one effect changes at the n points: twists (n or 1, sites, 6) at the robot's sites, or 0 for nothing.
+
+    A twist is a shift in mm and a rotation vector in rad, in the site's own frame; see `rrru.robots.legs`.
+    """
+
+    twists: np.ndarray | float = 0.0
+
+    def __add__(self, other: "Contribution") -> "Contribution":
+        return Contribution(self.twists + other.twists)
+
+    def __sub__(self, other: "Contribution") -> "Contribution":
+        return Contribution(self.twists - other.twists)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """What the robot does at the n sampled points, as far as an effect may need it; NaN where nobody knows it.
+    """What a robot does at the n sampled points, as far as an effect may need it; NaN where nobody knows it.
 
-    position_mm (n, 3): commanded positions; drive, drive_rate, drive_acceleration (n, 3): commanded actuator values,
-    angles in rad or slider positions in mm, and their derivatives by the time; path_drive (N, 3): the values along
-    everything that is driven, path_index (n,): rows of the sampled points in it; time_s (n,): since the campaign's
-    start; payload_kg (n,); force_n (n, 3): force with which each leg pushes the platform along force_direction (n, 3
-    legs, 3), the forearm's direction, compression positive, and held_force_n (n, 3) the same if friction holds joint 3;
-    drive_load (n, 3): torque in N mm or force in N of the loads on each drive, positive in the drive's sense;
-    lengths_mm (5,): nominal R, L1, L2, L3, r; L3 is the link that reaches the platform, 0 what a robot does not have.
+    robot: with its sites and parts; position_mm (n, 3): commanded positions; drive, drive_rate, drive_acceleration (n,
+    K): commanded actuator values, angles in rad or lengths in mm, and their derivatives by the time; path_drive (N, K):
+    the values along everything that is driven, path_index (n,): rows of the sampled points in it; time_s (n,): since
+    the campaign's start; payload_kg (n,); force_n (n, members): force with which each member pushes the platform,
+    compression positive, and held_force_n the same if friction holds the legs' inner joints; drive_load (n, K): torque
+    in N mm or force in N of the loads on each drive, positive in the drive's sense.
     """
 
+    robot: Any
     position_mm: np.ndarray
     drive: np.ndarray
     drive_rate: np.ndarray
@@ -35,32 +51,33 @@ class Motion:
     payload_kg: np.ndarray
     force_n: np.ndarray
     held_force_n: np.ndarray
-    force_direction: np.ndarray
     drive_load: np.ndarray
-    lengths_mm: np.ndarray
 
     def __len__(self) -> int:
         return len(self.drive)
 
+    def at_drives(self, changes: np.ndarray) -> Contribution:
+        """Contribution of changes (n, K) of the actuator values, in their units."""
+        return self.at({drive.site: np.multiply.outer(changes[:, k], drive.twist) for k, drive in self._drives})
 
-@dataclass(frozen=True)
-class Contribution:
-    """What one effect changes at the n points.
+    def along(self, groups: Iterable[tuple[str, ...]], shifts_mm: np.ndarray) -> Contribution:
+        """Contribution of shifts (n or 1, groups) in mm along the x of every site of each group."""
+        named = [(site, k) for k, group in enumerate(groups) for site in group]
+        return self.at({site: np.multiply.outer(shifts_mm[:, k], _ALONG) for site, k in named})
 
-    drive (n, 3): added to the actuator values, rad or mm; length_mm (n, 3 legs, 5): added to R, L1, L2, L3, r; joint_mm
-    (n, 3 legs, 3): shift of the platform's U-joint centres against the forearms, robot frame; displacement (3 legs, 6
-    places, 6): rigid displacements at the places of PLACES, shift in mm and rotation vector in rad, leg frame; frame
-    (6,): shift in mm and rotation vector in rad that carry true positions into measured ones.
-    """
+    def at(self, twists: Mapping[str, np.ndarray]) -> Contribution:
+        """Contribution of twists (n or 1, 6) by the site's name."""
+        numbers = self.robot.legs.site_numbers
+        rows = max((len(one) for one in twists.values()), default=1)
+        result = np.zeros((rows, len(numbers), 6))
+        for site, one in twists.items():
+            result[:, numbers[site]] += one
+        return Contribution(result)
 
-    drive: np.ndarray | float = 0.0
-    length_mm: np.ndarray | float = 0.0
-    joint_mm: np.ndarray | float = 0.0
-    displacement: np.ndarray | float = 0.0
-    frame: np.ndarray | float = 0.0
-
-    def __add__(self, other: "Contribution") -> "Contribution":
-        return Contribution(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+    @property
+    def _drives(self) -> Iterable[tuple[int, Any]]:
+        """Numbers of the actuator values and the robot's Drives."""
+        return enumerate(self.robot.parts.drives)
 
 
 @dataclass(frozen=True)
@@ -68,9 +85,9 @@ class Coordinates:
     """How the diagnosis fits a law: c coordinates in which its contribution is linear, or nearly so.
 
     typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest
-    sizes that the law allows; legs (c,): 1 to 3, or 0 where the coordinate acts on all; positive (c,): whether it
-    cannot be negative; shapes: values of the parameters that are no coordinates, each a variant of the law to be tried;
-    to_values: coordinates (c,) and a shape to parameter values (p,).
+    sizes that the law allows; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all;
+    positive (c,): whether it cannot be negative; shapes: values of the parameters that are no coordinates, each a
+    variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,).
     """
 
     typical: np.ndarray
@@ -84,19 +101,35 @@ class Coordinates:
         return len(self.typical)
 
 
-def base_displacement(shift_mm: np.ndarray, turn_rad: np.ndarray) -> np.ndarray:
-    """Contribution.displacement (3 legs, 6 places, 6) of shifts and rotation vectors (3, 3) of the feet, leg frame."""
-    result = np.zeros((3, len(PLACES), 6))
-    result[:, PLACES.index("base"), :3] = shift_mm
-    result[:, PLACES.index("base"), 3:] = turn_rad
-    return result
+def leg_parameters(source: str, *kinds: tuple[str, str, float, float], count: int = 3) -> tuple[Parameter, ...]:
+    """Parameters of each of `count` legs or drives, the first's first; kinds: (name, unit, low, high).
 
-
-def leg_parameters(source: str, *kinds: tuple[str, str, float, float]) -> tuple[Parameter, ...]:
-    """Parameters of every leg, those of leg 1 first; kinds: (name, unit, low, high), the leg's number is added."""
+    The leg's number is added to the name.
+    """
+    legs = range(1, count + 1)
     return tuple(
-        Parameter(f"{name}{leg}", unit, 0.0, low, high, source, leg) for leg in LEGS for name, unit, low, high in kinds
+        Parameter(f"{name}{leg}", unit, 0.0, low, high, source, leg) for leg in legs for name, unit, low, high in kinds
     )
+
+
+def drive_parameters(robot: Any, source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
+    """Parameters of each drive of a robot; kinds: (name, {drive's unit: (unit, low, high)}), source by drive's unit."""
+    return tuple(
+        Parameter(f"{name}{number}", *_bounds(by_unit[drive.unit]), source[drive.unit], number)
+        for number, drive in enumerate(robot.parts.drives, 1)
+        for name, by_unit in kinds
+    )
+
+
+def of_drives(robot: Any, by_unit: Mapping[str, float]) -> np.ndarray:
+    """One number (K,) of each drive of a robot by the drive's unit."""
+    return np.array([by_unit[drive.unit] for drive in robot.parts.drives])
+
+
+def _bounds(allowed: tuple[str, float, float]) -> tuple[str, float, float, float]:
+    """Unit, nominal value and bounds of a parameter that is nominally zero."""
+    unit, low, high = allowed
+    return unit, 0.0, low, high
 
 
 def plain_coordinates(
@@ -125,8 +158,7 @@ def plain_coordinates(
 class Effect:
     """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: fields of Motion without which the law says nothing; drives: units of the actuator values ("rad", "mm") of
-    the robots that it is written for.
+    needs: fields of Motion without which the law says nothing.
     """
 
     name: str
@@ -134,7 +166,6 @@ class Effect:
     coordinates: Coordinates
     law: Callable[[Motion, np.ndarray], Contribution]
     needs: tuple[str, ...] = ()
-    drives: tuple[str, ...] = ("rad", "mm")
 
     def contribute(self, motion: Motion, values: npt.ArrayLike) -> Contribution:
         """Changes at the points of a motion under parameter values (p,)."""

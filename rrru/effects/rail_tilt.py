@@ -7,11 +7,11 @@ vector
 
 rise lifts a horizontal rail's outer end or leans an upright one inwards, swing turns a horizontal rail about the
 vertical, lean an upright one to the side. The carriage at the distance b_k from the zero mark is off by w_k x b_k d_k,
-which grows along the rail: what tells it from the zero error of a slider. It enters as a displacement at the place
-`base`, nine numbers of which six do something, and is linear in them.
+which grows along the rail: what tells it from the zero error of a slider. It enters as a twist at the legs'
+feet, nine numbers of which six do something, and is linear in them.
 
-Assumptions: straight rail, true at its zero mark; joints that keep the platform upright all the same; constant over the
-campaign.
+Assumptions: straight rail, true at its zero mark; joints that lean with their rail, so that the platform turns;
+constant over the campaign.
 
 Source: geometry; squareness and parallelism of guides as in Slocum, Precision Machine Design, 1992. Typical size
 assumed: 0.3 mm over 300 mm.
@@ -19,17 +19,23 @@ assumed: 0.3 mm over 300 mm.
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, base_displacement, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _TURNS = tuple((kind, "rad", -0.05, 0.05) for kind in ("lean", "rise", "swing"))
-_PARAMETERS = ParameterSet(leg_parameters("seat of the rail, size assumed", *_TURNS))
 
 
-def _seats(_, values):
-    """Displacement of the rails' seats under lean, rise and swing of leg 1, then of legs 2 and 3, (9,) in rad."""
-    turn = np.reshape(values, (3, 3)) * [1.0, -1.0, 1.0]
-    return Contribution(displacement=base_displacement(np.zeros((3, 3)), turn))
+def for_robot(robot):
+    """The law for legs whose drives slide on rails on the base, None without such."""
+    feet = robot.parts.feet
+    if not feet or "rad" in robot.parts.units:
+        return None
+    parameters = ParameterSet(leg_parameters("seat of the rail, size assumed", *_TURNS, count=len(feet)))
+    return Effect("rail_tilt", parameters, plain_coordinates(parameters, 1e-3), _seats)
 
 
-EFFECTS = (Effect("rail_tilt", _PARAMETERS, plain_coordinates(_PARAMETERS, 1e-3), _seats, drives=("mm",)),)
+def _seats(motion, values):
+    """Twists of the rails' seats under lean, rise and swing of leg 1, then of the others, (3 legs,) in rad."""
+    turns = np.reshape(values, (-1, 1, 3)) * [1.0, -1.0, 1.0]
+    twists = np.concatenate([np.zeros_like(turns), turns], axis=2)
+    return motion.at(dict(zip(motion.robot.parts.feet, twists, strict=True)))

@@ -21,17 +21,21 @@ second.
 
 import numpy as np
 
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import ParameterSet
 
+_LAG = ("s", 0.0, 0.1)
 _SOURCE = "inverse of the position loop's gain, assumed"
-_PARAMETERS = ParameterSet(leg_parameters(_SOURCE, ("lag", "s", 0.0, 0.1)))
+
+
+def for_robot(robot):
+    """The law for all drives."""
+    lags = leg_parameters(_SOURCE, ("lag", *_LAG), count=len(robot.parts.drives))
+    parameters = ParameterSet(lags)
+    return Effect("servo_lag", parameters, plain_coordinates(parameters, 0.003), _late, ("drive_rate",))
 
 
 def _late(motion, delay):
-    """Changes (n, 3) of the drive angles under delays (3,) in s."""
+    """Changes of the actuator values under delays (K,) in s."""
     curvature, rate = np.nan_to_num(motion.drive_acceleration), np.nan_to_num(motion.drive_rate)
-    return Contribution(drive=0.5 * delay**2 * curvature - delay * rate)
-
-
-EFFECTS = (Effect("servo_lag", _PARAMETERS, plain_coordinates(_PARAMETERS, 0.003), _late, ("drive_rate",)),)
+    return motion.at_drives(0.5 * delay**2 * curvature - delay * rate)

@@ -35,11 +35,15 @@ _SHAPES = tuple({"time_constant": tau} for tau in (30.0, 60.0, 125.0, 250.0, 500
 
 
 def _grown(motion, values):
-    """Changes (n, 3, 5) of the lengths under final strain and time constant in s; none where the time is unknown."""
+    """Shifts of every link's end by its growth under final strain and time constant in s.
+
+    None where the time is unknown.
+    """
     strain, time_constant = values
     share = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
-    return Contribution(length_mm=np.broadcast_to(share[:, None, None] * motion.lengths_mm, (len(motion), 3, 5)))
+    return Contribution(np.multiply.outer(share, motion.robot.legs.growth))
 
 
-_COORDINATES = plain_coordinates(_PARAMETERS, 2e-4, _SHAPES)
-EFFECTS = (Effect("thermal_growth", _PARAMETERS, _COORDINATES, _grown, ("time_s",)),)
+def for_robot(_robot):
+    """The law, the same for every robot."""
+    return Effect("thermal_growth", _PARAMETERS, plain_coordinates(_PARAMETERS, 2e-4, _SHAPES), _grown, ("time_s",))

@@ -22,32 +22,32 @@ is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-
 import numpy as np
 
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Contribution, Effect
+from rrru.effects.protocol import Effect
 from rrru.parameters import Parameter, ParameterSet
-
-
-def _effect(drive_unit, parameters, typical, law):
-    """The law for drives of one kind, with its parameters, the last of them known from a data sheet."""
-    known = parameters[-1]
-    parameters = ParameterSet(parameters)
-    coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
-    return Effect("transmission_error", parameters, coordinates, law, drives=(drive_unit,))
-
-
-def _gear(motion, values):
-    """Changes (n, 3) of the drive angles under amplitudes (3,), phases (3,) in rad and the ratio."""
-    return Contribution(drive=harmonic(motion.drive, values[6], values))
-
-
-def _screw(motion, values):
-    """Changes (n, 3) of the slider positions under amplitudes (3,) in mm, phases (3,) in rad and the lead in mm."""
-    return Contribution(drive=harmonic(motion.drive, 2.0 * np.pi / values[6], values))
-
 
 _RATIO = Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default")
 _LEAD = Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default")
-_OUT_OF_TRUE = harmonic_parameters("screw out of true, assumed: up to some hundredths of a millimetre", "mm", 1.0)
-EFFECTS = (
-    _effect("rad", (*harmonic_parameters("assumed: up to some arc minutes"), _RATIO), 3e-4, _gear),
-    _effect("mm", (*_OUT_OF_TRUE, _LEAD), 0.01, _screw),
-)
+_GEAR, _SCREW = "assumed: up to some arc minutes", "screw out of true, assumed: up to some hundredths of a millimetre"
+
+
+def for_robot(robot):
+    """The law for robots whose drives all turn or all slide, None for others."""
+    units, count = set(robot.parts.units), len(robot.parts.drives)
+    if len(units) > 1:
+        return None
+    known, typical, law = (_RATIO, 3e-4, _turned) if units == {"rad"} else (_LEAD, 0.01, _slid)
+    sizes = harmonic_parameters(count, _GEAR) if units == {"rad"} else harmonic_parameters(count, _SCREW, "mm", 1.0)
+    parameters = ParameterSet((*sizes, known))
+    return Effect(
+        "transmission_error", parameters, harmonic_coordinates(parameters, typical, ({known.name: known.nominal},)), law
+    )
+
+
+def _turned(motion, values):
+    """Changes of the drive angles under amplitudes, phases (K,) in rad and the ratio."""
+    return motion.at_drives(harmonic(motion.drive, values[-1], values))
+
+
+def _slid(motion, values):
+    """Changes of the slider positions under amplitudes (K,) in mm, phases (K,) in rad and the lead in mm."""
+    return motion.at_drives(harmonic(motion.drive, 2.0 * np.pi / values[-1], values))

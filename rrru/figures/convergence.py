@@ -16,6 +16,8 @@ def convergence(tables, options):
     seed, their median and quartiles; a run that has stopped keeps what it reached.
     """
     campaign = options["campaign"]
+    if tables["genetic"].empty:
+        return style.note("no genetic search: the robot has no compiled objective")
     history = choose.of_campaign(tables, "genetic_history", campaign, "convergence")
     runs = choose.of_campaign(tables, "genetic", campaign, "convergence")
     names = list(dict.fromkeys(history["calibration"]))

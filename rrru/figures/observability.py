@@ -7,17 +7,21 @@ from rrru.figures import choose, style
 
 # weights smaller than this are left unwritten
 _WRITTEN_FROM = 0.15
+# with more parameters there is no room for numbers, and names stand upright
+_ROOM_FOR = 9
 
 
 @style.printed
 def observability(tables, options):
     """What every set of trajectories can see: directions of parameter space from the best seen to the worst, what
-    each is made of (weights below 0.15 are not written), the standard error along it and its singular value.
+    each is made of (weights below 0.15, or of more than nine parameters, are not written), the standard error along
+    it and its singular value.
     """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     names = list(dict.fromkeys(rows["calibration"]))
     widths = [2.6, 1.0] * min(len(names), 2)
-    figure, panels = style.panel_grid(len(names), 58.0, each=2, width_ratios=widths)
+    crowded = rows["parameter"].nunique() > _ROOM_FOR
+    figure, panels = style.panel_grid(len(names), 80.0 if crowded else 58.0, each=2, width_ratios=widths)
     limits = _error_limits(rows["standard_error_mm"])
     for place, (name, (weights, errors)) in enumerate(zip(names, panels, strict=True)):
         part = rows[rows["calibration"] == name]
@@ -36,11 +40,12 @@ def _weights(axes, part):
     table = part.pivot(index="direction", columns="parameter", values="weight")[parameters].sort_index()
     image = axes.imshow(table.abs(), cmap=style.SEQUENTIAL, vmin=0.0, vmax=1.0, aspect="auto", interpolation="none")
     for (row, column), weight in np.ndenumerate(table.to_numpy()):
-        if abs(weight) >= _WRITTEN_FROM:
+        if abs(weight) >= _WRITTEN_FROM and len(parameters) <= _ROOM_FOR:
             text = f"{weight:+.2f}".replace("0.", ".", 1).replace("-", "\N{MINUS SIGN}")
             color = "white" if abs(weight) > 0.6 else "black"
             axes.text(column, row, text, ha="center", va="center", fontsize=7.0, color=color, in_layout=False)
-    axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters])
+    crowded = {"rotation": 90.0, "fontsize": 6.0} if len(parameters) > _ROOM_FOR else {}
+    axes.set_xticks(range(len(parameters)), [choose.parameter_label(name) for name in parameters], **crowded)
     axes.set_yticks(range(len(table)), table.index)
     axes.tick_params(length=0.0)
     axes.set_xlabel("error parameter")

@@ -88,6 +88,13 @@ def new(width_mm, height_mm):
     return figure
 
 
+def note(text):
+    """A figure that says in a line why there is nothing to draw."""
+    figure = new(DOUBLE_MM, 20.0)
+    figure.text(0.5, 0.5, text, ha="center", va="center")
+    return figure
+
+
 def legend_above(figure, axes, columns=5, side="upper"):
     """One legend above all panels, where it covers no data, in as few rows of `columns` as it takes; side: or lower."""
     entries = _entries(axes)

@@ -72,7 +72,8 @@ def _slice(rows, name):
     for axis in (across, up):
         position = rows[f"{axis}_mm"]
         reached = position[reachable.loc[rows.index]]
-        margin = 0.04 * np.ptp(reached) if len(reached) else np.inf
+        step = np.diff(np.unique(position)).min(initial=np.inf)
+        margin = max(0.04 * np.ptp(reached), 1.5 * step) if len(reached) else np.inf
         rows = rows[position.between(reached.min() - margin, reached.max() + margin)] if len(reached) else rows
     axes = {"index": f"{up}_mm", "columns": f"{across}_mm"}
     rows = rows.assign(**{field: rows[field].where(reachable) for field in _FIELDS})

@@ -12,7 +12,7 @@ from rrru.errors import ConfigError, FitError
 from rrru.fit.least_squares import Fit, least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -31,18 +31,22 @@ class CalibrationSettings:
 
 
 def select(
-    measurements: pd.DataFrame, mechanism: Mechanism, patterns: Iterable[str], use_near_singularity: bool = True
+    measurements: pd.DataFrame, mechanism: Robot, patterns: Iterable[str], use_near_singularity: bool = True
 ) -> Residuals | None:
     """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit."""
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
-    if 3 * chosen.sum() < len(mechanism.parameters):
+    if not chosen.any():
         return None
     frame = measurements.loc[chosen]
-    return Residuals(mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame))
+    actuators, command = rows.actuators(frame, mechanism), rows.command(frame)
+    mechanism = mechanism.seen_at(actuators, command)
+    if 3 * len(frame) < len(mechanism.parameters):
+        return None
+    return Residuals(mechanism, actuators, rows.measured(frame), command)
 
 
 def fit_sets(
-    measurements: pd.DataFrame, mechanism: Mechanism, settings: CalibrationSettings, noise_mm: float | None = None
+    measurements: pd.DataFrame, mechanism: Robot, settings: CalibrationSettings, noise_mm: float | None = None
 ) -> dict[tuple[str, str], Fit]:
     """Fits {(set, method): Fit} of all sets of the CalibrationSettings that the campaign has points for.
 
@@ -142,7 +146,7 @@ def _observability_rows(fit: Fit) -> pd.DataFrame:
     )
 
 
-def deviation_vector(parameters: pd.DataFrame, calibration: str, method: str, mechanism: Mechanism) -> np.ndarray:
+def deviation_vector(parameters: pd.DataFrame, calibration: str, method: str, mechanism: Robot) -> np.ndarray:
     """Deviations (p,) of one calibration out of a `parameters` frame; raises FitError where it is not there."""
     chosen = parameters[(parameters["calibration"] == calibration) & (parameters["method"] == method)]
     if chosen.empty:

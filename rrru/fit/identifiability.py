@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 
 # A direction whose singular value is smaller than this share of the largest is not seen: it would need millimetre data
 # true to nanometres.
 RANK_TOLERANCE = 1e-6
 
 
-def parameter_scale(mechanism: Mechanism) -> np.ndarray:
+def parameter_scale(mechanism: Robot) -> np.ndarray:
     """Deviation (p,) that moves something by about 1 mm: 1 mm for lengths, 1 mm over the mechanism's arm for angles."""
     return np.array([1.0 / mechanism.angle_arm_mm if unit == "rad" else 1.0 for unit in mechanism.parameters.units])
 
@@ -95,7 +95,7 @@ class Identifiability:
         }
 
 
-def analyse(mechanism: Mechanism, jacobian: np.ndarray) -> Identifiability:
+def analyse(mechanism: Robot, jacobian: np.ndarray) -> Identifiability:
     """Identifiability from the derivative (n, 3, p) of the positions with respect to the mechanism's parameters."""
     return analyse_columns(mechanism.parameters.names, parameter_scale(mechanism), jacobian)
 

@@ -13,6 +13,8 @@ from rrru.fit.residuals import Residuals
 
 _OUT_OF_REACH_MM = 1e6
 _GRADIENT = 1e-9
+# a simplex of more corners crawls; the trust region's end at a kink then has to do
+_MOST_FOR_SIMPLEX = 15
 _SIMPLEX = {"maxfev": 20_000, "maxiter": 20_000, "xatol": 1e-8, "fatol": 1e-12, "adaptive": True}
 
 
@@ -38,7 +40,7 @@ def least_mean_distance(residuals: Residuals, start: npt.ArrayLike, noise_mm: fl
         value, np.zeros(ident.rank), jac=gradient, hess=hessian, method="trust-exact", options={"gtol": _GRADIENT}
     )
     evaluations, best = int(solution.nfev), solution.x
-    if not solution.success:
+    if not solution.success and ident.rank <= _MOST_FOR_SIMPLEX:
         options = _SIMPLEX | {"initial_simplex": _simplex(best)}
         simplex = optimize.minimize(
             lambda q: residuals.mean_distance((start + seen @ q)[None])[0], best, method="Nelder-Mead", options=options

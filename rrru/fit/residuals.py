@@ -8,7 +8,7 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import last_kept
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Residuals:
     and positions near which the model's are found (the commanded ones). Raises FitError where a number is not finite.
     """
 
-    mechanism: Mechanism
+    mechanism: Robot
     actuators: np.ndarray
     measured_mm: np.ndarray
     start_mm: np.ndarray

@@ -60,7 +60,9 @@ class Attribution:
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
     frame = case.points
-    fit = least_squares(Residuals(case.mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame)))
+    fit = least_squares(
+        Residuals(case.mechanism, rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame))
+    )
     return State(fit.deviations, {})
 
 

@@ -15,14 +15,13 @@ from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
 from rrru.gap.unknown import UNKNOWN, unknown_functions
-from rrru.plant.closure import corrected_sim
-from rrru.robots.first_order import first_order
 
 # a parameter of a law's shape may be off by this share
 _SHAPE_STEP = 0.3
 # an effect is tested where at least this share of the points has what it needs
 _ENOUGH = 0.8
 # nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
+_STANDS = {"rad": 1e-8, "mm": 1e-6}
 _NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
@@ -59,7 +58,7 @@ class Linear:
     mechanism's deviations; columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates;
     shape_columns: effect of the state to what its shape's parameters may be wrong by, (n, 3, q), each column one
     standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (n, 3 axes,
-    3): derivative by the actuator values.
+    K): derivative by the actuator values.
     """
 
     data: np.ndarray
@@ -117,13 +116,16 @@ class Case:
 
     def sim(self, deviations):
         """Positions (m, 3) of the calibrated sim without effects."""
-        return self.mechanism.forward(rows.actuators(self.measurements), deviations, rows.command(self.measurements))
+        return self.mechanism.forward(
+            rows.actuators(self.measurements, self.mechanism), deviations, rows.command(self.measurements)
+        )
 
     def exact(self, state):
         """Positions (n, 3) of the sim corrected by a state: the exact closure with its effects."""
         change = sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
-        actuators, command = rows.actuators(self.measurements), rows.command(self.measurements)
-        return corrected_sim(self.mechanism, state.deviations, actuators, command, change)[self.used]
+        actuators, command = rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
+        twists = self.mechanism.twists(state.deviations) + change.twists
+        return self.mechanism.measured(self.mechanism.solve(actuators, command, twists), twists)[self.used]
 
     def model(self, state):
         """Positions (n, 3) of a state's sim: exact where it has effects, the calibrated one where it has none."""
@@ -134,32 +136,32 @@ class Case:
 
         keys: (effect, shape) pairs to make columns for, by default all.
         """
-        actuators, position = rows.actuators(self.measurements), self.sim(state.deviations)
-        legs = first_order(self.mechanism, position, actuators, state.deviations)
+        actuators, position = rows.actuators(self.measurements, self.mechanism), self.sim(state.deviations)
+        at = self.mechanism.map_at(actuators, position, state.deviations)
         model = self.model(state)
         lost = ~np.isfinite(model).all(axis=1) | ~np.isfinite(position[self.used]).all(axis=1)
         if lost.any():
             raise FitError(f"the sim has no pose at {int(lost.sum())} points")
         if keys is None:
             keys = [(name, k) for name, effect in self.library.items() for k in range(len(effect.coordinates.shapes))]
-        columns = {key: self._columns(legs, key, state) for key in dict.fromkeys((*keys, *state.effects))}
-        by_shape = {key[0]: self._by_shape(legs, key, state) for key in state.effects}
+        columns = {key: self._columns(at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
+        by_shape = {key[0]: self._by_shape(at, key, state) for key in state.effects}
         data = self.measured_mm - model
         for key, coordinates in state.effects.items():
             data = data + columns[key] @ coordinates
         return Linear(
             data,
-            self.mechanism.parameter_jacobian(position, actuators, state.deviations)[self.used],
+            at.columns(self.mechanism.directions)[self.used],
             columns,
             {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
             {name: steps for name, (_, steps) in by_shape.items()},
-            (legs.response[..., 0] * legs.drive[:, None, :])[self.used],
+            at.drive_response[self.used],
         )
 
-    def _by_shape(self, legs, key, state):
+    def _by_shape(self, at, key, state):
         """`Linear.shape_columns` and `Linear.shape_steps` of one effect of the state."""
         shape, effect = state.shape(self.library, key), self.library[key[0]]
-        leg = legs.leg_deviations(state.contribution(self.library, key, self.motion))
+        own = state.contribution(self.library, key, self.motion)
         columns, steps = [], []
         for name, value in shape.items():
             stepped = value * (1.0 + _SHAPE_STEP)
@@ -167,12 +169,12 @@ class Case:
                 stepped = value * (1.0 - _SHAPE_STEP)
             if stepped != value:
                 other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
-                columns.append(np.einsum("nalc,nlc->na", legs.response, legs.leg_deviations(other) - leg)[self.used])
+                columns.append(at.move((other - own).twists)[self.used])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
         return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
 
-    def _columns(self, legs, key, state):
+    def _columns(self, at, key, state):
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
         step = np.array(self.library[key[0]].coordinates.typical)
         if key in state.effects:
@@ -181,7 +183,7 @@ class Case:
         result = np.empty((len(self), 3, len(step)))
         for k, one in enumerate(np.diag(step)):
             change = state.contribution(self.library, key, self.motion, one)
-            result[..., k] = legs.move(change)[self.used] / step[k]
+            result[..., k] = at.move(change.twists)[self.used] / step[k]
         return result
 
 
@@ -193,12 +195,14 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     """
     if not len(measurements):
         raise FitError("the campaign has no points")
-    actuators, command = rows.actuators(measurements), rows.command(measurements)
+    actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     motion = _motion(measurements, mechanism, masses, actuators)
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
-    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_reversals(motion, mechanism.drive_unit)
+    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_reversals(motion)
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
+    if not used.any():
+        raise FitError("the campaign has no point that a diagnosis can use")
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
@@ -209,23 +213,25 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
             testable[name] = effect
             complete = np.all([complete, *known.values()], axis=0)
     used &= complete
-    for name, function in unknown_functions(mechanism.drive_unit).items():
+    for name, function in unknown_functions(mechanism).items():
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm))
 
 
-def at_reversals(motion, drive_unit):
+def at_reversals(motion):
     """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell."""
     path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
-    for leg in range(3):
+    for leg, unit in enumerate(motion.robot.parts.units):
         step = np.diff(path[:, leg])
-        reversals = np.flatnonzero(step[:-1] * step[1:] < 0.0) + 1
+        # a drive that stands still does not turn back
+        moving = np.flatnonzero(~(np.abs(step) < _STANDS[unit]))
+        reversals = moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
         if len(reversals):
             nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
             close = np.abs(nearest - motion.path_index) <= STEPS
-            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[drive_unit])
+            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[unit])
     return result
 
 

@@ -1,5 +1,7 @@
 """The tables behind a verdict."""
 
+from itertools import zip_longest
+
 import numpy as np
 import pandas as pd
 
@@ -7,12 +9,14 @@ from rrru.campaign import measurements as rows
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.shrink import shrink_table
-from rrru.gap.terms import spread
+from rrru.gap.terms import sites, spread
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 
 _MOST_SETS = 20
 _LIKELY = 0.5
+# the table has columns for so many drives of either unit, whatever the robot
+_LEAST_DRIVES = 3
 _EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan, "note": ""}
 
 
@@ -45,6 +49,16 @@ def _attribute_rows(attribution):
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY, "note": note})
     return pd.DataFrame(result)
+
+
+def where(attribution, effects):
+    """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
+    case, found = attribution.case, []
+    for term in attribution.hypothesis.terms:
+        if term.effect in effects:
+            names = sites(case.library, case.motion, term)
+            found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
+    return ", ".join(dict.fromkeys(found))
 
 
 def _effect_row(attribution, name, alone):
@@ -141,21 +155,24 @@ def _point_rows(attribution, after, drive):
     case = attribution.case
     frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
     before = rows.measured(case.measurements) - case.sim(attribution.calibrated.deviations)
-    own, other = ("rad", "mm") if case.mechanism.drive_unit == "rad" else ("mm", "rad")
+    units = case.mechanism.parts.units
     after, drive = (_at(case.used, values) for values in (after, drive))
-    unknown = np.full_like(before, np.nan)
+    unknown = np.full(len(before), np.nan)
     return frame.assign(
         **rows.vector_columns("command", rows.command(case.measurements)),
         **rows.vector_columns("before", before),
         **rows.vector_columns("after", after),
-        **{f"drive_error{k}_{own}": drive[:, k - 1] for k in (1, 2, 3)},
-        **{f"drive_error{k}_{other}": unknown[:, k - 1] for k in (1, 2, 3)},
+        **{
+            f"drive_error{k}_{unit}": drive[:, k - 1] if own == unit else unknown
+            for unit in ("rad", "mm")
+            for k, own in zip_longest(range(1, max(len(units), _LEAST_DRIVES) + 1), units)
+        },
         used=case.used,
     )
 
 
 def _at(used, values):
     """Values (m, 3) at all points from those (n, 3) of the used ones, NaN at the others."""
-    result = np.full((len(used), 3), np.nan)
+    result = np.full((len(used), values.shape[1]), np.nan)
     result[used] = values
     return result

@@ -11,13 +11,13 @@ from rrru.errors import FitError
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, with_effects
 from rrru.gap.case import State, make_case
-from rrru.gap.details import details_of
+from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.verdict import Verdict, decide
 from rrru.robots.dynamics import Masses
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 from rrru.seeds import stream
 
 # fewer points fit any effect, and left-out ones are extrapolated
@@ -37,7 +37,7 @@ class MeasuredRobot:
     where it is to be estimated; campaign: name of the campaign, for its random stream.
     """
 
-    mechanism: Mechanism
+    mechanism: Robot
     masses: Masses = field(default_factory=Masses)
     noise_mm: float | None = None
     campaign: str = ""
@@ -67,7 +67,7 @@ def diagnose(
 
     details: also the tables that no verdict needs. Raises FitError where there are too few points to calibrate on.
     """
-    library = settings.library(robot.mechanism.drive_unit)
+    library = settings.library(robot.mechanism)
     noise_mm, noise_from = (robot.noise_mm, "given") if robot.noise_mm else (1.0, "")
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
     case = make_case(measurements, nominal, robot.masses, noise_mm, library, near)
@@ -98,6 +98,7 @@ def _row(
         "effects": verdict.label,
         "probability": verdict.probability,
         "leg": verdict.leg,
+        "where": where(attribution, verdict.effects),
         "confusable_with": ", ".join(verdict.confusable_with),
         "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),
         "gap_rms_mm": steps[0].gap_rms_mm,

@@ -50,8 +50,8 @@ def worst_spot(position_mm, residual_mm):
 
 
 def drive_errors(residual_mm, drive):
-    """Errors (n, 3) of the actuator values that would make the residuals (n, 3)."""
-    return np.linalg.solve(drive, residual_mm[..., None])[..., 0]
+    """Errors (n, K) of the actuator values that would make the residuals (n, 3), the smallest where K is above 3."""
+    return (np.linalg.pinv(drive) @ residual_mm[..., None])[..., 0]
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,8 @@ def _levels(case):
         quarter = np.char.add("quarter ", (np.searchsorted(edges, time, side="right") + 1).astype(str))
         result["time"] = np.where(np.isfinite(time), quarter, "").astype(object)
     if np.isfinite(rate).any():
-        more, less = ("down", "up") if case.mechanism.drive_unit == "rad" else ("out", "in")
-        for leg in range(3):
+        for leg, unit in enumerate(case.mechanism.parts.units):
+            more, less = ("down", "up") if unit == "rad" else ("out", "in")
             sense = np.where(rate[:, leg] > _AT_REST, more, np.where(rate[:, leg] < -_AT_REST, less, "at rest"))
             named = np.char.add(f"leg {leg + 1} ", sense)
             result[f"motion_direction {leg + 1}"] = np.where(np.isfinite(rate[:, leg]), named, "").astype(object)
@@ -118,12 +118,12 @@ def _leg_rows(case, residual_mm, drive, resampled):
     """Rows of the factor leg: shares of the squared errors of the drives."""
     errors = drive_errors(residual_mm, drive)
     # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
-    scaled = errors**2 / (case.noise_mm**2 * (np.linalg.inv(drive) ** 2).sum(axis=-1))
+    scaled = errors**2 / (case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1))
     whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
-    for leg in range(3):
+    for leg, unit in enumerate(case.mechanism.parts.units):
         moved = np.linalg.norm(drive[:, :, leg] * errors[:, leg, None], axis=1)
         row = whole.row("leg", f"leg {leg + 1}", scaled[:, leg], np.ones(len(scaled)))
         row["rms_mm"] = float(np.sqrt((moved**2).mean()))
-        row[f"drive_rms_{case.mechanism.drive_unit}"] = float(np.sqrt((errors[:, leg] ** 2).mean()))
+        row[f"drive_rms_{unit}"] = float(np.sqrt((errors[:, leg] ** 2).mean()))
         rows.append(row)
     return rows

@@ -2,7 +2,9 @@
 shrinks.
 """
 
-from rrru.store.schema import read_tables
+from dataclasses import replace
+
+from rrru.store.schema import Column, read_tables
 
 TABLES = read_tables("""
 campaign               str    name of the campaign in the configuration
@@ -18,7 +20,9 @@ campaign
 effects                str    names joined by + in the order of their share; none; unexplained where the library does
     not hold it
 probability            float  of this whole verdict, 0 to 1
-leg                    int    the one leg at fault, 1 to 3; 0 for all or none
+leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
+where                  str    where the effects act, in words: a site, or the first and last of several; empty where
+    nothing acts
 confusable_with        str    effects that this campaign cannot tell from the verdict, joined by a comma; empty where
     none
 noise_rms_mm
@@ -160,3 +164,14 @@ drive_error2_mm        float? the same of slider 2, for robots with sliders
 drive_error3_mm        float? the same of slider 3, for robots with sliders
 used                   bool   false where the diagnosis left the point out
 """)
+
+
+def tables_of(robot):
+    """The tables of the diagnosis, `gap_points` with a column for every drive of a robot with more than three."""
+    more = range(4, len(robot.parts.drives) + 1)
+    text = "before, as equivalent error of drive {}; null for drives of another unit and near singularities"
+    own = [Column(f"drive_error{k}_{u}", "float64", text.format(k), True) for u in ("rad", "mm") for k in more]
+    return tuple(
+        replace(table, columns=(*table.columns[:-1], *own, table.columns[-1])) if table.name == "gap_points" else table
+        for table in TABLES
+    )

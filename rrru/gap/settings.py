@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass, field, replace
 
-from rrru.effects.library import EFFECTS, SLIDER_EFFECTS, find
+from rrru.effects.library import BY_DEFAULT, find
 from rrru.errors import ConfigError
+from rrru.robots.ptt3 import Ptt3
+from rrru.robots.rrru3 import Rrru3
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,7 @@ class GapSettings:
     such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
-    effects: tuple = tuple(EFFECTS | SLIDER_EFFECTS)
+    effects: tuple = BY_DEFAULT
     known: dict = field(default_factory=dict)
     prior: Prior = field(default_factory=Prior)
     draws: int = 200
@@ -43,12 +45,12 @@ class GapSettings:
         """The settings with one effect taken out of the library."""
         return replace(self, effects=tuple(effect for effect in self.effects if effect != name))
 
-    def library(self, drive_unit="rad"):
-        """Effects by name that robots with drives in "rad" or "mm" may have, what is known of them fixed.
+    def library(self, robot):
+        """Effects by name that a robot may have, what is known of them fixed.
 
         Raises ConfigError for an unknown effect or parameter.
         """
-        found = [effect for effect in (find(name, drive_unit) for name in self.effects) if effect is not None]
+        found = [effect for effect in (find(name, robot) for name in self.effects) if effect is not None]
         result = {effect.name: effect for effect in found}
         if len(result) < len(found):
             raise ConfigError(f"gap.effects names an effect twice: {', '.join(self.effects)}")
@@ -73,4 +75,5 @@ def _with_known(effect, values):
 
 def check(config):
     """Raise ConfigError where the `gap` section names an effect or a parameter that does not exist."""
-    GapSettings.from_config(config["gap"]).library()
+    for robot in (Rrru3(), Ptt3()):
+        GapSettings.from_config(config["gap"]).library(robot)

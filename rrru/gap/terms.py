@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.effects.protocol import LEGS
-
 # on which legs a law acts: on each with its own value, on all with one value, or on one leg alone
 EACH, SAME = "each", "same"
 
@@ -26,13 +24,13 @@ def spread(coordinates, legs):
         return every
     if legs == SAME:
         # coordinates of one kind come in the order of the legs
-        return np.stack([every[:, coordinates.legs == leg] for leg in LEGS]).sum(axis=0)
+        return np.stack([every[:, coordinates.legs == leg] for leg in np.unique(coordinates.legs)]).sum(axis=0)
     return every[:, coordinates.legs == legs]
 
 
 def per_leg(effect):
-    """Whether every coordinate of an effect belongs to one leg, and every leg has some."""
-    return set(effect.coordinates.legs.tolist()) == set(LEGS)
+    """Whether every coordinate of an effect belongs to one leg."""
+    return bool((effect.coordinates.legs > 0).all())
 
 
 def variants(effect):
@@ -42,10 +40,23 @@ def variants(effect):
     errors of an assembly.
     """
     coordinates, legs = effect.coordinates, per_leg(effect)
-    choices = (EACH, *((SAME,) if legs and coordinates.positive.all() else ()), *(LEGS if legs else ()))
+    choices = (
+        EACH,
+        *((SAME,) if legs and coordinates.positive.all() else ()),
+        *(np.unique(coordinates.legs).tolist() if legs else ()),
+    )
     return tuple(Term(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
 
 
 def signatures(library, linear, terms):
     """Columns (n, 3, k) of each term's free numbers on a linearisation."""
     return [linear.columns[t.effect, t.shape] @ spread(library[t.effect].coordinates, t.legs) for t in terms]
+
+
+def sites(library, motion, term):
+    """Names of the robot's sites at which a term acts along a motion."""
+    effect = library[term.effect]
+    sizes = effect.coordinates.typical * spread(effect.coordinates, term.legs).sum(axis=1)
+    values = effect.coordinates.to_values(sizes, effect.coordinates.shapes[term.shape])
+    active = np.nan_to_num(effect.contribute(motion, values).twists).any(axis=(0, 2))
+    return [name for name, acts in zip(motion.robot.legs.sites, active, strict=True) if acts]

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from rrru.effects.protocol import Contribution, Coordinates
+from rrru.effects.protocol import Coordinates
+from rrru.robots.legs import WORLD
 
 _DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
 
@@ -30,20 +31,22 @@ class Unknown:
     per_leg: bool = False
     typical: float = 0.1
 
+    drives: int = 3
+
     @property
     def coordinates(self):
-        """One coefficient per function and leg or axis, in the drive's unit or mm."""
-        legs = np.zeros(3 * self.count, dtype=int)
+        """One coefficient per function and drive or axis, in the drive's unit or mm."""
+        legs = np.zeros((self.drives if self.per_leg else 3) * self.count, dtype=int)
         return Coordinates(np.full(len(legs), self.typical), legs, legs > 0, lambda values, _: values)
 
     def contribute(self, motion, values):
-        """Changes under coefficients (3 k,)."""
-        coefficients = np.reshape(values, (3, self.count))
+        """Changes under coefficients (drives or axes times k,)."""
+        coefficients = np.reshape(values, (-1, self.count))
         if self.per_leg:
-            functions = np.stack([self.basis(motion.drive[:, leg]) for leg in range(3)], axis=1)
-            return Contribution(drive=np.einsum("nlk,lk->nl", functions, coefficients))
+            functions = np.stack([self.basis(drive) for drive in motion.drive.T], axis=1)
+            return motion.at_drives(np.einsum("nlk,lk->nl", functions, coefficients))
         shift = self.basis(motion) @ coefficients.T
-        return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
+        return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
 
 
 def _unit(values):
@@ -90,15 +93,14 @@ UNKNOWN = {
         Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
     )
 }
-# what an error of a drive may typically be, and so the function of a slider's position
-_SLIDER_TYPICAL_MM = 0.01
+# what an error of a drive may typically be, and so the function of its value
+_TYPICAL = {"rad": 1e-4, "mm": 0.01}
 
 
-def unknown_functions(drive_unit):
-    """UNKNOWN for a robot with drives in "rad" or "mm"."""
-    if drive_unit == "rad":
-        return UNKNOWN
+def unknown_functions(robot):
+    """UNKNOWN for a robot's drives; for those of several units the first's typical size."""
+    units = robot.parts.units
     return {
-        name: replace(function, typical=_SLIDER_TYPICAL_MM) if function.per_leg else function
+        name: replace(function, typical=_TYPICAL[units[0]], drives=len(units)) if function.per_leg else function
         for name, function in UNKNOWN.items()
     }

@@ -10,7 +10,6 @@ from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
-from rrru.robots.mechanism import identifiable_truth
 from rrru.seeds import run_seed
 
 
@@ -41,7 +40,7 @@ def study_set(searched, identified, calibration, runs):
         start = perf_counter()
         result = minimise(searched.mean_distance, parameters.low, parameters.high, runs.settings, seed)
         seconds.append(perf_counter() - start)
-        shared = identifiable_truth(mechanism, parameters.mapping(result.deviations))
+        shared = mechanism.identifiable(parameters.mapping(result.deviations))
         polish = least_mean_distance(identified, mechanism.parameters.vector(shared))
         polished = {"polished_mm": polish.mean_mm, "polish_evaluations": polish.evaluations}
         above = {"excess": result.objective, "polished_excess": polish.mean_mm}

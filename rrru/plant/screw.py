@@ -50,7 +50,10 @@ def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
     n, still = len(travel), np.zeros_like(position)
     unknown, payload = np.full(n, np.nan), np.full(n, payload_kg)
     course = Course(position, sliders, sliders, np.arange(n), unknown, still, still, payload)
-    change = np.zeros_like(sliders) + together(robot.effects, make_motion(mechanism, robot.masses, course)).drive
+    change = mechanism.drive_errors(
+        np.zeros((n, len(mechanism.legs.sites), 6))
+        + together(robot.effects, make_motion(mechanism, robot.masses, course)).twists
+    )
     seen = (sliders + change)[:, leg - 1] + bench.noise_mm * generator.standard_normal(len(travel))
     encoder = np.round(seen / bench.resolution_mm) * bench.resolution_mm
     return pd.DataFrame({"pass": np.array(PASSES)[number], "commanded_mm": sliders[:, leg - 1], "encoder_mm": encoder})

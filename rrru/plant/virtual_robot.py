@@ -1,26 +1,38 @@
-"""The virtual robot: nominal controller in front, full spatial closure with its effects behind, a tracker beside."""
+"""The virtual robot: nominal controller in front, exact closure with its effects behind, a tracker beside."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from rrru.campaign.measurements import actuator_columns, vector_columns
+from rrru.campaign.measurements import vector_columns
 from rrru.effects.library import active_effects
 from rrru.effects.motion import Course, make_motion
-from rrru.effects.protocol import PLACES, together
+from rrru.effects.protocol import together
 from rrru.errors import ConfigError
-from rrru.plant.spatial import SpatialGeometry
 from rrru.plant.tracker import measure
 from rrru.robots.dynamics import Masses
+from rrru.robots.robot import Robot
 from rrru.robots.rrru3 import Rrru3
 
 
-class DrivenRobot:
-    """What virtual robots share: they drive plans and are measured.
+@dataclass(frozen=True)
+class VirtualRobot:
+    """A robot whose truth is known: it drives plans and is measured.
 
-    They add mechanism, deviations (names of the mechanism's parameters to true values), active effects, masses and
-    `positions`; non_repeatability_mm: radius of the ball in which the platform lies at random, see `non_repeatability`.
+    mechanism: the robot that its controller believes in; deviations: names of any of its parameters to true values;
+    axis_deviations (sites, 6): displacements of its axes at the robot's sites, or 0; effects: those that act;
+    non_repeatability_mm: radius of the ball in which the platform lies at random, see `non_repeatability`;
+    rotation_limit_rad: a platform turned further than this from where the nominal one stands counts as unsolved.
     """
+
+    mechanism: Robot = field(default_factory=Rrru3)
+    deviations: dict = field(default_factory=dict)
+    axis_deviations: np.ndarray | float = 0.0
+    effects: tuple = ()
+    non_repeatability_mm: float = 0.0
+    masses: Masses = field(default_factory=Masses)
+    rotation_limit_rad: float = 0.05
 
     def run(self, plan, noise_mm, generator, controller=None):
         """Drive a plan; returns (measurements, truth) as frames.
@@ -36,7 +48,7 @@ class DrivenRobot:
         solved = np.isfinite(position).all(axis=1)
         position = position + self.non_repeatability_mm * non_repeatability(generator, len(target))
         measurements = commands.assign(
-            **dict(zip(actuator_columns(self.mechanism.drive_unit), motion.drive.T, strict=True)),
+            **dict(zip(self.mechanism.parts.columns, motion.drive.T, strict=True)),
             **vector_columns("measured", measure(position, noise_mm, generator)),
             status=np.where(solved, "ok", "unsolved"),
         )
@@ -59,43 +71,23 @@ class DrivenRobot:
         )
         return make_motion(self.mechanism, self.masses, course)
 
+    @cached_property
+    def twists(self):
+        """Twists (1, sites, 6) of its deviations and axes."""
+        return self.mechanism.twists_of(self.deviations) + self.axis_deviations
 
-@dataclass(frozen=True)
-class VirtualRobot(DrivenRobot):
-    """A 3-RRRU whose truth is known.
-
-    deviations: of the published parameters or the tied ones; axis_deviations (3 legs, 6 places, 6): displacements of
-    every axis; rotation_limit_rad: a larger platform rotation counts as unsolved.
-    """
-
-    mechanism: Rrru3 = field(default_factory=Rrru3)
-    deviations: dict = field(default_factory=dict)
-    axis_deviations: np.ndarray = field(default_factory=lambda: np.zeros((3, len(PLACES), 6)))
-    effects: tuple = ()
-    non_repeatability_mm: float = 0.0
-    masses: Masses = field(default_factory=Masses)
-    rotation_limit_rad: float = 0.05
-
-    @property
-    def geometry(self):
-        """The chains' lengths and displacements."""
-        lengths = np.tile(self.mechanism.lengths_mm, (3, 1))
-        lengths[:, 1:4] += self.mechanism.leg_changes(self.deviations)[:, 1:4]
-        lengths[:, [0, 4]] += [self.deviations.get("dR", 0.0), self.deviations.get("dr", 0.0)]
-        return SpatialGeometry(np.array(self.mechanism.azimuth_rad), lengths, self.axis_deviations)
-
-    def positions(self, motion, target):
+    def positions(self, motion, target=None):
         """Platform centres (n, 3) in the tracker's frame and sizes (n,) of its rotation along a motion near targets.
 
-        NaN where the chains do not close near the target or the platform would turn by more than the limit.
+        target (n, 3): the commanded positions by default. NaN where the legs do not close near the target or the
+        platform would turn by more than the limit.
         """
-        change = together(self.effects, motion)
-        passive = self.mechanism.passive_angles(target, self.mechanism.inverse(target))
-        drive = motion.drive + self.mechanism.leg_changes(self.deviations)[:, 0]
-        solution = self.geometry.solve_under(drive, passive, change)
-        turned = np.linalg.norm(solution.rotation_rad, axis=1)
-        solved = solution.converged & (turned <= self.rotation_limit_rad)
-        return np.where(solved[:, None], solution.position_mm, np.nan), turned
+        twists = self.twists + together(self.effects, motion).twists
+        near = self.mechanism.near(motion.position_mm if target is None else target, motion.drive)
+        poses = self.mechanism.model.solve(motion.drive, near, twists)
+        turned = np.linalg.norm(poses.turned_from(near.turn), axis=1)
+        solved = poses.closed & (turned <= self.rotation_limit_rad)
+        return np.where(solved[:, None], self.mechanism.measured(poses, twists), np.nan), turned
 
 
 def non_repeatability(generator, count):
@@ -107,30 +99,27 @@ def non_repeatability(generator, count):
 
 def from_config(mechanism, section):
     """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
-    known = tuple(dict.fromkeys((*Rrru3.PARAMETER_NAMES["tied"], *Rrru3.PARAMETER_NAMES["published"])))
+    known = mechanism.deviation_names
     for name in section["errors"]:
         if name not in known:
             raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")
     return VirtualRobot(
-        axis_deviations=_axis_deviations(section["axis_errors"]),
-        rotation_limit_rad=section["rotation_limit_rad"],
-        **shared_parts(mechanism, section),
+        mechanism=mechanism,
+        deviations={name: float(value) for name, value in section["errors"].items()},
+        axis_deviations=_axis_deviations(mechanism, section["axis_errors"]) if "axis_errors" in section else 0.0,
+        effects=active_effects(section["effects"], mechanism),
+        non_repeatability_mm=section.get("wobble_mm", 0.0),
+        masses=Masses(section["platform_mass_kg"], section["forearm_mass_kg"], section["arm_mass_kg"]),
+        rotation_limit_rad=section.get("rotation_limit_rad", VirtualRobot.rotation_limit_rad),
     )
 
 
-def shared_parts(mechanism, section):
-    """What an entry of `virtual_robots:` says of any robot, as the fields that all virtual robots have."""
-    return {
-        "mechanism": mechanism,
-        "deviations": {name: float(value) for name, value in section["errors"].items()},
-        "effects": active_effects(section["effects"], mechanism.drive_unit),
-        "non_repeatability_mm": section.get("wobble_mm", 0.0),
-        "masses": Masses(section["platform_mass_kg"], section["forearm_mass_kg"], section["arm_mass_kg"]),
-    }
-
-
-def _axis_deviations(section):
-    """Displacements (3, 6 places, 6): normal draws of the stated sizes from the stated seed."""
-    generator = np.random.default_rng(section["seed"])
-    draw = generator.standard_normal((3, len(PLACES), 6))
-    return draw * np.repeat([section["position_mm"], section["angle_rad"]], 3)
+def _axis_deviations(mechanism, section):
+    """Displacements (sites, 6): normal draws of the stated sizes from the stated seed at the seats of all axes."""
+    numbers = mechanism.legs.site_numbers
+    result = np.zeros((len(numbers), 6))
+    draw = np.random.default_rng(section["seed"]).standard_normal((len(mechanism.seats), 6))
+    result[[numbers[site] for site in mechanism.seats]] = draw * np.repeat(
+        [section["position_mm"], section["angle_rad"]], 3
+    )
+    return result

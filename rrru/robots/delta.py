@@ -24,7 +24,10 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.three_legs import Deviation, of_each_leg, points
+from rrru.parameters import LEGS
+from rrru.robots.dynamics import arm_load
+from rrru.robots.legs import Bar, Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import Tripod
 
 # columns of the legs' numbers: what the drive's angle adds to, l1, l2, a
@@ -39,16 +42,18 @@ class Delta(Tripod):
     l1_mm: float = 375.0  # ASSUME this and the next two: the paper gives no dimensions
     l2_mm: float = 900.0
     a_mm: float = 125.0
+    # the platform's radius and the distance of an arm's two bars: where these are equal, they act on its tilt only
+    platform_mm: float = 60.0
+    spacing_mm: float = 120.0
     azimuth_rad: tuple[float, float, float] = (-np.pi / 6.0, np.pi / 2.0, 7.0 * np.pi / 6.0)
     parameter_set: str = "zero"
     angle_limit_rad: float = 0.05
     length_limit_mm: float = 10.0
     name: str = field(default="delta", init=False)
 
-    ARM, LINK, OFFSET = 1, 2, 3
+    LINK = 2
     TRACKED = "tied"
-    RICHEST = "legs"
-    DIMENSIONS = ("l1_mm", "l2_mm", "a_mm")
+    DIMENSIONS = ("l1_mm", "l2_mm", "a_mm", "platform_mm", "spacing_mm")
     DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
     PARAMETER_NAMES: ClassVar = {
         "zero": (*_OWN[0],),
@@ -56,6 +61,17 @@ class Delta(Tripod):
         "legs": (*_OWN[0], *_OWN[1], *_OWN[2], *_OWN[3]),
     }
     SOURCE = "paper C, 1.1; bounds assumed"
+    COLUMN_SITES = (
+        *((("drive", 4, 1.0),), (("elbow", 0, 1.0),)),
+        *((("a bar", 0, 1.0), ("b bar", 0, 1.0)), (("foot", 0, 1.0),)),
+    )
+    _BARS = tuple(zip(of_three_legs("a bar"), of_three_legs("b bar"), strict=True))
+    parts = Parts(
+        drives=three_drives("rad", 4),
+        feet=of_three_legs("foot"),
+        links={"dL1_leg": of_each("elbow"), "dL3_leg": _BARS},
+        members=_BARS,
+    )
 
     def __post_init__(self):
         super().__post_init__()
@@ -70,9 +86,27 @@ class Delta(Tripod):
         return self.l1_mm
 
     @property
-    def lengths_mm(self):
-        """Nominal R, L1, L2, L3, r (5,) as effects count them: arm L1, link L3."""
-        return np.array([self.a_mm, self.l1_mm, 0.0, self.l2_mm, 0.0])
+    def reach_mm(self):
+        """Length of a stretched leg."""
+        return self.l1_mm + self.l2_mm
+
+    @cached_property
+    def legs(self):
+        """Six bars, two on the elbow of every arm, side by side."""
+        bars = []
+        for leg, azimuth in zip(LEGS, self.azimuth_rad, strict=True):
+            root = turn_about(Z, azimuth)
+            arm = (
+                Joint(f"leg {leg} root", shift_mm=self.origin_depth_mm * Z, turn=root),
+                Joint(f"leg {leg} foot", shift_mm=(self.a_mm + self.platform_mm) * X),
+                Joint(f"leg {leg} drive", "R", Y, drive=leg - 1),
+                Joint(f"leg {leg} elbow", shift_mm=self.l1_mm * X),
+            )
+            for name, side in (("a", -0.5 * self.spacing_mm), ("b", 0.5 * self.spacing_mm)):
+                ball = Joint(f"leg {leg} {name} ball", shift_mm=side * Y)
+                bar = Bar(self.l2_mm, root @ (self.platform_mm * X + side * Y))
+                bars.append(Leg(f"leg {leg} {name}", (*arm, ball), bar=bar))
+        return Legs(tuple(bars), np.zeros(3))
 
     @property
     def origin_depth_mm(self):
@@ -111,10 +145,9 @@ class Delta(Tripod):
         columns = [turned, cosine * self.radial - sine * up, np.zeros(3), self.radial]
         return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
 
-    def levers(self, theta_rad, legs):
-        """Vectors (n, 3 legs, 3) in mm from the drive axes to the arms' ends."""
-        angle = (theta_rad + legs[:, 0])[..., None]
-        return legs[:, 1, None] * (np.cos(angle) * self.radial - np.sin(angle) * np.array([0.0, 0.0, 1.0]))
+    def own_load(self, masses, theta_rad, _rate, acceleration, _poses):
+        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
+        return arm_load(masses, self.l1_mm, theta_rad, acceleration)
 
     def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg's parallelogram keeps the platform from turning."""

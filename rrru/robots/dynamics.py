@@ -6,8 +6,8 @@ Handbook of Mathematical Functions, 1964, 25.3)
     q' = (q(x(h)) - q(x(-h))) / 2h,    q'' = (q(x(h)) - 2 q(x) + q(x(-h))) / h^2
 
 Loads. Half of each forearm is lumped at the platform, half at the driven end (elbow or carriage); a drive arm is a
-uniform rod of mass m_a, a carriage a point. The platform carries W = (m_p + payload + 3/2 m_f)(g - a), and the legs
-push it along g_i with f_i so that sum_i f_i g_i = -W. By virtual work (Tsai, Robot Analysis, 1999, chapter 10) the
+uniform rod of mass m_a, a carriage a point. The platform carries W = (m_p + payload + k/2 m_f)(g - a), and the k
+legs push it along g_i with f_i so that sum_i f_i g_i = -W. By virtual work (Tsai, Robot Analysis, 1999, chapter 10) the
 loads turn drive arm i, in the sense of theta > 0 which lowers it, with the torque, or push carriage i along its rail
 d_i with the force
 
@@ -23,12 +23,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rrru.robots import singularity
-from rrru.robots.rrru3 import Rrru3
-
 GRAVITY_MM_S2 = 9806.65
 # kg mm / s^2 in a newton
-_PER_NEWTON = 1000.0
+PER_NEWTON = 1000.0
 # balances the differences' rounding and truncation for paths that bend over some hundred mm
 _STEP_MM = 0.2
 
@@ -61,48 +58,71 @@ def drive_rates(mechanism, position_mm, velocity_mm_s, acceleration_mm_s2):
     return (after - before) / (2.0 * h), np.where(known, second, np.nan)
 
 
-def gravity(mechanism):
+def gravity(robot):
     """Acceleration of gravity (3,) in mm/s^2 in the robot's frame."""
-    return np.array([0.0, 0.0, GRAVITY_MM_S2 if isinstance(mechanism, Rrru3) else -GRAVITY_MM_S2])
+    return -GRAVITY_MM_S2 * np.asarray(robot.up)
 
 
-def loads(mechanism, masses, position_mm, actuators, drive_acceleration, acceleration_mm_s2, payload_kg):
-    """Legs' forces (n, 3) in N on the platform, their directions (n, 3 legs, 3), drives' loads (n, 3) in N mm or N.
+def arm_load(masses, arm_mm, theta_rad, acceleration):
+    """Torques (n, k) in N mm on drives of arms that stand level at theta_rad = 0, of their masses and half forearms."""
+    weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * GRAVITY_MM_S2 * arm_mm * np.cos(theta_rad)
+    inertia = (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm_mm**2
+    return (weight - inertia * acceleration) / PER_NEWTON
 
-    Compression is positive; a load is positive in the drive's sense. position_mm and actuators (n, 3) fit each other;
-    payload_kg (n,). NaN where a pose cannot be reached.
+
+@dataclass(frozen=True)
+class Loads:
+    """Forces (n, members) in N of the members on the platform, compression positive, held_n if friction holds joints.
+
+    drive (n, K): load on each drive in N mm or N, positive in the drive's sense.
     """
-    actuators = np.asarray(actuators, dtype=float)
-    direction = singularity.leg_forces(mechanism, position_mm, actuators)
-    load = _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg)
-    force = -np.linalg.solve(direction.transpose(0, 2, 1), load[..., None])[..., 0]
-    per_drive = mechanism.actuator_jacobian(position_mm, actuators)
-    if mechanism.drive_unit == "mm":
-        along = mechanism.rails() @ gravity(mechanism)
-        own = (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - drive_acceleration)
-    else:
-        arm = mechanism.lengths_mm[1]
-        weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * GRAVITY_MM_S2 * arm * np.cos(actuators)
-        own = weight - (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm**2 * drive_acceleration
-    return force, direction, np.einsum("nak,na->nk", per_drive, load) + own / _PER_NEWTON
+
+    member_n: np.ndarray
+    held_n: np.ndarray
+    drive: np.ndarray
 
 
-def held_force(mechanism, masses, position_mm, theta_rad, acceleration_mm_s2, payload_kg):
-    """Forces (n, 3) in N of the 3-RRRU's legs, as in `loads`, if friction holds joint 3.
+def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s2, payload_kg):
+    """Loads of a motion; position_mm (n, 3) and actuators (n, K) fit each other; drive_motion: rates and
+    accelerations (n, K) of the drives; payload_kg (n,).
 
-    A free joint 3 lets the leg push along its forearm only. Held, it makes one two-force member of L2 and L3, which
-    pushes along the line from the elbow (joint 2) to the U-joint. A real leg lies between the two.
+    NaN where a pose cannot be reached.
     """
-    theta, radial = np.asarray(theta_rad, dtype=float)[..., None], mechanism.radial
-    arm = np.cos(theta) * radial + np.sin(theta) * np.array([0.0, 0.0, 1.0])
-    elbow = mechanism.R_mm * radial + mechanism.L1_mm * arm
-    line = np.asarray(position_mm, dtype=float)[:, None, :] + mechanism.r_mm * radial - elbow
+    at = robot.map_at(actuators, position_mm)
+    force = _platform_load(robot, masses, acceleration_mm_s2, payload_kg)
+    member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
+    held = _held(robot, at, force) if robot.parts.held_from else member
+    own = robot.own_load(masses, np.asarray(actuators, dtype=float), *drive_motion, at.poses)
+    return Loads(member, held, np.einsum("nak,na->nk", at.drive_response, force) + own)
+
+
+def _along_members(robot, at, load):
+    """Forces (n, members) along the members under loads (n, 6) of the platform."""
+    numbers, wrenches = robot.legs.site_numbers, at.wrenches(load)
+    owner = {
+        site: k for k, leg in enumerate(robot.legs.legs) for site in (*(j.name for j in leg.joints), *leg.bar_sites)
+    }
+    result = np.zeros((len(at), len(robot.parts.members)))
+    for k, group in enumerate(robot.parts.members):
+        for site in group:
+            result[:, k] += (wrenches[owner[site]][:, :3] * at.frames[numbers[site]][0][:, :, 0]).sum(axis=1)
+    return result
+
+
+def _held(robot, at, force):
+    """Forces (n, 3) of three legs whose inner joint friction holds, under forces (n, 3) of the platform.
+
+    A free inner joint lets a leg push along its last link only. Held, it makes one two-force member of both its links,
+    which pushes along the line from the first to the platform's joint. A real leg lies between the two.
+    """
+    numbers = robot.legs.site_numbers
+    pairs = zip(robot.parts.held_from, (site for (site,) in robot.parts.members), strict=True)
+    line = np.stack([at.frames[numbers[far]][1] - at.frames[numbers[near]][1] for near, far in pairs], axis=1)
     line /= np.linalg.norm(line, axis=-1, keepdims=True)
-    load = _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg)
-    return -np.linalg.solve(line.transpose(0, 2, 1), load[..., None])[..., 0]
+    return -np.linalg.solve(line.transpose(0, 2, 1), force[..., None])[..., 0]
 
 
-def _platform_load(mechanism, masses, acceleration_mm_s2, payload_kg):
+def _platform_load(robot, masses, acceleration_mm_s2, payload_kg):
     """Weight and inertia force (n, 3) in N of platform, payload and the platform's half of the forearms."""
-    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 1.5 * masses.forearm_kg
-    return mass[:, None] * (gravity(mechanism) - acceleration_mm_s2) / _PER_NEWTON
+    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 0.5 * len(robot.parts.members) * masses.forearm_kg
+    return mass[:, None] * (gravity(robot) - acceleration_mm_s2) / PER_NEWTON

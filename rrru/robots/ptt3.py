@@ -28,7 +28,9 @@ import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.parameters import LEGS
-from rrru.robots.three_legs import Deviation, of_each_leg, points
+from rrru.robots.dynamics import PER_NEWTON, gravity
+from rrru.robots.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import Tripod
 
 # columns of the legs' numbers: what the slider adds to, L, a = R - r; azimuth, rise and swing of the rail
@@ -56,10 +58,8 @@ class Ptt3(Tripod):
     length_limit_mm: float = 10.0
     name: str = field(default="ptt3", init=False)
 
-    LINK, OFFSET = 1, 2
-    drive_unit = "mm"
+    LINK = 1
     TRACKED = "tied"
-    RICHEST = "rails"
     DIMENSIONS = ("L_mm", "R_mm", "r_mm")
     DEVIATIONS = _SLIDERS | _LINKS | _RAILS | {"dL": Deviation(1), "da": Deviation(2)}
     PARAMETER_NAMES: ClassVar = {
@@ -71,6 +71,18 @@ class Ptt3(Tripod):
         "distances": (*_BASE, *_SLIDERS, *_LINKS),
     }
     SOURCE = "paper B, 2.2; bounds assumed"
+    # ASSUME the U joints stay upright on a rail that points elsewhere: what turns before the drive turns back behind it
+    COLUMN_SITES = (
+        *((("drive", 0, 1.0),), (("wrist", 0, 1.0),), (("foot", 0, 1.0),)),
+        *((("root", 5, 1.0), ("platform", 5, -1.0)), (("foot", 4, -1.0), ("upright", 4, 1.0))),
+        (("rail", 5, 1.0), ("carriage", 5, -1.0)),
+    )
+    parts = Parts(
+        drives=three_drives("mm", 0),
+        feet=of_three_legs("foot"),
+        links={"dL_leg": of_each("wrist")},
+        members=of_each("wrist"),
+    )
 
     def __post_init__(self):
         super().__post_init__()
@@ -83,9 +95,39 @@ class Ptt3(Tripod):
         return self.R_mm
 
     @property
-    def lengths_mm(self):
-        """Nominal R, L1, L2, L3, r (5,) as effects count them: without arms, the link is the forearm."""
-        return np.array([self.R_mm, 0.0, 0.0, self.L_mm, self.r_mm])
+    def reach_mm(self):
+        """Length of a link."""
+        return self.L_mm
+
+    @cached_property
+    def legs(self):
+        """The chains: a carriage on its rail, then two U joints, the outer axes of both tangential."""
+        rise, chains = turn_about(-Y, self.rail_inclination_rad), []
+        for leg, azimuth, (zero, link, *_) in zip(LEGS, self.azimuth_rad, self.nominal_legs, strict=True):
+            root = turn_about(Z, azimuth)
+            joints = (
+                Joint(f"leg {leg} root", turn=root),
+                Joint(f"leg {leg} foot", shift_mm=self.R_mm * X),
+                Joint(f"leg {leg} rail", turn=rise),
+                Joint(f"leg {leg} drive", "P", X, zero * X, drive=leg - 1),
+                Joint(f"leg {leg} carriage"),
+                Joint(f"leg {leg} upright", turn=rise.T),
+                Joint(f"leg {leg} hip", "R", -Y, home=-3.0 * np.pi / 4.0),
+                Joint(f"leg {leg} hip across", "R", Z),
+                Joint(f"leg {leg} wrist", "R", Z, link * X),
+                Joint(f"leg {leg} cross", "R", -Y, home=3.0 * np.pi / 4.0),
+                Joint(f"leg {leg} platform", shift_mm=-self.r_mm * X),
+            )
+            chains.append(Leg(f"leg {leg}", joints, end_turn=root.T))
+        return Legs(tuple(chains), np.full(3, self.L_mm / 2.0))
+
+    def passive_near(self, position_mm, slider_mm):
+        """Angles (n, 12) of both U joints of every leg near positions (n, 3), of the nominal robot there."""
+        position = points(position_mm)
+        link = position[:, None, :] - self.ends(self.inverse(position), self.nominal_legs)
+        along, side = (link * self.radial).sum(axis=-1), (link * self.tangent).sum(axis=-1)
+        lean, swing = np.arctan2(link[..., 2], along), np.arcsin(side / self.nominal_legs[:, self.LINK])
+        return np.stack([lean, swing, -swing, -lean], axis=-1).reshape(-1, 12)
 
     @cached_property
     def nominal_legs(self):
@@ -123,13 +165,14 @@ class Ptt3(Tripod):
         ]
         return np.stack([np.broadcast_to(column, shape) for column in columns], axis=-1)
 
-    def levers(self, slider_mm, legs):
-        """Vectors (n, 3 legs, 3) in mm from the rails' zero marks to the carriages."""
-        return (slider_mm + legs[:, 0])[..., None] * self._directions(legs)[2]
-
     def rails(self, deviations=None):
         """Unit directions (3 legs, 3) in which the sliders count up."""
-        return self._directions(self.legs(deviations))[2]
+        return self._directions(self.numbers(deviations))[2]
+
+    def own_load(self, masses, _slider_mm, _rate, acceleration, _poses):
+        """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.robots.dynamics`."""
+        along = self.rails() @ gravity(self)
+        return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - acceleration) / PER_NEWTON
 
     def constraint_moments(self, position_mm, slider_mm, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.

@@ -20,15 +20,17 @@ from rrru.parameters import LEGS
 from rrru.robots import rrru3_kernels as kernels
 from rrru.robots import rrru3_objective
 from rrru.robots.compiled import CompiledObjective
-from rrru.robots.three_legs import Deviation, ThreeLegs, of_each_leg, points
+from rrru.robots.dynamics import arm_load
+from rrru.robots.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.robots.three_legs import Deviation, ThreeLegs, of_each, of_each_leg, of_three_legs, points, three_drives
 
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
-_LINKS = (1, 2, 3)
+_LINKS, _SEATS = (1, 2, 3), ("foot", "elbow", "knee", "wrist", "cross", "platform")
 # columns of the legs' numbers: what the drive's angle adds to, L1, L2, L3, r - R
 _DRIVES = of_each_leg("dtheta", 0, "rad")
 _OWN_LINKS = {f"dL{leg}{link}": Deviation(link, leg) for leg in LEGS for link in _LINKS}
 _TIED_LINKS = {f"dL{link}": Deviation(link) for link in _LINKS}
-_RADII = {"dR": Deviation(4, factor=-1.0), "dr": Deviation(4)}
+_RADII = {"dR": Deviation(4, factor=-1.0, site=("foot", 0)), "dr": Deviation(4)}
 # The gauge: R and r shift every leg by the same r - R, so that one number, da = dr - dR, stands for both.
 _GAUGED = {"da": Deviation(4, share=2.0)}
 
@@ -53,10 +55,7 @@ class Rrru3(ThreeLegs):
     length_limit_mm: float = 4.0
     name: str = field(default="rrru3", init=False)
 
-    # unit of an actuator value; sets of parameters that measured positions identify, that a truth is given in
-    drive_unit = "rad"
-    TRACKED = "identifiable"
-    RICHEST = "published"
+    TRACKED = "identifiable"  # by measured positions
     DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
     DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _GAUGED
     PARAMETER_NAMES: ClassVar = {
@@ -66,6 +65,18 @@ class Rrru3(ThreeLegs):
         "zero": (*_DRIVES,),
     }
     SOURCE = "paper A, section 2.2; bounds assumed"
+    COLUMN_SITES = (
+        *((("drive", 4, -1.0),), (("elbow", 0, 1.0),), (("knee", 0, 1.0),), (("wrist", 0, 1.0),)),
+        (("platform", 0, -1.0),),
+    )
+    up = (0.0, 0.0, -1.0)  # z points down
+    parts = Parts(
+        drives=three_drives("rad", 4, -1.0),
+        feet=of_three_legs("foot"),
+        links={f"dL{link}_leg": of_each(place) for link, place in ((1, "elbow"), (2, "knee"), (3, "wrist"))},
+        members=of_each("wrist"),
+        held_from=of_three_legs("elbow"),
+    )
 
     @property
     def angle_arm_mm(self):
@@ -73,9 +84,28 @@ class Rrru3(ThreeLegs):
         return self.L1_mm
 
     @property
-    def lengths_mm(self):
-        """Nominal R, L1, L2, L3, r (5,)."""
-        return np.array([self.R_mm, self.L1_mm, self.L2_mm, self.L3_mm, self.r_mm])
+    def reach_mm(self):
+        """Length of a stretched leg."""
+        return self.L1_mm + self.L2_mm + self.L3_mm
+
+    @cached_property
+    def legs(self):
+        """The chains: drive, then joints 2 to 5, the axes of the first, second and fifth across the leg's plane."""
+        chains = []
+        for leg, azimuth in zip(LEGS, self.azimuth_rad, strict=True):
+            root = turn_about(Z, azimuth)
+            joints = (
+                Joint(f"leg {leg} root", turn=root),
+                Joint(f"leg {leg} foot", shift_mm=self.R_mm * X),
+                Joint(f"leg {leg} drive", "R", -Y, drive=leg - 1),
+                Joint(f"leg {leg} elbow", "R", -Y, self.L1_mm * X, home=np.pi / 2.0),
+                Joint(f"leg {leg} knee", "R", Z, self.L2_mm * X),
+                Joint(f"leg {leg} wrist", "R", Z, self.L3_mm * X),
+                Joint(f"leg {leg} cross", "R", -Y, home=-np.pi / 2.0),
+                Joint(f"leg {leg} platform", shift_mm=-self.r_mm * X),
+            )
+            chains.append(Leg(f"leg {leg}", joints, end_turn=root.T))
+        return Legs(tuple(chains), np.zeros(3), (self.L2_mm + self.L3_mm) * Z)
 
     @cached_property
     def nominal_legs(self):
@@ -87,7 +117,7 @@ class Rrru3(ThreeLegs):
 
         `elbow` is "out" (the robot's assembly), "in", or one of these per leg.
         """
-        return self.inverse_of_legs(position_mm, self.legs(deviations), elbow)
+        return self.inverse_of_legs(position_mm, self.numbers(deviations), elbow)
 
     def inverse_of_legs(self, position_mm, legs, elbow="out"):
         """Drive angles (n, 3) in rad for positions (n, 3) in mm under leg numbers (3, 5)."""
@@ -112,7 +142,7 @@ class Rrru3(ThreeLegs):
 
     def forward_batch(self, theta_rad, deviations=None, guess_mm=None):
         """Positions (m, n, 3) in mm of n drive-angle triples under m vectors of deviations (m, p); see `forward`."""
-        legs = self.legs(deviations) if deviations is not None else self.legs()[None]
+        legs = self.numbers(deviations) if deviations is not None else self.numbers()[None]
         return self.forward_of_legs(theta_rad, legs, guess_mm)
 
     def first_guess(self, theta_rad):
@@ -156,12 +186,12 @@ class Rrru3(ThreeLegs):
 
     def closure(self, position_mm, theta_rad, deviations=None):
         """Left sides (n, 3) of eq. (8) in mm^2, zero where position and drive angles fit."""
-        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.legs(deviations))
+        big_x, big_z, _, rho, _, _ = self._chain(position_mm, theta_rad, self.numbers(deviations))
         return big_x**2 + big_z**2 - rho**2
 
     def closure_jacobians(self, position_mm, theta_rad, deviations=None):
         """Derivatives of the closures by the position (n, 3, 3) in mm and by the legs' numbers (n, 3, 5)."""
-        legs = self.legs(deviations)
+        legs = self.numbers(deviations)
         big_x, big_z, side, rho, s, angle = self._chain(position_mm, theta_rad, legs)
         cx, cy = self.azimuth_cos_sin
         by_position = 2.0 * np.stack([big_x * cx - side * cy, big_x * cy + side * cx, big_z], axis=-1)
@@ -175,13 +205,26 @@ class Rrru3(ThreeLegs):
 
         Joint 4 undoes joint 3 and joint 5 undoes joints 1 and 2, so that the platform does not turn.
         """
-        legs = self.legs(deviations)
+        legs = self.numbers(deviations)
         big_x, big_z, _, _, _, angle = self._chain(position_mm, theta_rad, legs)
         _, v = self.radial_tangential(points(position_mm))
         plane = np.arctan2(big_z, big_x)
         second = np.arctan2(np.sin(plane - angle), np.cos(plane - angle))
         third = np.arcsin(v / legs[:, 3])
         return np.stack([second, third, -third, -(angle + second)], axis=-1)
+
+    @property
+    def seats(self):
+        """Sites of the axes that a manufacturer may have set wrongly; joint 1's is on the foot."""
+        return tuple(f"leg {leg} {kind}" for leg in LEGS for kind in _SEATS)
+
+    def passive_near(self, position_mm, theta_rad):
+        """Angles (n, 12) of joints 2 to 5 of every leg near positions (n, 3), of the nominal robot there."""
+        return self.passive_angles(position_mm, self.inverse(position_mm)).reshape(-1, 12)
+
+    def own_load(self, masses, theta_rad, _rate, acceleration, _poses):
+        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
+        return arm_load(masses, self.L1_mm, theta_rad, acceleration)
 
     def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
@@ -190,7 +233,7 @@ class Rrru3(ThreeLegs):
         from joint 2 along L2.
         """
         passive = self.passive_angles(position_mm, theta_rad, deviations)
-        plane = np.asarray(theta_rad, dtype=float) + self.legs(deviations)[:, 0] + passive[..., 0]
+        plane = np.asarray(theta_rad, dtype=float) + self.numbers(deviations)[:, 0] + passive[..., 0]
         cx, cy = self.azimuth_cos_sin
         return np.stack([np.cos(plane) * cx, np.cos(plane) * cy, np.sin(plane)], axis=-1)
 

@@ -1,4 +1,7 @@
-"""What all mechanisms here share: three legs, each with one closure, and a platform that follows them. mm, rad."""
+"""What robots with a closed form share: three legs, each with one closure, and a platform that follows them. mm, rad.
+
+A leg's frame has x outwards, y to the side and z as the robot's; a site's name is its leg's and what it is.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,15 +9,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from rrru.errors import ConfigError, UnreachableError
+from rrru.errors import ConfigError
 from rrru.parameters import LEGS, Parameter, ParameterSet
+from rrru.robots import singularity
+from rrru.robots.legs import Drive, unit_twist
+from rrru.robots.robot import Robot
 
 
 @dataclass(frozen=True)
 class Deviation:
     """How a parameter changes the legs' numbers: by a factor, in a column of one leg (1 to 3) or of all (0).
 
-    share: its bound, as a share of the mechanism's limit for angles or lengths.
+    share: its bound, as a share of the robot's limit for angles or lengths; site: where it acts and on which component
+    of the twist, where that is not its column's site.
     """
 
     column: int
@@ -22,6 +29,7 @@ class Deviation:
     unit: str = "mm"
     factor: float = 1.0
     share: float = 1.0
+    site: tuple[str, int] | None = None
 
 
 def of_each_leg(name, column, unit="mm"):
@@ -29,17 +37,37 @@ def of_each_leg(name, column, unit="mm"):
     return {f"{name}{leg}": Deviation(column, leg, unit) for leg in LEGS}
 
 
-class ThreeLegs:
+def of_three_legs(site):
+    """Names of a site of the three legs."""
+    return tuple(f"leg {leg} {site}" for leg in LEGS)
+
+
+def of_each(site):
+    """Names of a site of the three legs, each a group of its own."""
+    return tuple((name,) for name in of_three_legs(site))
+
+
+def three_drives(unit, component, factor=1.0):
+    """The Drives of three legs, which turn or slide by one component of the twists at their sites "drive"."""
+    column = "theta{}_rad" if unit == "rad" else "slider{}_mm"
+    twist = unit_twist(component, factor)
+    return tuple(Drive(column.format(leg), unit, f"leg {leg} drive", twist) for leg in LEGS)
+
+
+class ThreeLegs(Robot):
     """Base of the mechanisms, which add `inverse`, `closure_jacobians`, `azimuth_rad`, both limits and `parameter_set`.
 
     DIMENSIONS: fields that must be positive; DEVIATIONS: parameters by name; PARAMETER_NAMES: sets of them by name;
-    SOURCE: of the parameters; nominal_legs (3, k): numbers of the legs, the first what an actuator's value adds to.
+    SOURCE: of the parameters; nominal_legs (3, k): numbers of the legs, the first what an actuator's value adds to;
+    COLUMN_SITES: by column where a change acts: sites of a leg, each with the component of its twist and a factor.
     """
 
     DIMENSIONS = ()
     DEVIATIONS: ClassVar = {}
     PARAMETER_NAMES: ClassVar = {}
     SOURCE = ""
+    COLUMN_SITES = ()
+    SEARCHED = "tied"
 
     def __post_init__(self):
         for key in (*self.DIMENSIONS, "angle_limit_rad", "length_limit_mm"):
@@ -67,6 +95,18 @@ class ThreeLegs:
         """Derivative of the legs' numbers by the parameters, shape (3, k, p)."""
         return np.stack([self.leg_changes({name: 1.0}) for name in self.parameters.names], axis=-1)
 
+    def identifiable(self, values):
+        """Mapping of the parameters, no two of which act alike, from values of any of DEVIATIONS; absent ones are zero.
+
+        NaN for a number that stands for all legs where theirs differ.
+        """
+        changes, result = self.leg_changes(values), {}
+        for name in self.parameters.names:
+            one = self.DEVIATIONS[name]
+            legs = changes[:, one.column] / one.factor
+            result[name] = float(legs[one.leg - 1] if one.leg or (legs == legs[0]).all() else np.nan)
+        return result
+
     def leg_changes(self, values):
         """Changes (3, k) of the legs' numbers by values of any of DEVIATIONS; a leg's own replaces that of all legs."""
         result = np.zeros(self.nominal_legs.shape)
@@ -78,51 +118,66 @@ class ThreeLegs:
                 result[:, one.column] += one.factor * value
         return result
 
+    @property
+    def deviation_names(self):
+        """Names of the deviations that `twists_of` knows: those of all sets."""
+        return tuple(self.DEVIATIONS)
+
+    def twists_of(self, values):
+        """Twists (1, sites, 6) by values of any of DEVIATIONS."""
+        own = {name: value for name, value in values.items() if self.DEVIATIONS[name].site}
+        changes = self.leg_changes({name: value for name, value in values.items() if name not in own})
+        result, numbers = np.zeros((1, len(self.legs.sites), 6)), self.legs.site_numbers
+        for leg in LEGS:
+            for change, sites in zip(changes[leg - 1], self.COLUMN_SITES, strict=True):
+                for site, component, factor in sites:
+                    result[0, numbers[f"leg {leg} {site}"], component] += factor * change
+            for name, value in own.items():
+                site, component = self.DEVIATIONS[name].site
+                result[0, numbers[f"leg {leg} {site}"], component] += value
+        return result
+
+    @cached_property
+    def directions(self):
+        """Twists (sites, 6, p) that a unit of each parameter makes."""
+        return np.stack([self.twists_of({name: 1.0})[0] for name in self.parameters.names], axis=-1)
+
     @cached_property
     def azimuth_cos_sin(self):
         """Cosines and sines of the legs' azimuths, shape (2, 3)."""
         return np.array([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)])
 
     @cached_property
-    def leg_axes(self):
-        """Frames of the legs, radial, tangential and along z, as rows of (3 legs, 3 axes, 3)."""
-        (cosine, sine), zero = self.azimuth_cos_sin, np.zeros(3)
-        up = np.broadcast_to([0.0, 0.0, 1.0], (3, 3))
-        return np.stack([np.stack([cosine, sine, zero], axis=-1), np.stack([-sine, cosine, zero], axis=-1), up], axis=1)
-
-    @property
     def radial(self):
         """Outward unit vectors (3 legs, 3)."""
-        return self.leg_axes[:, 0]
+        cosine, sine = self.azimuth_cos_sin
+        return np.stack([cosine, sine, np.zeros(3)], axis=-1)
 
-    @property
+    @cached_property
     def tangent(self):
         """Tangential unit vectors (3 legs, 3), from x towards y."""
-        return self.leg_axes[:, 1]
+        cosine, sine = self.azimuth_cos_sin
+        return np.stack([-sine, cosine, np.zeros(3)], axis=-1)
 
     def radial_tangential(self, position):
         """Coordinates u and v (n, 3 legs) of points (n, 3) along the legs' radial and tangential directions."""
         (cosine, sine), x, y = self.azimuth_cos_sin, position[:, :1], position[:, 1:2]
         return x * cosine + y * sine, y * cosine - x * sine
 
-    def legs(self, deviations=None):
+    def numbers(self, deviations=None):
         """Numbers of the legs, shape (..., 3, k), under deviations of shape (..., p)."""
         if deviations is None:
             return self.nominal_legs
         return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(deviations, dtype=float))
 
-    def require_reachable(self, position_mm, deviations=None):
-        """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
-        values = self.inverse(position_mm, deviations)
-        bad = np.flatnonzero(np.isnan(values).any(axis=1))
-        if bad.size:
-            x, y, z = np.asarray(position_mm, dtype=float)[bad[0]]
-            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(values[bad[0]])))
-            raise UnreachableError(
-                f"point {bad[0] + 1} at ({x:.3f}, {y:.3f}, {z:.3f}) mm is out of reach of leg {legs}; "
-                f"{bad.size} of {len(values)} points cannot be reached"
-            )
-        return values
+    def singularities(self, position_mm, actuators):
+        """Translational and constraint measure and constraint determinant, each (n,); see `rrru.robots.singularity`."""
+        measures = (
+            singularity.translational_measure,
+            singularity.constraint_measure,
+            singularity.constraint_determinant,
+        )
+        return tuple(measure(self, position_mm, actuators) for measure in measures)
 
     def leg_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position by the legs' numbers, shape (n, 3 axes, 3 legs, k)."""

@@ -18,57 +18,42 @@ ELBOW_SIGN = {"out": 1.0, "in": -1.0}
 
 
 class Tripod(ThreeLegs):
-    """Base of these mechanisms: they add `inverse_of_legs`, `ends`, `end_rates` and `levers`.
+    """Base of these mechanisms: they add `inverse_of_legs`, `ends` and `end_rates`.
 
-    LINK, ARM, OFFSET: columns of the legs' numbers that hold the link, the driven arm (None without one) and R - r.
+    LINK: column of the legs' numbers that holds the link.
     """
 
-    LINK = OFFSET = 0
-    ARM = None
-    # unit of an actuator value
-    drive_unit = "rad"
+    LINK = 0
 
     def inverse(self, position_mm, deviations=None, elbow="out"):
         """Actuator values (n, 3) for positions (n, 3) in mm; NaN where a leg cannot reach.
 
         `elbow` is "out" (carriages outside of the platform or above it, knees outwards: the robots' assembly) or "in".
         """
-        return self.inverse_of_legs(points(position_mm), self.legs(deviations), ELBOW_SIGN[elbow])
+        return self.inverse_of_legs(points(position_mm), self.numbers(deviations), ELBOW_SIGN[elbow])
 
     def forward(self, actuators, deviations=None, guess_mm=None):
         """Positions (n, 3) in mm of actuator values (n, 3), in closed form; NaN where the links do not meet.
 
         guess_mm is not needed: of the two assemblies the platform is in the lower one.
         """
-        return self.forward_of_legs(actuators, self.legs(deviations))
+        return self.forward_of_legs(actuators, self.numbers(deviations))
 
     def forward_batch(self, actuators, deviations, guess_mm=None):
         """Positions (m, n, 3) in mm of n actuator triples under m vectors of deviations (m, p); see `forward`."""
-        return self.forward_of_legs(actuators, self.legs(deviations)[:, None])
+        return self.forward_of_legs(actuators, self.numbers(deviations)[:, None])
 
-    def forward_of_legs(self, actuators, legs, shift_mm=0.0):
-        """Positions (..., 3) in mm of actuator values (n, 3) under leg numbers (..., 3, k) that broadcast against them.
-
-        shift_mm: added to the links' ends, (..., 3 legs, 3).
-        """
+    def forward_of_legs(self, actuators, legs):
+        """Positions (..., 3) in mm of actuator values (n, 3) under leg numbers (..., 3, k) that fit them."""
         legs = np.asarray(legs, dtype=float)
-        return lower_intersection(self.ends(points(actuators), legs) + shift_mm, legs[..., self.LINK])
-
-    def with_lengths(self, legs, change_mm):
-        """Leg numbers (..., 3, k) with changes (..., 3 legs, 5) of R, L1, L2, L3, r in mm."""
-        legs = np.array(np.broadcast_to(legs, (*np.shape(change_mm)[:-1], np.shape(legs)[-1])))
-        legs[..., self.LINK] += change_mm[..., 3]
-        legs[..., self.OFFSET] += change_mm[..., 0] - change_mm[..., 4]
-        if self.ARM is not None:
-            legs[..., self.ARM] += change_mm[..., 1]
-        return legs
+        return lower_intersection(self.ends(points(actuators), legs), legs[..., self.LINK])
 
     def mean_distance(self, actuators, _nominal_mm, measured_mm):
         """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
         measured_mm = np.ascontiguousarray(measured_mm, dtype=float)
 
         def evaluate(deviations):
-            legs = self.legs(deviations)
+            legs = self.numbers(deviations)
             ends = np.ascontiguousarray(self.ends(points(actuators), legs[:, None]))
             return tripod_mean_distance(ends, np.ascontiguousarray(legs[..., self.LINK]), measured_mm)
 
@@ -76,13 +61,13 @@ class Tripod(ThreeLegs):
 
     def closure(self, position_mm, actuators, deviations=None):
         """Left sides (n, 3) of the closures in mm^2, zero where position and actuator values fit."""
-        legs = self.legs(deviations)
+        legs = self.numbers(deviations)
         link = points(position_mm)[:, None, :] - self.ends(points(actuators), legs)
         return (link**2).sum(axis=-1) - legs[:, self.LINK] ** 2
 
     def closure_jacobians(self, position_mm, actuators, deviations=None):
         """Derivatives of the closures by the position (n, 3, 3) in mm and by the legs' numbers (n, 3, k)."""
-        legs = self.legs(deviations)
+        legs = self.numbers(deviations)
         actuators = points(actuators)
         by_position = 2.0 * (points(position_mm)[:, None, :] - self.ends(actuators, legs))
         by_leg = -np.einsum("nlk,nlkc->nlc", by_position, self.end_rates(actuators, legs))

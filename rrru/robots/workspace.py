@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from rrru.robots import singularity
-
 PLANES = {"xz": (0, 2, 1), "xy": (0, 1, 2)}
 
 
@@ -27,7 +25,5 @@ def measures(mechanism, points_mm):
     reachable = np.linalg.norm(mechanism.forward(theta, guess_mm=points_mm) - points_mm, axis=1) < 1e-6
     result = np.full((3, len(points_mm)), np.nan)
     inside = points_mm[reachable]
-    result[0, reachable] = singularity.translational_measure(mechanism, inside, theta[reachable])
-    result[1, reachable] = singularity.constraint_measure(mechanism, inside, theta[reachable])
-    result[2, reachable] = singularity.constraint_determinant(mechanism, inside, theta[reachable])
+    result[:, reachable] = mechanism.singularities(inside, theta[reachable])
     return reachable, *result

@@ -8,11 +8,7 @@ from rrru.campaign.noise import estimate
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
-from rrru.robots import singularity, workspace
-from rrru.robots.rrru3 import Rrru3
-
-# grid lines over the longest reach of a robot's legs
-_WORKSPACE_LINES = 130
+from rrru.robots import workspace
 
 
 def noise(robot, measurements, given, use_near_singularity):
@@ -31,26 +27,27 @@ def noise(robot, measurements, given, use_near_singularity):
 
 def with_singularities(robot, measurements, margin):
     """The measurements with points near a constraint singularity marked, and the rows of `singularity`."""
-    position, theta = rows.command(measurements), rows.actuators(measurements)
-    constraint = singularity.constraint_measure(robot, position, theta)
+    translational, constraint, determinant = robot.singularities(
+        rows.command(measurements), rows.actuators(measurements, robot)
+    )
     measurements = rows.mark_near_singularity(measurements, constraint, margin)
     return measurements, measurements[["run", "trajectory", "point", "status"]].assign(
-        translational_measure=singularity.translational_measure(robot, position, theta),
+        translational_measure=translational,
         constraint_measure=constraint,
-        constraint_determinant=singularity.constraint_determinant(robot, position, theta),
+        constraint_determinant=determinant,
     )
 
 
 def workspace_table(robot, measurements):
     """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commands."""
     height = float(rows.command(measurements)[:, 2].mean().round(-1))
-    reach = float(robot.lengths_mm[1:4].sum())
-    # the 3-RRRU's z points down from its base
-    across, down = (-reach, reach), (0.0 if isinstance(robot, Rrru3) else -reach, reach)
+    reach = float(robot.reach_mm)
+    # where z points down, the platform is on that side of the base
+    across, down = (-reach, reach), (0.0 if robot.up[2] < 0.0 else -reach, reach)
     frames = []
     for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
-        grid = workspace.slice_points(plane, at, across, vertical, reach / _WORKSPACE_LINES)
-        points = _around_reachable(robot, grid)
+        step = reach / robot.workspace_lines
+        points = _around_reachable(robot, workspace.slice_points(plane, at, across, vertical, step), step)
         names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
         measures = dict(zip(names, workspace.measures(robot, points), strict=True))
         frames.append(pd.DataFrame(points, columns=["x_mm", "y_mm", "z_mm"]).assign(slice=plane, **measures))
@@ -87,9 +84,14 @@ def unmatched_sets(sets, measurements):
     return (f"not calibrated on {', '.join(unmatched)}: these sets match none of the trajectories {present}",)
 
 
-def _around_reachable(robot, points):
-    """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth."""
+def _around_reachable(robot, points, step_mm):
+    """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth or a step.
+
+    All of them where it reaches none.
+    """
     reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
+    if not len(reachable):
+        return points
     low, high = reachable.min(axis=0), reachable.max(axis=0)
-    margin = 0.1 * (high - low)
+    margin = np.maximum(0.1 * (high - low), 1.5 * step_mm)
     return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]

@@ -3,6 +3,7 @@
 A workflow rule hands its script these parts and nothing else, so that a change reruns what it concerns.
 """
 
+import hashlib
 from pathlib import Path
 
 from rrru.errors import ConfigError
@@ -24,7 +25,17 @@ def robot(config, section):
     """The robot of a campaign's section: name, dimensions, and the set of parameters where the section chooses one."""
     name = section["robot"]
     dimensions = {**config["robots"].get(name, {}), **section.get("dimensions", {})}
-    return {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors")}
+    own = own_robot_file(dimensions)
+    # a robot of the user's own changes with its file
+    digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
+    return {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
+
+
+def own_robot_file(dimensions):
+    """The file of a `robots:` entry that describes a robot of the user's own, None for a built-in one."""
+    if "module" in dimensions:
+        return Path(f"{dimensions['module'].partition(':')[0].replace('.', '/')}.py")
+    return next((Path(dimensions[key]) for key in ("urdf", "mjcf") if key in dimensions), None)
 
 
 def nominal(config, name):
@@ -62,6 +73,8 @@ def virtual(config, name):
 def masses(config, section):
     """Masses in kg, the platform's own where the campaign's section states it."""
     loads = config["loads"]
+    if own_robot_file(config["robots"].get(section.get("robot"), {})):
+        return {"platform_kg": section.get("platform_mass_kg", 0.0), "forearm_kg": 0.0, "arm_kg": 0.0}
     return {
         "platform_kg": section.get("platform_mass_kg", loads["platform_mass_kg"]),
         "forearm_kg": loads["forearm_mass_kg"],
@@ -77,8 +90,11 @@ def check(config):
 
 
 def check_files(config):
-    """Raise ConfigError where a measured campaign has no file."""
+    """Raise ConfigError where a measured campaign, or the robot of one, has no file."""
     for name, section in config["campaigns"].items():
+        own = own_robot_file(entry(config, "robots", section["robot"], f"campaigns.{name}"))
+        if own and not own.is_file():
+            raise ConfigError(f"robots.{section['robot']}: there is no file {own}")
         if "ingest" in section and not Path(section["ingest"]).is_file():
             raise ConfigError(f"campaigns.{name}.ingest: there is no file {section['ingest']}")
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
-from rrru.plant import virtual_robot, virtual_tripod
-from rrru.robots.mechanism import MECHANISMS, identifiable_truth, make_mechanism
+from rrru.plant import virtual_robot
+from rrru.robots.catalogue import make_mechanism, tracked_set
 from rrru.seeds import stream
 
 
@@ -20,8 +20,15 @@ def mechanism(nominal, parameter_set=None):
     if "bounds" in nominal:
         bounds = nominal["bounds"]
         limits = {"angle_limit_rad": bounds["angle_rad"], "length_limit_mm": bounds["length_mm"]}
-    own = nominal.get("parameter_set") or MECHANISMS[name].TRACKED
+    own = nominal.get("parameter_set") or tracked_set(name)
     return make_mechanism(name, nominal["dimensions"], parameter_set=parameter_set or own, **limits)
+
+
+def measured_robot(nominal, measurements, parameter_set=None):
+    """The `mechanism` of a campaign that has been measured: its parameters are those that these poses can tell."""
+    robot = mechanism(nominal, parameter_set)
+    known = measurements[rows.usable(measurements)]
+    return robot.seen_at(rows.actuators(known, robot), rows.command(known))
 
 
 @dataclass(frozen=True)
@@ -32,7 +39,7 @@ class VirtualCampaign:
     in the order driven, to those sent to the motors, None where these are the same.
     """
 
-    robot: virtual_robot.DrivenRobot
+    robot: virtual_robot.VirtualRobot
     plan: object
     noise_mm: float
     seed: int
@@ -56,14 +63,12 @@ class VirtualCampaign:
         path, index = self.plan.path()
         wanted = (controller or mechanism.inverse)(path)
         measurements, truth = self.robot.run(self.plan, self.noise_mm, generator, lambda _: self.drive(wanted))
-        columns = rows.actuator_columns(mechanism.drive_unit)
-        return measurements.assign(**dict(zip(columns, wanted[index].T, strict=True))), truth
+        return measurements.assign(**dict(zip(mechanism.parts.columns, wanted[index].T, strict=True))), truth
 
 
 def real_robot(nominal, section):
     """The virtual robot that an entry of `virtual_robots:` makes of a nominal one; see `virtual_campaign`."""
-    kind = virtual_robot if nominal["name"] == "rrru3" else virtual_tripod
-    return kind.from_config(mechanism(nominal), section)
+    return virtual_robot.from_config(mechanism(nominal), section)
 
 
 def virtual_campaign(nominal, virtual):
@@ -81,6 +86,6 @@ def virtual_campaign(nominal, virtual):
     return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
 
 
-def true_deviations(nominal, truth):
+def true_deviations(robot, truth):
     """True deviations by the names of the mechanism's parameters from those of the real robot, None where unknown."""
-    return None if truth is None else identifiable_truth(mechanism(nominal), truth)
+    return None if truth is None else robot.identifiable(truth)

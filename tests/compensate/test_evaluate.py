@@ -12,7 +12,6 @@ from rrru.compensate import evaluate
 from rrru.errors import ConfigError, FitError
 from rrru.fit.campaign_fit import CalibrationSettings, deviation_vector, fit_sets, tables
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots.mechanism import identifiable_truth
 
 _ERRORS = {"dtheta1": 0.002, "dtheta2": -0.001, "dL1": 0.4, "dL3": -0.2, "dR": -1.2, "dr": 0.9}
 _SETTINGS = CalibrationSettings({"lines": ["line_*"], "spiral": ["spiral"], "absent": ["circle"]})
@@ -34,7 +33,7 @@ def test_calibrated_commands_land_on_target(campaign):
     fits = fit_sets(measurements, robot.mechanism, _SETTINGS, noise_mm=0.01)
     assert {name for name, _ in fits} == {"lines", "spiral"}
     before = evaluate.before(measurements)["error_mm"]
-    frame = tables("c", fits, identifiable_truth(robot.mechanism, _ERRORS))["parameters"]
+    frame = tables("c", fits, robot.mechanism.identifiable(_ERRORS))["parameters"]
     frame = frame[frame["calibration"] == "lines"]
 
     def drive(controller):

@@ -4,11 +4,14 @@ import numpy as np
 
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.library import active_effects
+from rrru.effects.library import active_effects, library
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 
 ROBOT = Rrru3()
+EFFECTS = library(ROBOT)
+SLIDER_EFFECTS = library(Ptt3())
 LINE = Line("line", (-450.0, -100.0, 600.0), (350.0, 150.0, 700.0), 60)
 SPIRAL = Spiral("spiral", (0.0, 0.0), (50.0, 300.0), (560.0, 760.0), 4.0, 60)
 FORWARD = {"reverse": False, "payload_kg": 0.0}
@@ -25,7 +28,7 @@ def drive(effects, plan, **options):
     """Motion, true positions (n, 3) without noise, and the platform's rotation (n,) under {effect: {parameter:
     value}}.
     """
-    robot = VirtualRobot(effects=active_effects(effects), **options)
+    robot = VirtualRobot(effects=active_effects(effects, ROBOT), **options)
     motion = robot.motion(plan, ROBOT.inverse)
     position, turned = robot.positions(motion, plan.targets())
     assert np.isfinite(position).all()
@@ -35,6 +38,16 @@ def drive(effects, plan, **options):
 def drive_error(motion, position):
     """Drive-angle errors (n, 3) that explain the positions of a robot whose platform does not turn."""
     return ROBOT.inverse(position) - motion.drive
+
+
+def at_site(contribution, site):
+    """Twists (n or 1, 6) of a contribution at one of the robot's sites."""
+    return contribution.twists[:, ROBOT.legs.site_numbers[site]]
+
+
+def at_legs(contribution, kind, component):
+    """One component (n or 1, 3) of a contribution's twists at the legs' sites of one kind."""
+    return np.stack([at_site(contribution, f"leg {leg} {kind}")[:, component] for leg in (1, 2, 3)], axis=-1)
 
 
 def per_leg(name, values):

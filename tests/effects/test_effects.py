@@ -7,11 +7,22 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from rrru.effects.backlash import play
-from rrru.effects.library import EFFECTS, active_effects
+from rrru.effects.library import NAMES, active_effects
 from rrru.effects.protocol import ActiveEffect, Contribution, Motion
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
-from tests.effects.robots import FORWARD, LINE, LOADED, REVERSE, SPIRAL, plan_of
+from tests.effects.robots import (
+    EFFECTS,
+    FORWARD,
+    LINE,
+    LOADED,
+    REVERSE,
+    ROBOT,
+    SLIDER_EFFECTS,
+    SPIRAL,
+    at_legs,
+    plan_of,
+)
 
 _NAMES = (
     "backlash",
@@ -26,22 +37,32 @@ _NAMES = (
     "transmission_error",
     "thermal_growth",
     "servo_lag",
+    "joint_axis_error",
 )
 _MOTION = VirtualRobot().motion(plan_of(FORWARD, REVERSE, LOADED, trajectories=(LINE, SPIRAL)), Rrru3().inverse)
-_SHAPES = {
-    "drive": (len(_MOTION), 3),
-    "length_mm": (len(_MOTION), 3, 5),
-    "joint_mm": (len(_MOTION), 3, 3),
-    "displacement": (3, 6, 6),
-    "frame": (6,),
+_SITES = len(ROBOT.legs.sites)
+_DRIVES = ("drive",)
+# the places of every leg at which an effect acts, or the site that is no leg's
+_ACTS_AT = {
+    **dict.fromkeys(("backlash", "drive_compliance", "encoder_eccentricity"), _DRIVES),
+    **dict.fromkeys(("transmission_error", "servo_lag"), _DRIVES),
+    **dict.fromkeys(("link_flexure", "joint_clearance"), ("wrist",)),
+    **dict.fromkeys(("axis_tilt", "base_placement"), ("foot",)),
+    "leg_asymmetry": ("elbow", "knee", "wrist"),
+    "thermal_growth": ("foot", "elbow", "knee", "wrist", "platform"),
+    "frame_misregistration": "world",
+    "joint_axis_error": ("drive", "elbow", "knee", "wrist", "cross"),
 }
 
 
 def _flat(contribution):
     """All that an effect changes, in one row."""
-    return np.concatenate(
-        [np.broadcast_to(getattr(contribution, key), shape).ravel() for key, shape in _SHAPES.items()]
-    )
+    return np.broadcast_to(contribution.twists, (len(_MOTION), _SITES, 6)).ravel()
+
+
+def _touched(contribution):
+    """Names of the sites at which a contribution is not zero."""
+    return {ROBOT.legs.sites[k] for k in np.flatnonzero(np.any(contribution.twists, axis=(0, 2)))}
 
 
 def _under(effect, coordinates, shape=None):
@@ -49,8 +70,10 @@ def _under(effect, coordinates, shape=None):
     return _flat(effect.contribute(_MOTION, effect.coordinates.to_values(coordinates, shape)))
 
 
-def test_the_library_holds_the_twelve_effects_in_their_order():
+def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
+    assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
+    assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"bar_mismatch", "tool_offset"}
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -74,14 +97,15 @@ def test_nominal_parameters_change_nothing(name):
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_a_contribution_names_its_place_in_the_full_shape(name):
+def test_a_contribution_acts_at_its_sites_in_the_full_shape(name):
     effect = EFFECTS[name]
     result = effect.contribute(
         _MOTION, effect.coordinates.to_values(effect.coordinates.typical, effect.coordinates.shapes[0])
     )
-    acting = {key for key in _SHAPES if np.any(getattr(result, key))}
-    assert len(acting) == 1
-    assert all(np.shape(getattr(result, key)) == (shape if key in acting else ()) for key, shape in _SHAPES.items())
+    places = _ACTS_AT[name]
+    legs = {f"leg {leg} {place}" for leg in (1, 2, 3) for place in places}
+    assert _touched(result) == ({places} if isinstance(places, str) else legs)
+    assert result.twists.shape in ((len(_MOTION), _SITES, 6), (1, _SITES, 6)) and np.isfinite(result.twists).all()
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -129,11 +153,8 @@ def test_a_legs_coordinate_leaves_the_other_legs_alone(name):
             np.eye(len(effect.coordinates))[k] * effect.coordinates.typical, effect.coordinates.shapes[0]
         )
         result = effect.contribute(_MOTION, values)
-        by_leg = {"drive": 1, "length_mm": 1, "joint_mm": 1, "displacement": 0}
-        for key, axis in by_leg.items():
-            if leg and np.ndim(getattr(result, key)):
-                touched = np.moveaxis(getattr(result, key), axis, 0).reshape(3, -1)
-                assert np.flatnonzero(touched.any(axis=1)).tolist() == [leg - 1]
+        touched = _touched(result)
+        assert touched and all(not leg or site.startswith(f"leg {leg} ") for site in touched)
 
 
 @settings(max_examples=50)
@@ -146,7 +167,8 @@ def test_sine_and_cosine_parts_give_back_amplitude_and_phase(parts):
         sine, cosine = np.reshape(parts, (3, 2)).T
         angle = periods * _MOTION.drive
         expected = sine * np.sin(angle) + cosine * np.cos(angle)
-        np.testing.assert_allclose(effect.contribute(_MOTION, values).drive, expected, atol=1e-15)
+        changes = ROBOT.drive_errors(effect.contribute(_MOTION, values).twists)
+        np.testing.assert_allclose(changes, expected, atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -183,10 +205,10 @@ def test_contributions_add_up_place_by_place():
 
 
 def test_active_effects_keep_their_order_and_nominal_values():
-    first, second = active_effects({"servo_lag": {"lag2": 0.01}, "backlash": {}})
+    first, second = active_effects({"servo_lag": {"lag2": 0.01}, "backlash": {}}, ROBOT)
     assert (first.effect.name, second.effect.name) == ("servo_lag", "backlash")
-    assert np.flatnonzero(first.contribute(_MOTION).drive.any(axis=0)).tolist() == [1]
-    assert not second.contribute(_MOTION).drive.any()
+    assert _touched(first.contribute(_MOTION)) == {"leg 2 drive"}
+    assert not np.any(second.contribute(_MOTION).twists)
 
 
 def test_play_equals_its_definition_step_by_step():
@@ -221,23 +243,30 @@ def test_play_remembers_the_path_and_ignores_the_speed():
 
 
 def test_clearance_flips_with_the_force_and_has_its_size():
-    shift = EFFECTS["joint_clearance"].contribute(_MOTION, np.array([0.3, 0.5, 0.1, 0.0, 0.0])).joint_mm
-    np.testing.assert_allclose(np.linalg.norm(shift, axis=-1), np.tile([0.3, 0.5, 0.1], (len(_MOTION), 1)))
-    assert (np.einsum("nla,nla->nl", shift, _MOTION.force_direction) * _MOTION.force_n < 0.0).all()
+    """Along the forearm, against the force with which it pushes."""
+    shift = _clearance(0.0)
+    np.testing.assert_allclose(np.abs(shift), np.tile([0.3, 0.5, 0.1], (len(_MOTION), 1)))
+    assert (shift * _MOTION.force_n < 0.0).all() and (_MOTION.force_n > 0.0).any() and (_MOTION.force_n < 0.0).any()
+
+
+def _clearance(transition):
+    """Shifts (n, 3) of the wrists along the forearms under a contact of some softness."""
+    change = EFFECTS["joint_clearance"].contribute(_MOTION, np.array([0.3, 0.5, 0.1, transition, 0.0]))
+    assert not any(at_legs(change, "wrist", component).any() for component in range(1, 6))
+    return at_legs(change, "wrist", 0)
 
 
 def test_a_soft_clearance_changes_sides_within_its_transition():
     """Half a transition from zero force tanh(1/2) of the clearance is left, far from it all."""
-    hard = EFFECTS["joint_clearance"].contribute(_MOTION, np.array([0.3, 0.5, 0.1, 0.0, 0.0])).joint_mm
-    soft = EFFECTS["joint_clearance"].contribute(_MOTION, np.array([0.3, 0.5, 0.1, 4.0, 0.0])).joint_mm
-    share = np.linalg.norm(soft, axis=-1) / np.linalg.norm(hard, axis=-1)
-    np.testing.assert_allclose(share, np.tanh(np.abs(_MOTION.force_n) / 4.0))
+    np.testing.assert_allclose(_clearance(4.0) / _clearance(0.0), np.tanh(np.abs(_MOTION.force_n) / 4.0))
 
 
 def test_flexure_follows_the_force_of_a_held_joint_to_the_share_asked_for():
-    held = EFFECTS["link_flexure"].contribute(_MOTION, np.array([1.0, 1.0, 1.0, 1.0])).length_mm[..., 3]
+    held, half = (
+        at_legs(EFFECTS["link_flexure"].contribute(_MOTION, np.array([1.0, 1.0, 1.0, share])), "wrist", 0)
+        for share in (1.0, 0.5)
+    )
     np.testing.assert_allclose(held, -_MOTION.held_force_n)
-    half = EFFECTS["link_flexure"].contribute(_MOTION, np.array([1.0, 1.0, 1.0, 0.5])).length_mm[..., 3]
     np.testing.assert_allclose(half, -0.5 * (_MOTION.held_force_n + _MOTION.force_n))
 
 
@@ -246,6 +275,6 @@ def test_periodic_errors_repeat_after_their_period(name, periods):
     effect = EFFECTS[name]
     values = effect.coordinates.to_values(np.linspace(-3e-4, 3e-4, 6), effect.coordinates.shapes[0])
     later = Motion(**{**_MOTION.__dict__, "drive": _MOTION.drive + 2.0 * np.pi / periods})
-    np.testing.assert_allclose(
-        effect.contribute(later, values).drive, effect.contribute(_MOTION, values).drive, atol=1e-15
-    )
+    before, after = (ROBOT.drive_errors(effect.contribute(motion, values).twists) for motion in (_MOTION, later))
+    np.testing.assert_allclose(after, before, atol=1e-15)
+    assert np.abs(before).max() > 1e-4

@@ -5,11 +5,12 @@ import sys
 import numpy as np
 import pytest
 
-from rrru.effects.library import EFFECTS, active_effects, find
+from rrru.effects.library import BY_DEFAULT, NAMES, active_effects, find, library
 from rrru.errors import ConfigError
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots.rrru3 import Rrru3
-from tests.effects.robots import FORWARD, ROBOT, drive, drive_error, plan_of
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
+from tests.effects.robots import EFFECTS, FORWARD, ROBOT, drive, drive_error, plan_of
 
 _OWN = """
 import numpy as np
@@ -21,7 +22,7 @@ class Creep:
     parameters = ParameterSet((Parameter("rate2", "rad/s", 0.0, 0.0, 1e-4, "seen once", leg=2),))
 
     def contribute(self, motion, values):
-        return Contribution(drive=values[0] * motion.time_s[:, None] * np.array([0.0, 1.0, 0.0]))
+        return motion.at_drives(values[0] * motion.time_s[:, None] * np.array([0.0, 1.0, 0.0]))
 
 class Full(Creep):
     name = "full"
@@ -31,11 +32,11 @@ class Full(Creep):
 class Everywhere(Creep):
     name = "everywhere"
     def contribute(self, motion, values):
-        return Contribution(drive=values[0], frame=[values[0], 0.0, 0.0, 0.0, 0.0, 0.0])
+        return Contribution([values[0], 0.0, 0.0, 0.0, 0.0, 0.0])
 
 class Crooked(Creep):
     def contribute(self, motion, values):
-        return Contribution(length_mm=np.zeros((3, 4)))
+        return Contribution(np.zeros((3, 4)))
 
 class Silent(Creep):
     def contribute(self, motion, values):
@@ -73,7 +74,14 @@ def own(tmp_path, monkeypatch):
 
 
 def test_a_library_name_finds_the_librarys_effect():
-    assert all(find(name) is EFFECTS[name] for name in EFFECTS)
+    for robot in (ROBOT, Ptt3(), Delta()):
+        effects = library(robot)
+        assert set(effects) < set(NAMES) and set(BY_DEFAULT) < set(NAMES)
+        for name in NAMES:
+            found = find(name, robot)
+            assert (found is not None) == (name in effects)
+            if found is not None:
+                assert found.name == name and list(found.parameters) == list(effects[name].parameters)
 
 
 @pytest.mark.parametrize("name", ["own_effects:Creep", "own_effects:made"])
@@ -85,30 +93,31 @@ def test_ten_lines_of_ones_own_drive_the_virtual_robot(name):
 
 
 def test_what_a_users_effect_leaves_out_is_filled_in():
-    effect = find("own_effects:Creep")
+    effect = find("own_effects:Creep", ROBOT)
     assert effect.name == "creep" and effect.needs == ()
     assert effect.coordinates.typical == pytest.approx([1e-5]) and effect.coordinates.legs.tolist() == [2]
     assert effect.coordinates.positive.all() and effect.coordinates.to_values([2e-5], {}).tolist() == [2e-5]
-    full = find("own_effects:Full")
+    full = find("own_effects:Full", ROBOT)
     assert full.needs == ("time_s",) and full.coordinates.typical.tolist() == [3e-6]
 
 
 def test_a_users_contribution_gets_its_full_shape():
-    motion = VirtualRobot().motion(plan_of(FORWARD), Rrru3().inverse)
-    result = find("own_effects:Everywhere").contribute(motion, np.array([1e-5]))
-    assert result.drive.shape == (len(motion), 3) and result.frame.shape == (6,) and result.joint_mm == 0.0
+    motion = VirtualRobot().motion(plan_of(FORWARD), ROBOT.inverse)
+    result = find("own_effects:Everywhere", ROBOT).contribute(motion, np.array([1e-5]))
+    assert result.twists.shape == (len(motion), 26, 6)
+    assert (result.twists[..., 0] == 1e-5).all() and not result.twists[..., 1:].any()
     for name, message in (
-        ("Crooked", r"length_mm has the shape \(3, 4\); allowed: \(60, 3, 5\)"),
+        ("Crooked", r"twists have the shape \(3, 4\); allowed: \(60, 26, 6\)"),
         ("Silent", "gave a float"),
     ):
         with pytest.raises(ConfigError, match=message):
-            find(f"own_effects:{name}").contribute(motion, np.array([1e-5]))
+            find(f"own_effects:{name}", ROBOT).contribute(motion, np.array([1e-5]))
 
 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("slack", "unknown effect 'slack'; known: backlash, .*rail_tilt, or module:object"),
+        ("slack", "unknown effect 'slack'; known: backlash, .*rail_tilt, .*, or module:object"),
         ("own_effects:", "unknown effect"),
         (":Creep", "unknown effect"),
         ("./own_effects.py:Creep", "unknown effect"),
@@ -124,7 +133,7 @@ def test_a_users_contribution_gets_its_full_shape():
 )
 def test_what_is_no_effect_is_refused_by_its_name(name, message):
     with pytest.raises(ConfigError, match=message):
-        find(name)
+        find(name, ROBOT)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -133,18 +142,18 @@ def test_values_out_of_bounds_and_unknown_parameters_are_refused(name):
     for parameter in effect.parameters:
         for value in (parameter.low - 0.01 * (parameter.high - parameter.low), 1.01 * parameter.high, float("nan")):
             with pytest.raises(ConfigError, match=f"effect {name}: {parameter.name} is .*allowed: "):
-                active_effects({name: {parameter.name: value}})
-        active_effects({name: {parameter.name: parameter.high}})
+                active_effects({name: {parameter.name: value}}, ROBOT)
+        active_effects({name: {parameter.name: parameter.high}}, ROBOT)
     with pytest.raises(ConfigError, match="unknown parameter 'strength'; known: "):
-        active_effects({name: {"strength": 0.0}})
+        active_effects({name: {"strength": 0.0}}, ROBOT)
     with pytest.raises(ConfigError, match=r"rate2 is 1\.0 rad/s; allowed: 0\.0 to 0\.0001"):
-        active_effects({"own_effects:Creep": {"rate2": 1.0}})
+        active_effects({"own_effects:Creep": {"rate2": 1.0}}, ROBOT)
 
 
 def test_no_effects_at_all_leave_the_robot_ideal():
     plan = plan_of(FORWARD)
     for section in (None, {}):
-        assert active_effects(section) == ()
+        assert active_effects(section, ROBOT) == ()
     _, position, _ = drive({}, plan)
     np.testing.assert_allclose(
         position, ROBOT.forward(ROBOT.inverse(plan.targets()), guess_mm=plan.targets()), atol=1e-8
@@ -163,4 +172,4 @@ def test_a_law_that_fails_is_named_in_the_error(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(ConfigError, match="'broken_law:Broken': contribute failed with AttributeError"):
-        find("broken_law:Broken").contribute(object(), [0.0])
+        find("broken_law:Broken", ROBOT).contribute(object(), [0.0])

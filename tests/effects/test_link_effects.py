@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from rrru.robots import singularity
 from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, drive, per_leg, plan_of
 
 
 def _along_legs(motion, change):
     """How far (n, 3) the platform moves along the legs' forearms, where it does not turn."""
-    return np.einsum("nla,na->nl", motion.force_direction, change)
+    along = singularity.leg_forces(ROBOT, motion.position_mm, ROBOT.inverse(motion.position_mm))
+    return np.einsum("nla,na->nl", along, change)
 
 
 def test_link_flexure_shortens_the_forearms_by_their_force():

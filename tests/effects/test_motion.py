@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from rrru.effects.library import EFFECTS
 from rrru.effects.motion import Course, make_motion
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
-from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
+from rrru.robots.ptt3 import Ptt3
+from tests.effects.robots import EFFECTS, FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
 
 _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
 
@@ -30,19 +31,19 @@ def _given(**changes):
 
 
 def test_the_virtual_robots_motion_is_the_plans():
-    motion = VirtualRobot().motion(_PLAN, ROBOT.inverse)
+    motion = VirtualRobot(ROBOT).motion(_PLAN, ROBOT.inverse)
     commands = _PLAN.commands(ROBOT)
     np.testing.assert_array_equal(motion.time_s, commands["time_s"])
     np.testing.assert_array_equal(motion.payload_kg, commands["payload_kg"])
     np.testing.assert_array_equal(motion.position_mm, commands[[f"command_{a}_mm" for a in "xyz"]])
     np.testing.assert_array_equal(motion.drive, commands[[f"theta{k}_rad" for k in (1, 2, 3)]])
     np.testing.assert_allclose(motion.path_drive[motion.path_index], motion.drive, atol=1e-12)
-    assert motion.lengths_mm.tolist() == [400.0, 400.0, 100.0, 800.0, 400.0] and len(motion) == len(commands)
+    assert motion.robot is ROBOT and len(motion) == len(commands)
 
 
 def test_rates_are_the_slopes_of_the_angles_in_time():
     """Between two sampled points of a run the rates' mean is the angles' step, as far as the trapezoidal rule tells."""
-    motion = VirtualRobot().motion(_PLAN, ROBOT.inverse)
+    motion = VirtualRobot(ROBOT).motion(_PLAN, ROBOT.inverse)
     run = _PLAN.commands(ROBOT)["run"].to_numpy()
     inside = run[1:] == run[:-1]
     step = np.diff(motion.time_s)[:, None]
@@ -56,9 +57,9 @@ def test_an_unknown_speed_leaves_static_loads_and_no_rates():
     unknown = np.full((len(_PLAN.targets()), 3), np.nan)
     still, blind = _given(), _given(velocity_mm_s=unknown, acceleration_mm_s2=unknown)
     assert np.isnan(blind.drive_rate).all() and np.isnan(blind.drive_acceleration).all()
-    for key in ("force_n", "force_direction", "drive_load"):
+    for key in ("force_n", "held_force_n", "drive_load"):
         np.testing.assert_array_equal(getattr(blind, key), getattr(still, key))
-    assert not EFFECTS["servo_lag"].contribute(blind, np.full(3, 0.01)).drive.any()
+    assert not EFFECTS["servo_lag"].contribute(blind, np.full(3, 0.01)).twists.any()
 
 
 def test_an_unknown_payload_counts_as_none():
@@ -69,10 +70,43 @@ def test_an_unknown_payload_counts_as_none():
 
 def test_an_unknown_time_leaves_the_robot_cold():
     blind = _given(time_s=np.full(len(_PLAN.targets()), np.nan))
-    assert not EFFECTS["thermal_growth"].contribute(blind, np.array([1e-3, 100.0])).length_mm.any()
+    assert not EFFECTS["thermal_growth"].contribute(blind, np.array([1e-3, 100.0])).twists.any()
 
 
 def test_loads_are_those_of_the_commanded_pose_whatever_the_controller_adds():
     shifted = _given(drive=ROBOT.inverse(_PLAN.targets()) + 0.002)
     np.testing.assert_array_equal(shifted.drive_load, _given().drive_load)
     assert shifted.drive[0, 0] == pytest.approx(_given().drive[0, 0] + 0.002)
+
+
+@pytest.mark.parametrize("robot", [ROBOT, Ptt3(), Delta()], ids=lambda robot: robot.name)
+def test_changes_at_the_drives_are_read_back(robot):
+    """A change of an actuator value is a twist at its drive's site, which other sites' twists do not spoil."""
+    place = {"rrru3": (-400.0, 20.0, 600.0), "ptt3": (5.0, 10.0, -250.0), "delta": (30.0, 20.0, 10.0)}[robot.name]
+    target = np.add(place, np.random.default_rng(2).normal(size=(7, 3)))
+    motion = make_motion(robot, Masses(), _course(robot, target))
+    changes = np.random.default_rng(1).normal(size=(7, 3))
+    twists = motion.at_drives(changes).twists
+    assert {robot.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))} == {
+        f"leg {leg} drive" for leg in (1, 2, 3)
+    }
+    other = motion.at({"world": np.ones((1, 6)), robot.parts.feet[0]: np.ones((1, 6))}).twists
+    np.testing.assert_allclose(robot.drive_errors(twists + other), changes, atol=1e-15)
+
+
+def _course(robot, target):
+    """A Course along positions (n, 3) that nobody knows more about."""
+    still, drive, n = np.zeros_like(target), robot.inverse(target), len(target)
+    return Course(target, drive, drive, np.arange(n), np.zeros(n), still, still, np.zeros(n))
+
+
+def test_shifts_along_a_group_act_at_each_of_its_sites():
+    robot = Delta()
+    motion = make_motion(robot, Masses(), _course(robot, np.array([[10.0, 5.0, 0.0], [20.0, 5.0, 3.0]])))
+    shifts = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
+    twists = motion.along(robot.parts.members, shifts).twists
+    for k, group in enumerate(robot.parts.members):
+        assert len(group) == 2
+        for site in group:
+            np.testing.assert_array_equal(twists[:, robot.legs.site_numbers[site], 0], shifts[:, k])
+    assert not twists[:, :, 1:].any() and np.count_nonzero(twists.any(axis=(0, 2))) == 6

@@ -9,7 +9,6 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
-from rrru.effects.library import EFFECTS
 from rrru.effects.protocol import ActiveEffect
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
@@ -23,6 +22,7 @@ from rrru.robots.rrru3 import Rrru3
 ROBOT = Rrru3()
 SIM = sim(ROBOT)
 MASSES = Masses()
+EFFECTS = GapSettings().library(ROBOT)
 NOISE_MM = 0.02
 NOISE_RMS_MM = NOISE_MM * np.sqrt(3.0)
 ERRORS = {"dtheta1": 2e-3, "dtheta2": -1e-3, "dtheta3": 1.5e-3, "dL1": 0.4, "dL2": -0.3, "dL3": 0.5, "dr": 0.2}
@@ -66,7 +66,7 @@ def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, deviations=None):
 def gap_mm(effects, plan=None):
     """Rms distance that a calibration leaves without noise."""
     frame = measure(effects, 0.0, plan=plan)
-    return least_squares(Residuals(SIM, rows.actuators(frame), rows.measured(frame), rows.command(frame))).rms_mm
+    return least_squares(Residuals(SIM, rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame))).rms_mm
 
 
 def drawn(name, seed, leg=0):

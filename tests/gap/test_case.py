@@ -10,12 +10,11 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
-from rrru.effects.library import EFFECTS
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import State, at_reversals
 from tests.gap import campaigns
-from tests.gap.campaigns import ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
+from tests.gap.campaigns import EFFECTS, ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 
 STATE_ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
 
@@ -29,7 +28,7 @@ def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     run = case.measurements["run"].to_numpy()
     starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
-    np.testing.assert_array_equal(case.used, ~starts & ~at_reversals(case.motion, "rad"))
+    np.testing.assert_array_equal(case.used, ~starts & ~at_reversals(case.motion))
     assert len(case) == case.used.sum() == len(case.measured_mm) == len(case.run)
 
 
@@ -42,7 +41,7 @@ def test_points_that_are_lost_or_marked_are_not_used():
     frame.loc[60:70, "status"] = "near_singularity"
     near = slice(60, 71)
     kept = case_of(frame).used[near]
-    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_reversals(case_of(frame).motion, "rad")
+    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_reversals(case_of(frame).motion)
     assert kept.any() and kept.sum() == (~doubtful)[near].sum()
 
 
@@ -117,7 +116,7 @@ def test_the_calibrations_columns_are_derivatives_of_the_sim(case):
 
 def test_the_derivative_by_the_drives_is_the_mechanisms(case):
     linear = case.linearise(State(STATE_ERRORS, {}))
-    theta, position = rows.actuators(case.measurements), case.sim(STATE_ERRORS)
+    theta, position = rows.actuators(case.measurements, SIM), case.sim(STATE_ERRORS)
     np.testing.assert_allclose(linear.drive, SIM.actuator_jacobian(position, theta, STATE_ERRORS)[case.used], rtol=1e-8)
 
 
@@ -146,8 +145,8 @@ def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_tw
         path[:, 1] = 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0)
         path[:, 0] = path[:, 2] = 0.001 * steps
         index = np.arange(0, 97, 8)
-        motion = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
-        assert np.flatnonzero(at_reversals(motion, "rad")).tolist() == doubtful
+        motion = SimpleNamespace(robot=ROBOT, path_drive=path, path_index=index, drive=path[index])
+        assert np.flatnonzero(at_reversals(motion)).tolist() == doubtful
 
 
 def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):

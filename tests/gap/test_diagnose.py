@@ -6,13 +6,25 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.library import EFFECTS, find
-from rrru.effects.protocol import ActiveEffect, Contribution
+from rrru.effects.library import find
+from rrru.effects.protocol import ActiveEffect
 from rrru.errors import ConfigError, FitError
 from rrru.gap.settings import GapSettings
 from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.legs import WORLD
 from tests.gap import campaigns
-from tests.gap.campaigns import NOISE_MM, NOISE_RMS_MM, active, diagnosed, drawn, measure, plan_of, strong
+from tests.gap.campaigns import (
+    EFFECTS,
+    NOISE_MM,
+    NOISE_RMS_MM,
+    ROBOT,
+    active,
+    diagnosed,
+    drawn,
+    measure,
+    plan_of,
+    strong,
+)
 from tests.schemas import TABLES, check
 
 MEASURED = [f"measured_{axis}_mm" for axis in "xyz"]
@@ -66,12 +78,28 @@ def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     assert attributed.loc[name, "heldout_gain"] > attributed.loc[name, "heldout_gain_se"] > 0.0
 
 
+_FIRST_SITE = dict.fromkeys(("backlash", "servo_lag"), "drive") | {
+    "leg_asymmetry": "elbow",
+    "axis_tilt": "foot",
+    "joint_clearance": "wrist",
+}
+
+
 @pytest.mark.parametrize(
     ("name", "leg"), [("backlash", 2), ("servo_lag", 3), ("leg_asymmetry", 1), ("axis_tilt", 2), ("joint_clearance", 3)]
 )
 def test_a_fault_on_one_leg_is_laid_to_that_leg(name, leg):
     verdict = diagnosed(measure((strong(name, 4.0, 1, leg),))).verdict
     assert (verdict["effects"], verdict["leg"]) == (name, leg)
+    assert verdict["where"].split(" to ")[0] == f"leg {leg} {_FIRST_SITE[name]}"
+    assert all(site.startswith(f"leg {leg} ") for site in verdict["where"].split(" to "))
+
+
+def test_a_fault_on_all_legs_is_at_the_first_to_the_last_and_none_nowhere():
+    verdict = diagnosed(measure((strong("backlash", 4.0),))).verdict
+    assert verdict["where"] == "leg 1 drive to leg 3 drive"
+    assert diagnosed(measure((strong("frame_misregistration", 4.0),))).verdict["where"] == "world"
+    assert diagnosed(measure()).verdict["where"] == ""
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
@@ -109,14 +137,14 @@ class Ripple:
     parameters: ParameterSet = _SWAY
 
     def contribute(self, motion, values):
-        """Shift of all three joints alike."""
-        shift = np.array([0.0, 0.0, 1.0]) * values[0] * np.sin(motion.position_mm[:, :1] / 80.0)
-        return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
+        """Shift of what is measured."""
+        upwards = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+        return motion.at({WORLD: upwards * values[0] * np.sin(motion.position_mm[:, :1] / 80.0)})
 
 
 def test_a_users_own_effect_takes_part():
     label = f"{__name__}:Ripple"
-    robot = (ActiveEffect(find(label), {"ripple": 0.15}),)
+    robot = (ActiveEffect(find(label, ROBOT), {"ripple": 0.15}),)
     settings = GapSettings(effects=(*EFFECTS, label), draws=20)
     found = _checked(diagnosed(measure(robot), details=True, settings=settings))
     assert found.verdict["effects"] == "ripple"

@@ -7,14 +7,13 @@ import pandas as pd
 import pytest
 from scipy.stats import chi2
 
-from rrru.effects.library import EFFECTS
-from rrru.effects.protocol import Contribution, Coordinates, plain_coordinates
+from rrru.effects.protocol import Coordinates, plain_coordinates
 from rrru.gap.attribute import calibrate
 from rrru.gap.case import State
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate, worst_spot
 from rrru.parameters import Parameter, ParameterSet
-from tests.gap.campaigns import NOISE_MM, case_of, measure
+from tests.gap.campaigns import EFFECTS, NOISE_MM, case_of, measure
 from tests.schemas import check
 
 FACTORS = {"trajectory", "region", "direction", "leg", "motion_direction", "speed", "payload", "time"}
@@ -145,10 +144,8 @@ class ArmGrowth:
     needs: tuple = ()
 
     def contribute(self, motion, values):
-        """Changes (n, 3, 5) of the lengths."""
-        length = np.zeros((len(motion), 3, 5))
-        length[..., 1] = values[0]
-        return Contribution(length_mm=length)
+        """Shifts of the elbows along the arms."""
+        return motion.along(motion.robot.parts.links["dL1_leg"], np.full((1, 3), values[0]))
 
 
 def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from rrru.effects.library import EFFECTS
 from rrru.gap.evidence import LEVELS
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis
 from rrru.gap.settings import Prior
 from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
 from rrru.gap.verdict import decide, label
+from tests.gap.campaigns import EFFECTS
 
 WITH_LEGS = {name for name in EFFECTS if name not in ("frame_misregistration", "thermal_growth")}
 

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.effects.library import EFFECTS
-from rrru.effects.protocol import Contribution, Coordinates
+from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
@@ -22,7 +21,19 @@ from rrru.gap.settings import Prior
 from rrru.gap.terms import Term, spread, variants
 from rrru.gap.verdict import decide
 from rrru.parameters import ParameterSet
-from tests.gap.campaigns import FORWARD, FULL, MASSES, REVERSE, active, case_of, drawn, measure, plan_of, strong
+from tests.gap.campaigns import (
+    EFFECTS,
+    FORWARD,
+    FULL,
+    MASSES,
+    REVERSE,
+    active,
+    case_of,
+    drawn,
+    measure,
+    plan_of,
+    strong,
+)
 
 FEW = ("leg_asymmetry", "servo_lag", "backlash")
 
@@ -109,9 +120,8 @@ class FakeCompliance:
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""
-        return Contribution(
-            drive=np.asarray(values) * motion.drive_load / (1.0 + np.nan_to_num(motion.payload_kg))[:, None]
-        )
+        share = 1.0 / (1.0 + np.nan_to_num(motion.payload_kg))[:, None]
+        return motion.at_drives(np.asarray(values) * motion.drive_load * share)
 
 
 @pytest.fixture(scope="module")

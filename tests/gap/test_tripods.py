@@ -7,7 +7,7 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.effects.library import active_effects
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
@@ -21,7 +21,7 @@ def _diagnosed(mechanism, height, deviations, effects, payloads=(0.0, 2.0, 5.0),
     plan = make_plan(
         [curve], [{"payload_kg": load, "reverse": k % 2 == 1} for k, load in enumerate(payloads)], 80.0, 400.0, 5.0
     )
-    robot = VirtualTripod(mechanism, deviations, active_effects(effects, mechanism.drive_unit))
+    robot = VirtualRobot(mechanism, deviations, effects=active_effects(effects, mechanism))
     measurements, _ = robot.run(plan, NOISE_MM, np.random.default_rng(seed))
     return diagnose(measurements, MeasuredRobot(mechanism, Masses(), NOISE_MM, "test"))
 

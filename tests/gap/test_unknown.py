@@ -1,11 +1,16 @@
 """The smooth functions that compete with the library."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
+from rrru.effects.protocol import Contribution
 from rrru.gap.case import make_case
-from rrru.gap.unknown import UNKNOWN
-from tests.gap.campaigns import MASSES, NOISE_MM, SIM, case_of, diagnosed, measure
+from rrru.gap.unknown import UNKNOWN, unknown_functions
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
+from tests.gap.campaigns import MASSES, NOISE_MM, SIM, case_of, diagnosed, measure, robot_of
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +24,10 @@ def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are
     first, second = (generator.standard_normal(len(function.coordinates)) for _ in range(2))
 
     def made(values):
-        result = function.contribute(case.motion, values)
-        return result.drive if function.per_leg else result.joint_mm
+        twists = function.contribute(case.motion, values).twists
+        acting = {SIM.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))}
+        assert acting <= ({f"leg {leg} drive" for leg in (1, 2, 3)} if function.per_leg else {"world"})
+        return twists
 
     np.testing.assert_allclose(made(2.0 * first - second), 2.0 * made(first) - made(second), atol=1e-12)
     for k in range(len(first)):
@@ -28,12 +35,35 @@ def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are
         assert 0.5 <= one.max() <= 1.0 + 1e-12
 
 
-def test_a_shift_of_all_three_joints_moves_the_platform_by_it(case):
+def test_a_constant_shift_moves_the_reading_by_it(case):
     function = UNKNOWN["unknown_affine"]
     values = np.zeros((3, 4))
     values[:, 0] = [0.1, -0.2, 0.3]
-    shift = function.contribute(case.motion, values.ravel()).joint_mm
-    np.testing.assert_allclose(shift, np.broadcast_to([0.1, -0.2, 0.3], shift.shape))
+    twists = function.contribute(case.motion, values.ravel()).twists
+    np.testing.assert_allclose(twists[:, 0], np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (len(twists), 1)))
+    still = robot_of().positions(case.motion)[0]
+    moved = robot_of((_Constant(Contribution(twists)),)).positions(case.motion)[0]
+    np.testing.assert_allclose(moved - still, np.tile([0.1, -0.2, 0.3], (len(still), 1)), atol=1e-9)
+
+
+@dataclass(frozen=True)
+class _Constant:
+    """A contribution that is known."""
+
+    contribution: Contribution
+
+    def contribute(self, motion):
+        return self.contribution
+
+
+def test_functions_of_a_drive_are_as_large_as_its_unit_allows():
+    for robot, typical in ((SIM, 1e-4), (Delta(), 1e-4), (Ptt3(), 0.01)):
+        functions = unknown_functions(robot)
+        assert list(functions) == list(UNKNOWN)
+        of_drives = [function for function in functions.values() if function.per_leg]
+        assert of_drives and all((f.coordinates.typical == typical).all() for f in of_drives)
+        assert all(len(f.coordinates) == 3 * f.count for f in of_drives)
+        assert all(f is UNKNOWN[name] for name, f in functions.items() if not f.per_leg)
 
 
 def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():

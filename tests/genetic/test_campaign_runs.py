@@ -8,7 +8,7 @@ from rrru.fit.residuals import Residuals
 from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set, typical_parameters
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
-from rrru.robots.mechanism import make_mechanism
+from rrru.robots.catalogue import make_mechanism
 
 TRUTH = {"dtheta1": 0.002, "dL1": 0.3, "da": -0.4}
 

@@ -7,7 +7,7 @@ from rrru.compensate.backlash import measured_width
 from rrru.effects.library import active_effects
 from rrru.errors import UnreachableError
 from rrru.plant.screw import ScrewBench, encoder_record
-from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.ptt3 import Ptt3
 
 PLACE = (0.0, 0.0, -250.0)
@@ -18,7 +18,8 @@ REAL = ScrewBench(turns=10, lead_mm=5.0, samples_per_turn=40, noise_mm=5e-4, res
 def robot(widths=(0.06, 0.045, 0.075), compliance=0.0):
     effects = {f"width{leg}": width for leg, width in enumerate(widths, start=1)}
     soft = {f"compliance{leg}": compliance for leg in (1, 2, 3)}
-    return VirtualTripod(Ptt3(), effects=active_effects({"backlash": effects, "drive_compliance": soft}, "mm"))
+    section = {"backlash": effects, "drive_compliance": soft}
+    return VirtualRobot(Ptt3(), effects=active_effects(section, Ptt3()))
 
 
 def test_every_pass_stops_at_the_same_places():

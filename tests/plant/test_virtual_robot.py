@@ -17,6 +17,7 @@ from rrru.robots import singularity
 from rrru.robots.dynamics import GRAVITY_MM_S2
 from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
+from tests.reference.spatial_chain import LENGTHS, PLACES
 
 _ONCE = ({"reverse": False, "payload_kg": 0.0},)
 
@@ -67,11 +68,12 @@ def test_leg_forces_do_the_work_of_the_load():
     gradient, by_leg = robot.mechanism.closure_jacobians(target, motion.drive)
     moment = -motion.force_n * by_leg[..., 0] / np.linalg.norm(gradient, axis=-1)
     np.testing.assert_allclose(torque, moment, rtol=1e-9, atol=1e-9 * np.abs(moment).max())
-    np.testing.assert_allclose(np.einsum("nl,nla->na", motion.force_n, motion.force_direction), -load, atol=1e-9)
+    along = singularity.leg_forces(robot.mechanism, target, motion.drive)
+    np.testing.assert_allclose(np.einsum("nl,nla->na", motion.force_n, along), -load, atol=1e-9)
 
 
 def _constraint(measurements):
-    return singularity.constraint_measure(Rrru3(), rows.command(measurements), rows.actuators(measurements))
+    return singularity.constraint_measure(Rrru3(), rows.command(measurements), rows.actuators(measurements, Rrru3()))
 
 
 def test_commands_near_the_constraint_singularity_are_reported():
@@ -129,19 +131,22 @@ def test_payload_reaches_the_effects():
     np.testing.assert_allclose(loaded, empty * (3.0 + 1.8 + 5.0) / (3.0 + 1.8), rtol=1e-9)
 
 
+_LOOSE = {"joint_clearance": {f"clearance{k}": 0.5 for k in (1, 2, 3)}}
+
+
 def test_clearance_moves_the_platform_down_under_its_weight():
     """The bores lag behind the pins, so that gravity is followed: the platform's shift does positive work on the
     load.
     """
     plan = _plan()
-    loose = VirtualRobot(effects=active_effects({"joint_clearance": {f"clearance{k}": 0.5 for k in (1, 2, 3)}}))
+    loose = VirtualRobot(effects=active_effects(_LOOSE, Rrru3()))
     measurements, _ = loose.run(plan, 0.0, np.random.default_rng(0))
     assert (measurements["measured_z_mm"] - measurements["command_z_mm"] > 0.0).all()
 
 
 @dataclass(frozen=True)
 class _Everything:
-    """A contribution of every kind at once."""
+    """A contribution at every site at once."""
 
     contribution: Contribution
 
@@ -149,29 +154,29 @@ class _Everything:
         return self.contribution
 
 
-def test_every_part_of_a_contribution_reaches_the_loop_closure():
-    """Drive, length, joint, displacement and frame at once, against a general solver on 18 equations."""
+def test_a_contribution_at_every_site_reaches_the_loop_closure():
+    """Twists of all joints, of the world and of the tool at once, against a general solver on 18 equations."""
     plan, generator = _plan(x=(-600.0, -300.0)), np.random.default_rng(11)
     target = plan.targets()
     n = len(target)
-    change = Contribution(
-        drive=generator.normal(0.0, 1e-3, (n, 3)),
-        length_mm=generator.normal(0.0, 0.3, (n, 3, 5)),
-        joint_mm=generator.normal(0.0, 0.1, (n, 3, 3)),
-        displacement=generator.normal(size=(3, 6, 6)) * np.repeat([0.3, 0.001], 3),
-        frame=np.array([3.0, -1.0, 2.0, 0.01, -0.02, 0.015]),
-    )
-    robot = VirtualRobot(deviations={"dtheta2": 0.002, "dL13": 0.7, "dr": -0.5}, effects=(_Everything(change),))
+    twists = generator.normal(size=(n, 26, 6)) * np.repeat([0.3, 0.001], 3)
+    twists[:, 0] = [3.0, -1.0, 2.0, 0.01, -0.02, 0.015]
+    twists[:, 25, 3:] = 0.0
+    deviations, change = {"dtheta2": 0.002, "dL13": 0.7, "dr": -0.5, "dR": 0.3}, Contribution(twists)
+    robot = VirtualRobot(deviations=deviations, effects=(_Everything(change),))
     position, _ = robot.positions(robot.motion(plan, robot.mechanism.inverse), target)
     theta = robot.mechanism.inverse(target)
     passive = robot.mechanism.passive_angles(target, theta)
-    lengths = np.tile([400.0, 400.0, 100.0, 800.0, 399.5], (3, 1))
+    lengths = LENGTHS + np.array([0.3, 0.0, 0.0, 0.0, -0.5])
     lengths[0, 3] += 0.7
     for k in range(0, n, 9):
         guess = np.concatenate([passive[k].ravel(), np.zeros(3), target[k]])
-        angles = theta[k] + [0.0, 0.002, 0.0] + change.drive[k]
-        pose = rrru3_slow.close(angles, lengths + change.length_mm[k], change.displacement, guess, change.joint_mm[k])
-        seen = rrru3_slow.transform(change.frame[3:], change.frame[:3]) @ pose
+        own = twists[k, 1:25].reshape(3, 8, 6).copy()
+        # rotation vectors at one site add up; theta counts about minus y
+        own[1, PLACES.index("drive"), 4] -= 0.002
+        pose = rrru3_slow.close(theta[k], lengths, own, guess)
+        seen = rrru3_slow.transform(twists[k, 0, 3:], twists[k, 0, :3]) @ pose
+        seen = seen @ rrru3_slow.transform(shift=twists[k, 25, :3])
         np.testing.assert_allclose(position[k], seen[:3, 3], atol=1e-7)
 
 

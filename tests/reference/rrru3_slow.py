@@ -39,30 +39,31 @@ def transform(rotation=None, shift=(0.0, 0.0, 0.0)):
     return result
 
 
-def chain(leg, lengths, deviations, angles, joint_shift=(0.0, 0.0, 0.0)):
-    """Platform pose (4, 4) of one leg from its five joint angles; lengths R, L1, L2, L3, r; deviations (6, 6)."""
+def chain(leg, lengths, deviations, angles):
+    """Platform pose (4, 4) of one leg from its five joint angles; lengths R, L1, L2, L3, r; deviations (8, 6)."""
     base, arm, offset, forearm, platform = lengths
     displaced = [transform(d[3:], d[:3]) for d in deviations]
-    matrix = transform((0.0, 0.0, AZIMUTH[leg])) @ transform(shift=(base, 0.0, 0.0)) @ displaced[0]
-    matrix = matrix @ transform((0.0, -angles[0], 0.0)) @ transform(shift=(arm, 0.0, 0.0)) @ displaced[1]
-    matrix = matrix @ transform((0.0, -angles[1], 0.0)) @ transform(shift=(offset, 0.0, 0.0)) @ displaced[2]
-    matrix = matrix @ transform((0.0, 0.0, angles[2])) @ transform(shift=(forearm, 0.0, 0.0)) @ displaced[3]
-    matrix = matrix @ transform((0.0, 0.0, angles[3]))
-    matrix[:3, 3] += joint_shift
-    matrix = matrix @ displaced[4] @ transform((0.0, -angles[4], 0.0))
-    return matrix @ transform(shift=(-platform, 0.0, 0.0)) @ displaced[5] @ transform((0.0, 0.0, -AZIMUTH[leg]))
+    matrix = transform((0.0, 0.0, AZIMUTH[leg])) @ displaced[0] @ transform(shift=(base, 0.0, 0.0)) @ displaced[1]
+    matrix = matrix @ displaced[2] @ transform((0.0, -angles[0], 0.0)) @ transform(shift=(arm, 0.0, 0.0))
+    matrix = matrix @ displaced[3] @ transform((0.0, -angles[1], 0.0)) @ transform(shift=(offset, 0.0, 0.0))
+    matrix = matrix @ displaced[4] @ transform((0.0, 0.0, angles[2])) @ transform(shift=(forearm, 0.0, 0.0))
+    matrix = matrix @ displaced[5] @ transform((0.0, 0.0, angles[3])) @ displaced[6]
+    matrix = matrix @ transform((0.0, -angles[4], 0.0)) @ transform(shift=(-platform, 0.0, 0.0))
+    return matrix @ displaced[7] @ transform((0.0, 0.0, -AZIMUTH[leg]))
 
 
-def close(theta, lengths, deviations, guess, joint_shift=None):
-    """Platform pose (4, 4) of the closed robot: fsolve on 18 equations in 12 passive angles and the platform's pose."""
-    shift = np.zeros((3, 3)) if joint_shift is None else joint_shift
+def close(theta, lengths, deviations, guess):
+    """Platform pose (4, 4) of the closed robot: fsolve on 18 equations in 12 passive angles and the platform's pose.
+
+    deviations (3 legs, 8, 6).
+    """
 
     def equations(unknown):
         pose = transform(unknown[12:15] / 500.0, unknown[15:])
         rows = []
         for leg in range(3):
             angles = [theta[leg], *unknown[4 * leg : 4 * leg + 4]]
-            difference = np.linalg.inv(pose) @ chain(leg, lengths[leg], deviations[leg], angles, shift[leg])
+            difference = np.linalg.inv(pose) @ chain(leg, lengths[leg], deviations[leg], angles)
             rows += [*difference[:3, 3], *(500.0 * Rotation.from_matrix(difference[:3, :3]).as_rotvec())]
         return rows
 

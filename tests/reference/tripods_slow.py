@@ -3,7 +3,7 @@ with the package.
 """
 
 import numpy as np
-from scipy.optimize import root
+from scipy.optimize import fsolve, root
 from scipy.spatial.transform import Rotation
 
 
@@ -46,6 +46,67 @@ def upright_carriages(position, length, radius):
     azimuth = np.radians([0.0, 120.0, 240.0])
     across = np.hypot(radius * np.cos(azimuth) - position[0], radius * np.sin(azimuth) - position[1])
     return position[2] + np.sqrt(length**2 - across**2)
+
+
+def _move(rotation_vector, shift):
+    """Homogeneous matrix."""
+    result = np.eye(4)
+    result[:3, :3] = Rotation.from_rotvec(rotation_vector).as_matrix()
+    result[:3, 3] = shift
+    return result
+
+
+def ptt3_close(slider, feet, inclination, guess, lengths=(350.0, 300.0, 60.0)):
+    """Platform pose (4, 4) of a 3-PTT whose feet (3 legs, 6) are displaced: shift in mm and rotation vector.
+
+    Rails and the U joints on their carriages go with their feet. The legs as chains of matrices: a carriage, four axes
+    of U joints, the platform; fsolve on 18 equations in 12 angles and the pose. lengths: L, R, r.
+    """
+    link, base, platform = lengths
+
+    def chain(leg, angles):
+        first, second, third, fourth = angles
+        azimuth = np.radians(120.0 * leg)
+        way = slider[leg] * np.array([np.cos(inclination), 0.0, np.sin(inclination)])
+        pose = _move([0.0, 0.0, azimuth], np.zeros(3)) @ _move(np.zeros(3), [base, 0.0, 0.0])
+        pose = pose @ _move(feet[leg][3:], feet[leg][:3]) @ _move([0.0, -first, 0.0], way)
+        pose = pose @ _move([0.0, 0.0, second], np.zeros(3)) @ _move([0.0, 0.0, third], [link, 0.0, 0.0])
+        return pose @ _move([0.0, -fourth, 0.0], np.zeros(3)) @ _move([0.0, 0.0, -azimuth], [-platform, 0.0, 0.0])
+
+    def equations(unknown):
+        pose = _move(unknown[12:15] / 300.0, unknown[15:])
+        rows = []
+        for leg in range(3):
+            off = np.linalg.inv(pose) @ chain(leg, unknown[4 * leg : 4 * leg + 4])
+            rows += [*off[:3, 3], *(300.0 * Rotation.from_matrix(off[:3, :3]).as_rotvec())]
+        return rows
+
+    solution = fsolve(equations, guess, xtol=1e-12)
+    assert np.abs(equations(solution)).max() < 1e-8
+    return _move(solution[12:15] / 300.0, solution[15:])
+
+
+def delta_bars(theta, beta, lengths, guess, dimensions=(375.0, 125.0, 60.0, 120.0), depth=0.0):
+    """Platform position (3,) and rotation vector (3,) of a Delta of six bars (3 arms, 2): fsolve on their lengths.
+
+    dimensions: l1, base's radius less the platform's, the platform's, distance of an arm's bars; the second bar stands
+    where the tangent points.
+    """
+    arm, base, platform, spacing = dimensions
+    pairs = []
+    for leg in range(3):
+        out, side = delta_arm(beta[leg], 0.0), np.array([-np.sin(beta[leg]), np.cos(beta[leg]), 0.0])
+        for share, length in zip((-0.5, 0.5), lengths[leg], strict=True):
+            elbow = (base + platform) * out + arm * delta_arm(beta[leg], theta[leg]) + np.array([0.0, 0.0, depth])
+            pairs.append((elbow + share * spacing * side, platform * out + share * spacing * side, length))
+
+    def equations(unknown):
+        turn = Rotation.from_rotvec(unknown[3:] / 300.0)
+        return [np.linalg.norm(unknown[:3] + turn.apply(end) - elbow) - length for elbow, end, length in pairs]
+
+    solution = fsolve(equations, np.concatenate([guess, np.zeros(3)]), xtol=1e-12)
+    assert np.abs(equations(solution)).max() < 1e-9
+    return solution[:3], solution[3:] / 300.0
 
 
 def delta_arm(beta, angle):

@@ -68,14 +68,14 @@ def test_errors_of_every_leg_are_errors_of_its_dimensions():
 def test_the_second_drive_axis_lies_on_y():
     robot = Delta()
     np.testing.assert_allclose(np.exp(1j * np.array(robot.azimuth_rad)), np.exp(1j * BETA), atol=1e-15)
-    feet = robot.ends(np.zeros((1, 3)), robot.legs())[0] - robot.l1_mm * robot.radial
+    feet = robot.ends(np.zeros((1, 3)), robot.numbers())[0] - robot.l1_mm * robot.radial
     np.testing.assert_allclose(feet[1], [0.0, 125.0, _DEPTH], atol=1e-9)
 
 
 def test_arms_are_level_at_the_calibration_frames_origin():
     robot = Delta()
     np.testing.assert_allclose(robot.inverse([[0.0, 0.0, 0.0]]), 0.0, atol=1e-12)
-    ends = robot.ends(np.zeros((1, 3)), robot.legs())[0]
+    ends = robot.ends(np.zeros((1, 3)), robot.numbers())[0]
     np.testing.assert_allclose(ends[:, 2], _DEPTH)
     np.testing.assert_allclose(np.linalg.norm(ends, axis=1), 900.0)
 
@@ -100,7 +100,7 @@ def test_turning_by_a_third_passes_the_drives_on_and_a_mirror_swaps_two():
 
 def test_knees_point_outwards():
     robot, points = Delta(), _inside()
-    legs = robot.legs()
+    legs = robot.numbers()
     ends = robot.ends(robot.inverse(points), legs)
     feet = robot.a_mm * robot.radial + np.array([0.0, 0.0, robot.origin_depth_mm])
     outward = ((ends - feet) * robot.radial).sum(axis=-1)

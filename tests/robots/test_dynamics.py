@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, held_force, loads
+from rrru.robots.delta import Delta
+from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, gravity, loads
+from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 
 _ROBOT = Rrru3()
@@ -73,7 +75,7 @@ def _potential(theta, guess):
 def test_static_torque_is_the_potential_energys_slope(rich_poses):
     points, theta = rich_poses
     nothing = np.zeros_like(points)
-    _, _, torque = loads(_ROBOT, _MASSES, points, theta, nothing, nothing, np.full(len(points), _PAYLOAD_KG))
+    torque = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, np.full(len(points), _PAYLOAD_KG)).drive
     h = 1e-5
     for leg in range(3):
         step = h * np.eye(3)[leg]
@@ -89,7 +91,7 @@ def test_motors_supply_the_change_of_energy(rich_poses):
     velocity, acceleration = _motion(len(points))
     payload = np.full(len(points), _PAYLOAD_KG)
     rate, second = drive_rates(_ROBOT, points, velocity, acceleration)
-    _, _, torque = loads(_ROBOT, _MASSES, points, theta, second, acceleration, payload)
+    torque = loads(_ROBOT, _MASSES, points, theta, (rate, second), acceleration, payload).drive
     h = 1e-4
 
     def energy(t):
@@ -110,12 +112,10 @@ def test_motors_supply_the_change_of_energy(rich_poses):
 def test_legs_carry_the_platform_along_their_forearms(rich_poses):
     points, theta = rich_poses
     _, acceleration = _motion(len(points))
-    force, direction, _ = loads(
-        _ROBOT, _MASSES, points, theta, np.zeros_like(points), acceleration, np.full(len(points), _PAYLOAD_KG)
-    )
+    still, payload = (np.zeros_like(points),) * 2, np.full(len(points), _PAYLOAD_KG)
+    force = loads(_ROBOT, _MASSES, points, theta, still, acceleration, payload).member_n
     mass = 3.0 + _PAYLOAD_KG + 1.8
     weight = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
-    np.testing.assert_allclose(np.einsum("nl,nla->na", force, direction), -weight, atol=1e-9)
     # joint 4 lies at the platform's U joint, joint 3 a forearm before it
     passive = _ROBOT.passive_angles(points, theta)
     plane = theta + passive[..., 0]
@@ -125,22 +125,24 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
     forearm = np.stack(
         [radial * cx - side * cy, radial * cy + side * cx, np.sin(plane) * np.cos(passive[..., 1])], axis=-1
     )
-    np.testing.assert_allclose(direction, forearm, atol=1e-12)
+    np.testing.assert_allclose(np.einsum("nl,nla->na", force, forearm), -weight, atol=1e-9)
 
 
 @pytest.mark.parametrize("payload_kg", [0.0, 4.0])
 def test_forces_grow_with_the_mass_that_hangs_on_the_platform(rich_poses, payload_kg):
     points, theta = rich_poses
     nothing = np.zeros_like(points)
-    bare, _, _ = loads(_ROBOT, Masses(1.0, 0.0, 0.0), points, theta, nothing, nothing, np.zeros(len(points)))
-    full, _, _ = loads(_ROBOT, _MASSES, points, theta, nothing, nothing, np.full(len(points), payload_kg))
-    np.testing.assert_allclose(full, bare * (3.0 + 1.8 + payload_kg), rtol=1e-12)
+    bare = loads(_ROBOT, Masses(1.0, 0.0, 0.0), points, theta, (nothing, nothing), nothing, np.zeros(len(points)))
+    full = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, np.full(len(points), payload_kg))
+    np.testing.assert_allclose(full.member_n, bare.member_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
+    np.testing.assert_allclose(full.held_n, bare.held_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
 
 
 def test_held_forces_carry_the_load_along_the_lines_from_elbow_to_joint(rich_poses):
     """Independent: the elbow from the definition of the drive arm, the balance of forces at the platform."""
     points, theta = rich_poses
-    force = held_force(_ROBOT, _MASSES, points, theta, np.zeros_like(points), np.full(len(points), _PAYLOAD_KG))
+    nothing, payload = np.zeros_like(points), np.full(len(points), _PAYLOAD_KG)
+    force = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, payload).held_n
     total = np.zeros_like(points)
     for leg, azimuth in enumerate(_ROBOT.azimuth_rad):
         out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -149,3 +151,16 @@ def test_held_forces_carry_the_load_along_the_lines_from_elbow_to_joint(rich_pos
         total += force[:, leg, None] * line / np.linalg.norm(line, axis=1, keepdims=True)
     weight = (_MASSES.platform_kg + _PAYLOAD_KG + 1.5 * _MASSES.forearm_kg) * 9.80665
     np.testing.assert_allclose(total, np.tile([0.0, 0.0, -weight], (len(points), 1)), atol=1e-9)
+
+
+def test_gravity_points_down_in_every_robots_frame():
+    assert gravity(_ROBOT).tolist() == [0.0, 0.0, GRAVITY_MM_S2]
+    assert gravity(Delta()).tolist() == gravity(Ptt3()).tolist() == [0.0, 0.0, -GRAVITY_MM_S2]
+
+
+@pytest.mark.parametrize("robot", [Delta(), Ptt3()], ids=["delta", "ptt3"])
+def test_legs_without_an_inner_joint_are_held_as_they_are(robot):
+    actuators = robot.inverse([robot.legs.home_mm]) if robot.name == "delta" else robot.inverse([[10.0, 5.0, -250.0]])
+    position, nothing = robot.forward(actuators), np.zeros((1, 3))
+    load = loads(robot, _MASSES, position, actuators, (nothing, nothing), nothing, np.full(1, _PAYLOAD_KG))
+    np.testing.assert_array_equal(load.held_n, load.member_n)

@@ -78,7 +78,7 @@ def test_a_rail_that_leans_moves_its_carriage_along_the_leaning_line():
     slider = np.array([[50.0, 50.0, 50.0]])
 
     def end(**values):
-        return robot.ends(slider, robot.legs(robot.parameters.vector(values)))[0, 0]
+        return robot.ends(slider, robot.numbers(robot.parameters.vector(values)))[0, 0]
 
     np.testing.assert_allclose(end(rise1=0.01), [240.0 + 50.0 * np.cos(0.01), 0.0, 50.0 * np.sin(0.01)], atol=1e-12)
     np.testing.assert_allclose(end(swing1=0.01), [240.0 + 50.0 * np.cos(0.01), 50.0 * np.sin(0.01), 0.0], atol=1e-12)
@@ -148,7 +148,7 @@ def test_a_zero_of_kappa_is_a_singularity_that_the_platform_crosses():
     assert 0.1 < root < 1.0 and z[0] < -200.0 and d.min() > 1.0
     assert singularity.translational_measure(robot, point, robot.inverse(point))[0] < 1e-9
     assert singularity.constraint_measure(robot, point, robot.inverse(point))[0] > 0.01
-    ends = robot.ends(robot.inverse(point), robot.legs())[0]
+    ends = robot.ends(robot.inverse(point), robot.numbers())[0]
     assert abs(np.cross(ends[1] - ends[0], ends[2] - ends[0])[2]) < 1e-6
     sides = [
         np.linalg.det(robot.jacobian(on_ray(root + step), robot.inverse(on_ray(root + step))))[0]

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
 from rrru.robots import singularity
-from rrru.robots.mechanism import identifiable_truth
 from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 
@@ -59,7 +58,7 @@ def test_forward_equals_a_general_solver_point_by_point(rich_poses):
     points, theta = rich_poses
     robot = Rrru3(parameter_set="published")
     deviations = np.random.default_rng(0).uniform(-1, 1, 14) * np.r_[[0.02] * 3, [2.0] * 11]
-    legs = robot.legs(deviations)
+    legs = robot.numbers(deviations)
     slow = [rrru3_slow.forward(t, legs, p) for t, p in zip(theta[:40], points[:40], strict=True)]
     np.testing.assert_allclose(robot.forward(theta[:40], deviations, points[:40]), slow, atol=1e-9)
 
@@ -111,7 +110,7 @@ def test_passive_angles_lead_the_chain_back_to_the_platform(rich_poses):
     points, theta = rich_poses
     robot = Rrru3()
     passive = robot.passive_angles(points, theta)
-    lengths, ideal = (400.0, 400.0, 100.0, 800.0, 400.0), np.zeros((6, 6))
+    lengths, ideal = (400.0, 400.0, 100.0, 800.0, 400.0), np.zeros((8, 6))
     for point, drive, angles in zip(points[:20], theta[:20], passive[:20], strict=True):
         for leg in range(3):
             pose = rrru3_slow.chain(leg, lengths, ideal, [drive[leg], *angles[leg]])
@@ -139,22 +138,19 @@ def test_published_tied_and_identifiable_errors_say_the_same(rich_poses):
     published = {**{k: v for k, v in tied.items() if k[:2] != "dL"}, **{f"dL{leg}1": 0.4 for leg in (1, 2, 3)}}
     published |= {f"dL{leg}3": -0.2 for leg in (1, 2, 3)}
     positions = []
-    for kind, values in (("tied", tied), ("published", published), ("identifiable", identifiable_truth(Rrru3(), tied))):
+    for kind, values in (("tied", tied), ("published", published), ("identifiable", Rrru3().identifiable(tied))):
         robot = Rrru3(parameter_set=kind)
         positions.append(robot.forward(theta, robot.parameters.vector(values), points))
     np.testing.assert_allclose(positions[0], positions[1], atol=1e-9)
     np.testing.assert_allclose(positions[0], positions[2], atol=1e-9)
-    assert identifiable_truth(Rrru3(), published) == identifiable_truth(Rrru3(), tied)
+    assert Rrru3().identifiable(published) == Rrru3().identifiable(tied)
     assert np.linalg.norm(positions[0] - points, axis=1).min() > 0.1
 
 
 def test_legs_that_differ_have_no_tied_error():
-    assert np.isnan(identifiable_truth(Rrru3(), {"dL11": 0.1, "dL21": 0.2})["dL1"])
-    assert (
-        np.isnan(identifiable_truth(Rrru3(), {"dL11": 0.3})["dL1"])
-        and identifiable_truth(Rrru3(), {"dL11": 0.3})["dL2"] == 0.0
-    )
-    assert identifiable_truth(Rrru3(), {"dL1": 0.3, "dL21": 0.3})["dL1"] == 0.3
+    assert np.isnan(Rrru3().identifiable({"dL11": 0.1, "dL21": 0.2})["dL1"])
+    assert np.isnan(Rrru3().identifiable({"dL11": 0.3})["dL1"]) and Rrru3().identifiable({"dL11": 0.3})["dL2"] == 0.0
+    assert Rrru3().identifiable({"dL1": 0.3, "dL21": 0.3})["dL1"] == 0.3
 
 
 def test_out_of_reach_is_nan_in_batches_and_an_error_at_the_boundary():

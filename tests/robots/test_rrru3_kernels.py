@@ -23,7 +23,7 @@ def test_mean_distance_equals_the_slow_loop_within_1e_9_mm(rich_poses):
             [u == "rad" for u in robot.parameters.units], 0.03, 4.0
         )
         slow = []
-        for legs in robot.legs(deviations):
+        for legs in robot.numbers(deviations):
             positions = [
                 rrru3_slow.forward(theta, legs, start)
                 for theta, start in zip(residuals.actuators, residuals.start_mm, strict=True)

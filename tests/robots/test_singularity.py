@@ -5,10 +5,9 @@ means.
 import numpy as np
 import pytest
 
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity, workspace
 from rrru.robots.rrru3 import Rrru3
-from tests.reference.closure_determinant import closure_determinant
+from tests.reference.spatial_chain import closure_determinant
 
 
 def _line(y, x):
@@ -33,7 +32,7 @@ def test_constraint_determinant_changes_sign_with_the_spatial_closure(y):
     points, theta = _line(y, np.linspace(-800.0, -700.0, 101))
     robot = Rrru3()
     small = singularity.constraint_determinant(robot, points, theta)
-    full = closure_determinant(VirtualRobot().geometry, theta, robot.passive_angles(points, theta))
+    full = closure_determinant(theta, robot.passive_angles(points, theta))
     change = np.flatnonzero(np.diff(np.sign(small)))
     assert change.tolist() == np.flatnonzero(np.diff(np.sign(full))).tolist()
     assert len(change) == 1 and -790.0 <= points[change[0], 0] <= -779.0
@@ -45,7 +44,7 @@ def test_closure_determinant_is_the_product_of_both_singularities(rich_poses):
     """
     points, theta = rich_poses
     robot = Rrru3()
-    full = closure_determinant(VirtualRobot().geometry, theta, robot.passive_angles(points, theta))
+    full = closure_determinant(theta, robot.passive_angles(points, theta))
     forces = np.linalg.det(singularity.leg_forces(robot, points, theta))
     constraint_moments = np.linalg.det(robot.constraint_moments(points, theta))
     ratio = np.abs(full / (forces * constraint_moments))

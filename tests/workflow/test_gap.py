@@ -7,14 +7,13 @@ import pytest
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.effects.library import active_effects
-from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.ptt3 import Ptt3
 from tests.places import DATA
 from tests.workflow.folder import dry_run, run
 
 _DRIFT = """
 import numpy as np
-from rrru.effects.protocol import Contribution
 from rrru.parameters import Parameter, ParameterSet
 
 class Drift:
@@ -22,7 +21,7 @@ class Drift:
     parameters = ParameterSet(tuple(Parameter(f"speed_{axis}", "mm/s", 0.0, -1e-3, 1e-3) for axis in "xyz"))
     def contribute(self, motion, values):
         shift = motion.time_s[:, None] * values
-        return Contribution(joint_mm=np.repeat(shift[:, None], 3, axis=1))
+        return motion.at({"world": np.concatenate([shift, 0.0 * shift], axis=1)})
 """
 
 
@@ -69,11 +68,11 @@ def measured(tmp_path_factory):
     points = pd.read_csv(DATA / "field_02.csv")
     lacking = ["time_s", "speed_mm_s", "payload_kg", "theta1_rad", "theta2_rad", "theta3_rad"]
     points.drop(columns=lacking).to_csv(folder / "bare.csv", index=False)
-    play = active_effects({"backlash": {f"width{k}": 0.05 for k in (1, 2, 3)}}, "mm")
+    play = active_effects({"backlash": {f"width{k}": 0.05 for k in (1, 2, 3)}}, Ptt3())
     robots = {
-        "sliders": (VirtualTripod(Ptt3(), {"db1": 0.3}, play), (-270.0, -230.0), 80, (False, True), 0.005),
+        "sliders": (VirtualRobot(Ptt3(), {"db1": 0.3}, effects=play), (-270.0, -230.0), 80, (False, True), 0.005),
         "tall": (
-            VirtualTripod(Ptt3(**_TALL, rail_inclination_rad=np.pi / 2), {"db2": 0.2}),
+            VirtualRobot(Ptt3(**_TALL, rail_inclination_rad=np.pi / 2), {"db2": 0.2}),
             (0.0, 30.0),
             60,
             (False,),

@@ -12,8 +12,9 @@ def main(settings, inputs, outputs):
     nominal, info = settings["nominal"], tables.read(inputs["campaigns"]).iloc[0]
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
-    fits = campaign_fit.fit_sets(measurements, setup.mechanism(nominal), calibration, info["noise_mm"])
-    truth = setup.true_deviations(nominal, settings["truth"])
+    robot = setup.measured_robot(nominal, measurements)
+    fits = campaign_fit.fit_sets(measurements, robot, calibration, info["noise_mm"])
+    truth = setup.true_deviations(robot, settings["truth"])
     tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from rrru.campaign.schemas import TABLES
+from rrru.campaign.schemas import TABLES, measurement_table
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies import campaigns, setup
@@ -23,7 +23,12 @@ def main(settings, inputs, outputs):
         measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))
         notes, registration = ingested.notes, ingested.registration
     measurements, singular = campaigns.with_singularities(robot, measurements, settings["singularity_margin"])
-    noise = campaigns.noise(robot, measurements, section.get("noise_mm"), settings["use_near_singularity"])
+    noise = campaigns.noise(
+        setup.measured_robot(nominal, measurements),
+        measurements,
+        section.get("noise_mm"),
+        settings["use_near_singularity"],
+    )
     notes = (*notes, *campaigns.unmatched_sets(settings["sets"], measurements))
     row = campaigns.campaign_row(section, measurements, singular, noise, notes, registration)
     if row["notes"]:
@@ -34,8 +39,7 @@ def main(settings, inputs, outputs):
         "workspace": campaigns.workspace_table(robot, measurements).assign(campaign=name),
         "campaigns": pd.DataFrame([row]).assign(campaign=name),
     }
-    kind = "measurements" if robot.drive_unit == "rad" else "slider_measurements"
-    tables.write_all(TABLES, {kind: measurements}, {kind: outputs["measurements"]})
+    tables.write_all((measurement_table(robot),), {"measurements": measurements}, outputs)
     tables.write_all(TABLES, frames, outputs)
 
 

@@ -13,7 +13,8 @@ from rrru.studies import setup
 def main(settings, inputs, outputs):
     """Write the campaign's errors point by point and summed up."""
     nominal = settings["nominal"]
-    measurements, mechanism = tables.read(inputs["measurements"]), setup.mechanism(nominal)
+    measurements = tables.read(inputs["measurements"])
+    mechanism = setup.measured_robot(nominal, measurements)
     genetic = (tables.read(inputs[name]) for name in ("genetic", "genetic_parameters"))
     typical = typical_parameters(*genetic, mechanism.parameters.names)
     parameters = pd.concat([tables.read(inputs["parameters"])[typical.columns], typical], ignore_index=True)

@@ -4,7 +4,7 @@ import pandas as pd
 
 from rrru.figures.drawing import draw_all
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.schemas import TABLES
+from rrru.gap.schemas import tables_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
 from rrru.store import tables
@@ -14,15 +14,16 @@ from rrru.studies import setup
 
 def main(settings, inputs, outputs):
     """Write the verdict and everything behind it, and draw it."""
-    nominal, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
+    measurements, masses = tables.read(inputs["measurements"]), Masses(**settings["masses"])
+    nominal = setup.measured_robot(settings["robot"], measurements)
     robot = MeasuredRobot(nominal, masses, settings["noise_mm"], settings["campaign"])
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
-    result = diagnose(tables.read(inputs["measurements"]), robot, chosen)
+    result = diagnose(measurements, robot, chosen)
     points = result.tables.pop("gap_points")
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     frames = {name: frame.assign(campaign=settings["campaign"]) for name, frame in frames.items()}
     frames["gap_points"] = points
-    tables.write_all(TABLES, frames, outputs)
+    tables.write_all(tables_of(nominal), frames, outputs)
     draw_all(settings["figures"], {name: outputs[name] for name in frames}, settings["options"], outputs)
 
 

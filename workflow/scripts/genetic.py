@@ -7,6 +7,7 @@ from rrru.fit.campaign_fit import select
 from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
+from rrru.robots.catalogue import searched_set
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
@@ -14,24 +15,36 @@ from rrru.studies import setup
 
 def main(settings, inputs, outputs):
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
-    measurements = tables.read(inputs["measurements"])
+    searched = searched_set(settings["nominal"]["name"])
+    frames = _runs(settings, inputs, searched) if searched else _nothing()
+    frames = {table: frame.assign(campaign=settings["campaign"]) for table, frame in frames.items()}
+    tables.write_all(TABLES, frames, outputs)
+
+
+def _runs(settings, inputs, searched):
+    """Frames by table of all runs; searched: the set of parameters that they search."""
+    measurements, genetic = tables.read(inputs["measurements"]), settings["genetic"]
     name, nominal, calibration = settings["campaign"], settings["nominal"], settings["calibration"]
-    robots = setup.mechanism(nominal, "tied"), setup.mechanism(nominal)
-    genetic = settings["genetic"]
+    robots = [setup.measured_robot(nominal, measurements, one) for one in (searched, None)]
     runs = Runs(GeneticSettings.from_config(genetic), genetic["seeds"], settings["seed"], (name,))
     results = []
     for label, patterns in tqdm(calibration["sets"].items(), desc=f"genetic {name}", unit="set"):
-        searched, identified = (
+        wide, identified = (
             select(measurements, robot, patterns, calibration["use_near_singularity"]) for robot in robots
         )
-        if searched is not None:
-            results.append(study_set(searched, identified, label, runs))
+        if wide is not None:
+            results.append(study_set(wide, identified, label, runs))
     frames = {table: pd.concat([part[table] for part in results], ignore_index=True) for table in results[0]}
-    truth = setup.true_deviations(nominal, settings["truth"])
+    truth = setup.true_deviations(robots[1], settings["truth"])
     fits = (tables.read(inputs[table]) for table in ("calibrations", "parameters"))
     compared = against_least_squares(frames["genetic"], frames["genetic_parameters"], *fits, truth)
-    frames["genetic_against_least_squares"] = compared
-    tables.write_all(TABLES, {table: frame.assign(campaign=name) for table, frame in frames.items()}, outputs)
+    return frames | {"genetic_against_least_squares": compared}
+
+
+def _nothing():
+    """Empty frames by table, for a robot without an objective fast enough."""
+    names = ("genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares", "timings")
+    return {table.name: pd.DataFrame(columns=table.names) for table in TABLES if table.name in names}
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Kinematics, singularities, backlash and repeatability of paper B's robot, and what its experiments measure."""
 
-from rrru.campaign.schemas import TABLES as CAMPAIGN_TABLES
+from rrru.campaign.schemas import measurement_table
+from rrru.robots.ptt3 import Ptt3
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.ptt3 import bench
@@ -20,7 +21,7 @@ def main(settings, inputs, outputs):
     }
     tables.write_all(TABLES, frames, outputs)
     for name, frame in _measured(settings, backlash).items():
-        tables.write_all(CAMPAIGN_TABLES, {"slider_measurements": frame}, {"slider_measurements": outputs[name]})
+        tables.write_all((measurement_table(Ptt3()),), {"measurements": frame}, {"measurements": outputs[name]})
 
 
 def _measured(settings, backlash):

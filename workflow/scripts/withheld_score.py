@@ -11,8 +11,9 @@ from rrru.studies.withheld.score import score_chunk
 def main(settings, inputs, outputs):
     """Write scores and limits of the robots of a chunk."""
     frames = {name.removeprefix("withheld_"): tables.read(path) for name, path in inputs.items()}
-    library = GapSettings.from_config(settings["gap"]).library()
-    scores, limits = score_chunk(**frames, conditions=Conditions.from_config(settings), library=library)
+    conditions = Conditions.from_config(settings)
+    library = GapSettings.from_config(settings["gap"]).library(conditions.mechanism)
+    scores, limits = score_chunk(**frames, conditions=conditions, library=library)
     tables.write_all(TABLES, {"withheld_scores": scores, "withheld_limits": limits}, outputs)
 
 

@@ -10,15 +10,15 @@ import pandas as pd
 
 from rrru.campaign.ingest.cells import read_cells
 from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, path_length, resolution
-from rrru.campaign.ingest.columns import KNOWN, MM, RAD, REQUIRED, convert, resolve
+from rrru.campaign.ingest.columns import MM, RAD, REQUIRED, convert, known_columns, resolve
 from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts, frame_limit
 from rrru.campaign.ingest.outliers import flag_outliers, reproduced
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration, register
-from rrru.campaign.ingest.sheet import COMMAND, DRIVES, MEASURED, Sheet
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, Sheet
 from rrru.campaign.measurements import command, measured, vector_columns
 from rrru.errors import ConfigError, FitError
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 
 _CHOICES = {
     "unit": tuple(MM),
@@ -53,9 +53,6 @@ class IngestSpec:
         given = {key: getattr(self, key) for key in _CHOICES}
         wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(_CHOICES[key])}" for key in _CHOICES]
         wrong = [text for text, key in zip(wrong, _CHOICES, strict=True) if given[key] not in _CHOICES[key]]
-        wrong += [
-            f"columns has the key {key!r}; allowed: {', '.join(KNOWN)}" for key in self.columns if key not in KNOWN
-        ]
         doubled = [name for name in theirs if theirs.count(name) > 1]
         wrong += [f"columns gives {name!r} two meanings; allowed: one of our names per column" for name in doubled]
         if points and self.frame != "register":
@@ -82,7 +79,7 @@ class Ingested:
     registration: Registration | None
 
 
-def ingest(spec: IngestSpec, mechanism: Mechanism) -> Ingested:
+def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     """Measurement table of a file, for the robot that it was measured on.
 
     Positions are brought to mm and the robot frame, angles to rad; drive angles that the file lacks are those of the
@@ -112,14 +109,18 @@ def ingest(spec: IngestSpec, mechanism: Mechanism) -> Ingested:
     return Ingested(table, (*notes, *more), registration)
 
 
-def _read(spec: IngestSpec, mechanism: Mechanism) -> tuple[Sheet, list[str]]:
+def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     """The file as a sheet with numbered runs and points, and what the user should know about its columns."""
+    known = known_columns(mechanism)
+    for key in spec.columns:
+        if key not in known:
+            raise ConfigError(f"ingest of {spec.path}: columns has the key {key!r}; allowed: {', '.join(known)}")
     problems, notes = Problems(spec.path), []
     names, rows, cells = read_cells(Path(spec.path), problems)
-    found, extra = resolve(spec, names, DRIVES[mechanism.drive_unit], problems)
+    found, extra = resolve(spec, names, mechanism, problems)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
-    frame = convert(spec, found, cells, rows, problems)
+    frame = convert(spec, mechanism, found, cells, rows, problems)
     if not set(REQUIRED) <= set(frame) or len(set(names)) < len(names):
         problems.refuse()
     frame, more = number_runs(frame)
@@ -136,7 +137,7 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
             notes.append(blank if name in found else f"no column {name}: it is unknown")
     if not set(sheet.drives) <= set(frame):
         which = f"{sheet.mechanism.name}, nominal, elbow {sheet.spec.elbow}"
-        names = f"{sheet.drives[0]} to {sheet.drives[2]}"
+        names = f"{sheet.drives[0]} to {sheet.drives[-1]}"
         notes.append(f"no {sheet.drive_name}: {names} computed from the commanded positions ({which})")
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")

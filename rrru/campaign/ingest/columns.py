@@ -7,12 +7,10 @@ from decimal import Decimal
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.ingest.sheet import COMMAND, DRIVES, MEASURED, drive_name
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, drive_name
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
-_ANY_DRIVES = (*DRIVES["rad"], *DRIVES["mm"])
-OPTIONAL = ("run", "point", "time_s", *_ANY_DRIVES, "speed_mm_s", "payload_kg")
-KNOWN = (*REQUIRED, *OPTIONAL)
+_BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
 MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
 RAD = {"rad": 1.0, "deg": np.pi / 180.0}
 
@@ -31,16 +29,21 @@ _LIMITS = {
 }
 
 
-def resolve(spec, names, drives, problems):
+def known_columns(mechanism):
+    """Our names of all columns that a robot's file may have."""
+    return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES)
+
+
+def resolve(spec, names, mechanism, problems):
     """{our name: the file's name} of the columns that the file has, and its columns that nobody declared.
 
-    drives: names of the three columns of actuator values that the robot has. Missing columns, repeated ones and, unless
-    `extra_columns` is "ignore", undeclared ones are noted.
+    Missing columns, repeated ones and, unless `extra_columns` is "ignore", undeclared ones are noted.
     """
+    drives = mechanism.parts.columns
     for name in sorted({name for name in names if names.count(name) > 1}):
         value = f"{names.count(name)} columns of this name"
         problems.add("repeated column", column=name, value=value, allowed="each name once")
-    wanted = {ours: spec.columns.get(ours, ours) for ours in KNOWN if ours in drives or ours not in _ANY_DRIVES}
+    wanted = {ours: spec.columns.get(ours, ours) for ours in known_columns(mechanism)}
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
     extra = [name for name in names if name not in found.values()]
     for ours, theirs in wanted.items():
@@ -50,7 +53,7 @@ def resolve(spec, names, drives, problems):
     given = ", ".join(found[name] for name in drives if name in found)
     if 0 < sum(name in found for name in drives) < len(drives):
         allowed = f"all of {', '.join(drives)}, or none"
-        problems.add("missing column", column=given, value=f"some {drive_name(drives)}", allowed=allowed)
+        problems.add("missing column", column=given, value=f"some {drive_name(mechanism)}", allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
         for name in dict.fromkeys(extra):
@@ -61,7 +64,7 @@ def resolve(spec, names, drives, problems):
     return found, extra
 
 
-def convert(spec, found, cells, rows, problems):
+def convert(spec, mechanism, found, cells, rows, problems):
     """Frame of our columns in mm and rad, indexed by the row numbers (n,); NaN, or "" as a name, where a cell is noted.
 
     found: {our name: the file's name}; cells: {the file's name: cells (n,) that are text, numbers or None}. An optional
@@ -73,9 +76,10 @@ def convert(spec, found, cells, rows, problems):
         allowed = "three numbers: drop the row of a point that was not measured"
         problems.add("missed point", row=row, column=", ".join(measured), value="blank", allowed=allowed)
     filled = {ours for ours, theirs in found.items() if ours in REQUIRED or not all(map(_blank, cells[theirs]))}
-    filled |= {name for drives in DRIVES.values() if filled & set(drives) for name in drives}
-    factor = dict.fromkeys((*COMMAND, *MEASURED, *DRIVES["mm"]), MM[spec.unit])
-    factor |= dict.fromkeys(DRIVES["rad"], RAD[spec.angle_unit])
+    drives = {drive.column: drive.unit for drive in mechanism.parts.drives}
+    filled |= set(drives) if filled & set(drives) else set()
+    factor = dict.fromkeys((*COMMAND, *MEASURED), MM[spec.unit])
+    factor |= {name: MM[spec.unit] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
     frame = pd.DataFrame(index=pd.Index(rows))
     for ours, theirs in found.items():
         if ours == "trajectory":

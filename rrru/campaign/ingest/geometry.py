@@ -8,7 +8,6 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.columns import MM
 from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, position_text
-from rrru.robots.rrru3 import Rrru3
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
 DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
@@ -153,7 +152,7 @@ def _upside_down(command, drive, sheet):
     flipped = np.abs(back[:, 2] + command[:, 2]) < np.abs(back[:, 2] - command[:, 2])
     if not len(command) or flipped.mean() < _MANY:
         return False
-    way = "DOWN" if isinstance(sheet.mechanism, Rrru3) else "UP"
+    way = "DOWN" if sheet.mechanism.up[2] < 0.0 else "UP"
     at, turned = command[flipped][0, 2], back[flipped][0, 2]
     value = f"{at:.6g} mm, where the {sheet.drive_name} of that position bring the robot to {turned:.6g} mm"
     sheet.note("upside down", COMMAND[2], value, f"positions in the robot frame, whose z points {way} from the base")
@@ -162,10 +161,11 @@ def _upside_down(command, drive, sheet):
 
 def _check_drives(known, drive, sheet):
     """Note drive angles or slider positions that are not those (n, 3) of the commanded positions."""
-    unit = sheet.mechanism.drive_unit
+    units = sheet.mechanism.parts.units
     given, command = known[[*sheet.drives]].to_numpy(), rows.command(known)
-    off, limit = np.abs(given - drive), DRIVE_TOLERANCE[unit]
-    bad = off > limit
+    off, limits = np.abs(given - drive), _tolerances(sheet.mechanism)
+    bad = off > limits
+    unit, limit = units[0], limits[0]
     allowed = f"within {limit:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
     if bad.any(axis=1).mean() > _MANY and (advice := _drive_advice(given, drive, command, sheet)):
         read = f" when read in {sheet.spec.angle_unit}" if unit == "rad" else ""
@@ -174,8 +174,13 @@ def _check_drives(known, drive, sheet):
         sheet.note("angles", sheet.drives, value, f"{allowed}; {advice}")
         return
     for i, k in np.argwhere(bad):
-        needs = f"while the commanded position {position_text(command[i])} needs {drive[i, k]:.6f} {unit}"
-        sheet.note("angles", sheet.drives[k], f"{given[i, k]:.6f} {unit}, {needs}", allowed, known.index[i])
+        needs = f"while the commanded position {position_text(command[i])} needs {drive[i, k]:.6f} {units[k]}"
+        sheet.note("angles", sheet.drives[k], f"{given[i, k]:.6f} {units[k]}, {needs}", allowed, known.index[i])
+
+
+def _tolerances(mechanism):
+    """Largest differences (K,) of actuator values in their units."""
+    return np.array([DRIVE_TOLERANCE[unit] for unit in mechanism.parts.units])
 
 
 def _drive_advice(given, drive, command, sheet):
@@ -187,10 +192,10 @@ def _drive_advice(given, drive, command, sheet):
         (given, mechanism.inverse(command, elbow=elbow), f"elbow: {elbow} makes them fit"),
         (given[:, ::-1], drive, "the legs seem to be numbered the other way round"),
     ]
-    if mechanism.drive_unit == "rad":
+    if "rad" in mechanism.parts.units:
         candidates.insert(0, (given * factor, drive, f"angle_unit: {other} makes them fit"))
     for candidate, wanted, advice in candidates:
-        if (np.abs(candidate - wanted) < DRIVE_TOLERANCE[mechanism.drive_unit]).all(axis=1).mean() > _MOST:
+        if (np.abs(candidate - wanted) < _tolerances(mechanism)).all(axis=1).mean() > _MOST:
             return advice
     return None
 

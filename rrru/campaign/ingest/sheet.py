@@ -6,14 +6,12 @@ from typing import Any
 import pandas as pd
 
 from rrru.campaign.ingest.problems import Problems
-from rrru.campaign.measurements import actuator_columns
-from rrru.robots.mechanism import Mechanism
+from rrru.robots.robot import Robot
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
+_DRIVE_NAMES = {frozenset({"rad"}): "drive angles", frozenset({"mm"}): "slider positions"}
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
-# columns of the commanded actuator values by their unit: drive angles or slider positions
-DRIVES = {unit: tuple(actuator_columns(unit)) for unit in ("rad", "mm")}
 
 
 @dataclass(frozen=True)
@@ -25,20 +23,20 @@ class Sheet:
     """
 
     spec: Any
-    mechanism: Mechanism
+    mechanism: Robot
     problems: Problems
     found: dict
     frame: pd.DataFrame
 
     @property
     def drives(self):
-        """Names of the three columns of actuator values."""
-        return DRIVES[self.mechanism.drive_unit]
+        """Names of the columns of actuator values."""
+        return tuple(self.mechanism.parts.columns)
 
     @property
     def drive_name(self):
         """What the columns of actuator values hold."""
-        return drive_name(self.drives)
+        return drive_name(self.mechanism)
 
     def note(self, kind, ours, value, allowed, row=None):
         """Note a problem in columns of ours, one name or several, or None."""
@@ -52,9 +50,9 @@ class Sheet:
         self.problems.refuse()
 
 
-def drive_name(drives):
-    """What columns of actuator values hold."""
-    return "drive angles" if drives == DRIVES["rad"] else "slider positions"
+def drive_name(mechanism):
+    """What a robot's columns of actuator values hold."""
+    return _DRIVE_NAMES.get(frozenset(mechanism.parts.units), "actuator values")
 
 
 def position_text(position):

@@ -12,8 +12,8 @@ import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.plant.tracker import measure
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
-from rrru.robots.mechanism import make_mechanism
 from rrru.seeds import stream
 
 

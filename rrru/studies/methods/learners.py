@@ -50,7 +50,7 @@ class Candidates:
 def measured_points(mechanism, measurements):
     """Residuals of the usable points of a measurement table; methods choose what is fitted to them."""
     frame = measurements[rows.usable(measurements)]
-    return Residuals(mechanism, rows.actuators(frame), rows.measured(frame), rows.command(frame))
+    return Residuals(mechanism, rows.actuators(frame, mechanism), rows.measured(frame), rows.command(frame))
 
 
 def _with(points, parameter_set):

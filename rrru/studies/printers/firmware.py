@@ -29,7 +29,7 @@ def residuals_of(printer, parameter_set=None):
 
 def own_numbers(mechanism, deviations):
     """A printer's own numbers (p,), NAMES in UNITS, under deviations (p,), and their derivative (p, p) by these."""
-    legs = mechanism.legs(deviations)
+    legs = mechanism.numbers(deviations)
     arm, radius = legs[:, 1], legs[0, 2]
     root = np.sqrt(arm**2 - radius**2)
     angle = np.degrees(np.asarray(mechanism.azimuth_rad) + legs[:, 3])

@@ -134,7 +134,7 @@ def point_means(experiment, measurements):
     measurements: of passes in one direction.
     """
     passes = measurements["run"].nunique()
-    every = (rows.command(measurements), rows.actuators(measurements), rows.measured(measurements))
+    every = (rows.command(measurements), rows.actuators(measurements, experiment.model), rows.measured(measurements))
     return tuple(experiment.curve.without_run_up(v.reshape(passes, -1, 3)).mean(axis=0) for v in every)
 
 

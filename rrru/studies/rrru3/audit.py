@@ -8,7 +8,6 @@ import numpy as np
 from rrru.fit.residuals import Residuals
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.robots.rrru3 import Rrru3
 from rrru.studies import paper
@@ -124,12 +123,10 @@ def _largest_error():
 )
 def _radii():
     """Largest change on group 1, spatial closure: r alone 1 mm larger, and both R and r 1 mm larger."""
-    points, geometry = _line()[::5], VirtualRobot().geometry
+    points = _line()[::5]
     theta = _ROBOT.inverse(points)
-    passive = _ROBOT.passive_angles(points, theta)
-    changed = (geometry.lengths_mm + np.array([radius, 0.0, 0.0, 0.0, 1.0]) for radius in (0.0, 1.0))
-    moved = (replace(geometry, lengths_mm=lengths).solve(theta, passive).position_mm for lengths in changed)
-    return tuple(np.abs(position - points).max() for position in moved)
+    changed = (_ROBOT.twists_of({"dR": radius, "dr": 1.0}) for radius in (0.0, 1.0))
+    return tuple(np.abs(_ROBOT.solve(theta, points, twists).position_mm - points).max() for twists in changed)
 
 
 @finding(

@@ -45,7 +45,11 @@ def _measured(campaign, attained, generator):
 
 def _numbers(campaign, measurements, attained, chosen, method, number):
     """The numbers of one draw; chosen: rows (n,) of the line and of the spiral calibration."""
-    mechanism, target, theta = campaign.robot.mechanism, rows.command(measurements), rows.actuators(measurements)
+    mechanism, target, theta = (
+        campaign.robot.mechanism,
+        rows.command(measurements),
+        rows.actuators(measurements, campaign.robot.mechanism),
+    )
     measured = _measured(campaign, attained, campaign.generator("redraw", number, "measure"))
     fits, after = [], []
     for calibrated in chosen:

@@ -8,6 +8,7 @@ from rrru.campaign import trajectories
 from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.rrru3 import Rrru3
 
 _LEGS = (1, 2, 3)
 _OFFSETS = ("offset_first_mm", "offset_second_mm", "offset_third_mm")
@@ -86,7 +87,7 @@ class Twin:
         return kind(
             mechanism=mechanism,
             deviations=section["errors"],
-            effects=active_effects(section["effects"]),
+            effects=active_effects(section["effects"], Rrru3()),
             non_repeatability_mm=section["wobble_mm"],
         )
 

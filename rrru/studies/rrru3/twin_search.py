@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 
 from rrru.campaign.plan import Plan, make_run
-from rrru.effects.protocol import Contribution
+from rrru.effects.protocol import together
 from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.plant.virtual_robot import VirtualRobot, non_repeatability
 from rrru.robots import singularity
@@ -39,12 +39,13 @@ class TranslationalRobot(VirtualRobot):
 
     def positions(self, motion, target):
         """Platform centres (n, 3); clearance to first order."""
-        change = sum((effect.contribute(motion) for effect in self.effects), Contribution())
+        change = together(self.effects, motion)
         named = {name: value for name, value in self.deviations.items() if name != "dr"}
         deviations = self.mechanism.parameters.vector(named | {"da": self.deviations["dr"]})
-        solved = self.mechanism.forward(motion.drive + change.drive, deviations, target)
-        along = np.einsum("nlk,nlk->nl", motion.force_direction, change.joint_mm)
-        return solved + np.linalg.solve(motion.force_direction, along[..., None])[..., 0], np.zeros(len(target))
+        solved = self.mechanism.forward(motion.drive + self.mechanism.drive_errors(change.twists), deviations, target)
+        sites = [self.mechanism.legs.site_numbers[site] for (site,) in self.mechanism.parts.members]
+        along = singularity.leg_forces(self.mechanism, target, self.mechanism.inverse(target))
+        return solved + np.linalg.solve(along, change.twists[:, sites, 0, None])[..., 0], np.zeros(len(target))
 
 
 @dataclass(frozen=True)

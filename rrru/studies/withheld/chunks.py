@@ -28,7 +28,7 @@ def chunks(section):
 
 def check(config):
     """Raise ConfigError where the `withheld` section names a campaign or an effect that does not exist."""
-    from rrru.effects.library import EFFECTS
+    from rrru.studies.withheld.outside import EFFECTS
 
     section = config["withheld"]
     for key, known in (("field", config["campaigns"]), ("effects", EFFECTS)):

@@ -10,12 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from rrru.campaign.trajectories import from_config
-from rrru.effects.library import EFFECTS
 from rrru.errors import UnreachableError
 from rrru.robots import singularity
-from rrru.robots.first_order import FirstOrder
 from rrru.seeds import stream
-from rrru.studies.withheld.outside import CAUSES, OUTSIDE
+from rrru.studies.withheld.outside import CAUSES, EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import PASSES, Acting, Robot, true_gap_mm
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
@@ -164,8 +162,8 @@ def _first_order_gap_mm(robot, acting, conditions):
     mechanism = conditions.mechanism
     campaign = robot.campaign(conditions)
     motion = campaign.robot.motion(campaign.plan, mechanism.inverse)
-    legs = FirstOrder(mechanism, motion.position_mm, motion.drive)
-    moved = legs.move(acting.law.contribute(motion, acting.values)).ravel()
-    base = mechanism.parameter_jacobian(motion.position_mm, motion.drive).reshape(moved.size, -1)
+    at = mechanism.map_at(motion.drive, motion.position_mm)
+    moved = at.move(acting.law.contribute(motion, acting.values).twists).ravel()
+    base = at.columns(mechanism.directions).reshape(moved.size, -1)
     basis, _ = np.linalg.qr(base)
     return float(np.sqrt(((moved - basis @ (basis.T @ moved)) ** 2).sum() / len(motion)))

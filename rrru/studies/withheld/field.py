@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from rrru.effects.library import EFFECTS
 from rrru.errors import ConfigError
+from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.states import VERDICT
 from rrru.studies.withheld.verdicts import in_order, is_outside, scores
 

@@ -5,10 +5,12 @@ Effects as the library's are, used by the plant alone; sizes and places are assu
 
 import numpy as np
 
-from rrru.effects.library import EFFECTS
-from rrru.effects.protocol import Contribution, Effect, leg_parameters, plain_coordinates
+from rrru.effects.library import BY_DEFAULT, library
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
+from rrru.robots.legs import WORLD
+from rrru.robots.rrru3 import Rrru3
 
 # a rest this long ends a run
 _REST_S = 10.0
@@ -19,33 +21,33 @@ _SLACK_MM = 1080.0
 _PERIODS_S = (7.3, 19.0, 41.0)
 
 
-def _shifted(shift_mm):
-    """The platform shifted by (n, 3): all three U joints alike."""
-    return Contribution(joint_mm=np.repeat(shift_mm[:, None], 3, axis=1))
+def _shifted(motion, shift_mm):
+    """What is measured shifted by (n, 3)."""
+    return motion.at({WORLD: np.concatenate([shift_mm, np.zeros_like(shift_mm)], axis=1)})
 
 
 def _rehoming(motion, values):
     """Drives that find their zero anew before every run, off by up to their switch's repeatability (rad)."""
     run = np.cumsum(np.diff(motion.time_s, prepend=motion.time_s[0]) > _REST_S)
     offset = np.random.default_rng(int(values[3])).uniform(-1.0, 1.0, (run[-1] + 1, 3))
-    return Contribution(drive=values[:3] * offset[run])
+    return motion.at_drives(values[:3] * offset[run])
 
 
 def _tripod_sway(motion, values):
     """The tracker's tripod sways: a sine in time with an amplitude (mm) per axis."""
-    return _shifted(np.sin(2.0 * np.pi * motion.time_s / values[3])[:, None] * values[:3])
+    return _shifted(motion, np.sin(2.0 * np.pi * motion.time_s / values[3])[:, None] * values[:3])
 
 
 def _tripod_creep(motion, values):
     """The tracker's tripod sinks into the floor at a constant speed (mm/s) per axis."""
-    return _shifted(motion.time_s[:, None] * values)
+    return _shifted(motion, motion.time_s[:, None] * values)
 
 
 def _cable_pull(motion, values):
     """A cable to a fixed anchor, slack when near, pulls the platform off like a spring: mm per mm of stretch."""
     reach = _ANCHOR_MM - motion.position_mm
     length = np.linalg.norm(reach, axis=1, keepdims=True)
-    return _shifted(values[0] * np.maximum(length - _SLACK_MM, 0.0) * reach / length)
+    return _shifted(motion, values[0] * np.maximum(length - _SLACK_MM, 0.0) * reach / length)
 
 
 def _floor_tilt(motion, values):
@@ -53,13 +55,13 @@ def _floor_tilt(motion, values):
     weight = (_PLATFORM_KG + np.nan_to_num(motion.payload_kg))[:, None] * (GRAVITY_MM_S2 / 1000.0)
     moment = weight * motion.position_mm[:, [1, 0]] * [1.0, -1.0]
     tilt = np.concatenate([values * moment, np.zeros((len(motion), 1))], axis=1)
-    return _shifted(np.cross(tilt, motion.position_mm))
+    return _shifted(motion, np.cross(tilt, motion.position_mm))
 
 
 def _pulley_ripple(motion, values):
     """A belt pulley off centre that turns five times per turn of the drive arm: sine and cosine (rad) per drive."""
     sine, cosine = np.reshape(values, (3, 2)).T
-    return Contribution(drive=sine * np.sin(5.0 * motion.drive) + cosine * np.cos(5.0 * motion.drive))
+    return motion.at_drives(sine * np.sin(5.0 * motion.drive) + cosine * np.cos(5.0 * motion.drive))
 
 
 def _make(law, parameters, typical, shapes=({},)):
@@ -92,5 +94,6 @@ OUTSIDE = {
         _make(_pulley_ripple, _RIPPLES, 3e-4),
     )
 }
-# whatever may act in a robot of the check
+# of the library and from outside, whatever may act in a robot of the check, all of which are 3-RRRUs
+EFFECTS = {name: effect for name, effect in library(Rrru3()).items() if name in BY_DEFAULT}
 CAUSES = EFFECTS | OUTSIDE

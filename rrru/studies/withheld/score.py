@@ -5,10 +5,10 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from rrru.effects.library import EFFECTS
 from rrru.gap.case import State, make_case
 from rrru.studies.withheld.draw import fresh
 from rrru.studies.withheld.oracle import limits, with_truth
+from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.robots import Robot, noise_free
 from rrru.studies.withheld.states import state_of
 from rrru.studies.withheld.verdicts import scores

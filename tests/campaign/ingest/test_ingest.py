@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.errors import ConfigError, IngestError
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 from tests.places import DATA
 from tests.schemas import check
@@ -229,7 +231,6 @@ def test_thousands_of_rows_are_taken(field, tmp_path):
         ({"frame": "tracker"}, "frame is 'tracker'; allowed: robot, register"),
         ({"extra_columns": "keep"}, "extra_columns is 'keep'; allowed: refuse, ignore"),
         ({"elbow": "up"}, "elbow is 'up'; allowed: out, in"),
-        ({"columns": {"speed": "v"}}, "key 'speed'; allowed: trajectory, command_x_mm"),
         ({"columns": {"run": "n", "point": "n"}}, "'n' two meanings"),
         ({"registration_points": ((1, 2),)}, "allowed: frame register"),
         ({"frame": "register", "registration_points": (3, 4, 5)}, r"allowed: pairs \(run, point\)"),
@@ -238,6 +239,15 @@ def test_thousands_of_rows_are_taken(field, tmp_path):
 def test_settings_that_do_not_exist_are_refused(setting, said):
     with pytest.raises(ConfigError, match=said):
         IngestSpec("f.csv", **setting)
+
+
+@pytest.mark.parametrize(
+    ("robot", "key"), [(ROBOT, "speed"), (ROBOT, "slider1_mm"), (Ptt3(), "theta1_rad"), (Delta(), "slider1_mm")]
+)
+def test_names_of_columns_that_the_robot_does_not_have_are_refused(robot, key):
+    said = f"key '{key}'; allowed: trajectory, command_x_mm, .*time_s, {robot.parts.columns[0]}, "
+    with pytest.raises(ConfigError, match=said):
+        ingest(IngestSpec("f.csv", columns={key: "v"}), robot)
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -7,10 +7,10 @@ from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.errors import IngestError
-from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
-from tests.schemas import check
+from tests.schemas import check_measurements
 
 ROBOTS = {
     "ptt3": (Ptt3(), -250.0, {"db1": 0.3, "dL2": 0.2}),
@@ -27,7 +27,7 @@ def measured(request):
     plan = make_plan(
         [curve], [{"payload_kg": 0.0, "reverse": False}, {"payload_kg": 2.0, "reverse": True}], 80.0, 400.0, 5.0
     )
-    table, _ = VirtualTripod(robot, deviations).run(plan, 0.01, np.random.default_rng(0))
+    table, _ = VirtualRobot(robot, deviations).run(plan, 0.01, np.random.default_rng(0))
     return request.param, robot, table.drop(columns="status")
 
 
@@ -40,7 +40,8 @@ def _taken(table, robot, folder, **options):
 def test_a_file_is_taken_as_it_stands(measured, tmp_path):
     name, robot, table = measured
     found = _taken(table, robot, tmp_path)
-    frame = check("slider_measurements" if name == "ptt3" else "measurements", found.measurements)
+    frame = check_measurements(robot, found.measurements)
+    assert set(DRIVES[name]) < set(frame)
     assert found.notes == () and (frame["status"] == "ok").all()
     for column in table.columns.drop("trajectory"):
         np.testing.assert_allclose(frame[column], table[column], rtol=1e-12, atol=1e-12)
@@ -73,7 +74,7 @@ def test_a_robot_that_stands_on_its_head_is_refused(tmp_path):
     robot, height, _ = ROBOTS["ptt3"]
     curve = Spiral("curve", (0.0, 0.0), (40.0, 80.0), (height - 20.0, height + 20.0), 2.0, 50)
     plan = make_plan([curve], [{"payload_kg": 0.0, "reverse": False}], 80.0, 400.0, 5.0)
-    table, _ = VirtualTripod(robot).run(plan, 0.01, np.random.default_rng(0))
+    table, _ = VirtualRobot(robot).run(plan, 0.01, np.random.default_rng(0))
     turned = table.drop(columns=["status", *DRIVES["ptt3"]])
     turned[["command_z_mm", "measured_z_mm"]] *= -1.0
     with pytest.raises(IngestError, match="whose z points UP from the base"):

@@ -10,7 +10,7 @@ from snakemake.utils import validate
 
 from rrru.errors import ConfigError
 from rrru.genetic.settings import GeneticSettings
-from rrru.plant.virtual_tripod import VirtualTripod
+from rrru.plant.virtual_robot import VirtualRobot
 from rrru.studies.methods import compare, learners, parts, regions
 from tests.places import ROOT
 from tests.schemas import check
@@ -119,7 +119,7 @@ def test_the_points_needed_are_the_fewest_from_which_on_more_bring_next_to_nothi
 def test_a_perfect_robot_is_left_as_it_is():
     """Without errors and noise no method may move the robot off its targets."""
     one = regions.trial(PTT3)
-    still = replace(one, robot=VirtualTripod(one.robot.mechanism), noise_mm=0.0)
+    still = replace(one, robot=VirtualRobot(one.robot.mechanism), noise_mm=0.0)
     _, curve, _ = compare.compare(still, [60], NETWORK, GENETIC)
     after = curve.groupby("method")["after_max_mm"].max()
     # the genetic algorithm comes near, never there

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrru.robots.spheres import lower_intersection
 from rrru.studies.printers import firmware, printer_causes, printer_fit
 from rrru.studies.printers.readings import read
 from tests.places import DATA
@@ -40,10 +41,10 @@ def simulated(
     """
     own = firmware.residuals_of(printer, "distances")
     robot, sliders = own.mechanism, own.actuators * (1.0 + np.asarray(steps))
-    legs = robot.legs(deviations)
+    legs = robot.numbers(deviations)
     height = (sliders + legs[:, 0])[..., None]
     shift = 0.0 if lean is None else height * (lean[:, :1] * robot.radial + lean[:, 1:] * robot.tangent)
-    places = robot.forward_of_legs(sliders, legs, shift)
+    places = lower_intersection(robot.ends(sliders, legs) + shift, legs[:, robot.LINK])
     n, m = len(printer.height_mm), len(printer.distance_mm)
     stretch, skew = shape
     between = (places[n : n + m] - places[n + m :]) @ np.array(

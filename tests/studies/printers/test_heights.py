@@ -48,7 +48,7 @@ def slow_place(slider, numbers):
 def test_residuals_are_measured_less_slowly_computed_readings():
     own = residuals()
     deviations = np.array([0.4, 0.003, -0.002, 0.3, -0.2, 0.1, 0.5, -0.4, 0.3])
-    legs = own.mechanism.legs(deviations)
+    legs = own.mechanism.numbers(deviations)
     root = np.sqrt(legs[:, 1] ** 2 - legs[:, 2] ** 2)
     numbers = RADIUS + 0.4, np.add(AZIMUTH, [0.003, -0.002, 0.0]), legs[:, 0] - root, np.add(ARMS, deviations[6:])
     expected = [

@@ -8,7 +8,7 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
-from rrru.robots.mechanism import make_mechanism
+from rrru.robots.catalogue import make_mechanism
 from rrru.studies.ptt3 import bench, driving, experiments, parts, results
 from rrru.studies.ptt3.learning import METHODS, learning
 
@@ -129,8 +129,8 @@ def test_a_compensated_robot_is_one_without_play():
 
 def test_the_sliders_of_the_table_are_where_the_controller_wants_them():
     frame, _ = experiment("light").campaign.run()
-    nominal = make_mechanism("ptt3", SETTINGS["robots"]["ptt3"]).inverse(rows.command(frame))
-    np.testing.assert_allclose(rows.actuators(frame), nominal, atol=1e-12)
+    robot = make_mechanism("ptt3", SETTINGS["robots"]["ptt3"])
+    np.testing.assert_allclose(rows.actuators(frame, robot), robot.inverse(rows.command(frame)), atol=1e-12)
 
 
 def test_joined_experiments_are_one_campaign_in_time():

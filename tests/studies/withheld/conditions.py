@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.dynamics import Masses
-from rrru.robots.mechanism import make_mechanism
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.robots import Conditions
 

@@ -9,16 +9,14 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.effects.library import EFFECTS
 from rrru.errors import ConfigError
 from rrru.gap.case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
-from rrru.robots.first_order import FirstOrder
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.chunks import Member, check, chunks
 from rrru.studies.withheld.oracle import limits, with_truth
-from rrru.studies.withheld.outside import OUTSIDE
+from rrru.studies.withheld.outside import EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import Robot, noise_free, true_gap_mm
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
@@ -27,7 +25,7 @@ _MECHANISM = CONDITIONS.mechanism
 
 def _calibrated(measurements):
     """Deviations (7,) and rms distance in mm of a calibration by repeated linear least squares."""
-    theta, measured = rows.actuators(measurements), rows.measured(measurements)
+    theta, measured = rows.actuators(measurements, _MECHANISM), rows.measured(measurements)
     deviations = np.zeros(7)
     for _ in range(6):
         model = _MECHANISM.forward(theta, deviations, rows.command(measurements))
@@ -142,7 +140,8 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
     motion = virtual.motion(campaign.plan, _MECHANISM.inverse)
     moved, _ = virtual.positions(motion, motion.position_mm)
     still, _ = VirtualRobot(mechanism=_MECHANISM).positions(motion, motion.position_mm)
-    first = FirstOrder(_MECHANISM, motion.position_mm, motion.drive).move(acting.law.contribute(motion, acting.values))
+    at = _MECHANISM.map_at(motion.drive, motion.position_mm)
+    first = at.move(acting.law.contribute(motion, acting.values).twists)
     np.testing.assert_allclose(moved - still, first, atol=0.02 * np.abs(first).max())
     measurements, _ = campaign.run()
     deviations, _ = _calibrated(measurements)
@@ -155,15 +154,22 @@ def test_a_cause_from_outside_is_physical_and_nothing_in_the_library_imitates_it
 def test_the_laws_from_outside_do_as_they_say():
     motion = VirtualRobot(mechanism=_MECHANISM).motion(bare(0).plan(CONDITIONS), _MECHANISM.inverse)
     run = np.cumsum(np.diff(motion.time_s, prepend=0.0) > 30.0)
-    jumps = OUTSIDE["rehoming"].contribute(motion, np.array([1e-3, 2e-3, 0.0, 1.0])).drive
+    jumps = OUTSIDE["rehoming"].contribute(motion, np.array([1e-3, 2e-3, 0.0, 1.0])).twists
+    jumps = _MECHANISM.drive_errors(jumps)
     for number in range(8):
         assert (np.ptp(jumps[run == number], axis=0) == 0.0).all()
     assert np.unique(jumps[:, 0]).size == 8 and np.abs(jumps).max(axis=0)[0] <= 1e-3 and not jumps[:, 2].any()
-    creep = OUTSIDE["tripod_creep"].contribute(motion, np.array([0.0, 1e-3, 0.0])).joint_mm
-    np.testing.assert_allclose(creep[:, 2, 1], 1e-3 * motion.time_s)
-    sway = OUTSIDE["tripod_sway"].contribute(motion, np.array([0.1, 0.0, 0.0, 10.0])).joint_mm[:, 0, 0]
+
+    def shift(name, values):
+        """Shift (n, 3) of what is measured, which is all that the cause does."""
+        twists = OUTSIDE[name].contribute(motion, np.array(values)).twists
+        assert not twists[:, 1:].any() and not twists[:, 0, 3:].any()
+        return twists[:, 0, :3]
+
+    np.testing.assert_allclose(shift("tripod_creep", [0.0, 1e-3, 0.0])[:, 1], 1e-3 * motion.time_s)
+    sway = shift("tripod_sway", [0.1, 0.0, 0.0, 10.0])[:, 0]
     np.testing.assert_allclose(sway, 0.1 * np.sin(0.2 * np.pi * motion.time_s), atol=1e-12)
-    pull = OUTSIDE["cable_pull"].contribute(motion, np.array([1e-3])).joint_mm[:, 0]
+    pull = shift("cable_pull", [1e-3])
     assert 0.0 < (np.linalg.norm(pull, axis=1) > 0.0).mean() < 1.0
 
 

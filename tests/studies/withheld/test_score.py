@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.effects.library import EFFECTS
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
@@ -15,6 +14,7 @@ from rrru.gap.case import State, make_case
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.field import field_verdicts, read_field_answers, score_field
 from rrru.studies.withheld.oracle import limits, with_truth
+from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.robots import noise_free
 from rrru.studies.withheld.score import score_chunk
 from rrru.studies.withheld.states import state_of, state_row

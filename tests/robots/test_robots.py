@@ -12,7 +12,7 @@ from rrru.fit.identifiability import analyse
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.robots import singularity
-from rrru.robots.mechanism import MECHANISMS, make_mechanism
+from rrru.robots.catalogue import MECHANISMS, make_mechanism
 
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))
 
@@ -114,7 +114,7 @@ def test_actuator_and_parameter_jacobians_equal_finite_differences(name, kind):
     steps = 1e-2 * _size(mechanism)
     numeric = _slope(lambda step: mechanism.forward(drives, deviations + step, position), len(deviations), steps)
     _same(mechanism.parameter_jacobian(position, drives, deviations), numeric)
-    step = 1e-5 if mechanism.drive_unit == "rad" else 1e-2
+    step = 1e-5 if mechanism.parts.units[0] == "rad" else 1e-2
     numeric = _slope(lambda change: mechanism.forward(drives + change, deviations, position), 3, step)
     _same(mechanism.actuator_jacobian(position, drives, deviations), numeric)
 

@@ -1,0 +1,64 @@
+"""The robots by the name that the configuration gives them. Lengths in mm, angles in rad."""
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.objects import load_object
+from rrru.robots.delta import Delta
+from rrru.robots.general import GeneralRobot
+from rrru.robots.ptt3 import Ptt3
+from rrru.robots.robot import Robot
+from rrru.robots.rrru3 import Rrru3
+
+MECHANISMS: dict[str, Any] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
+# keys of an entry that describes a robot of the user's own
+_OWN = ("urdf", "mjcf", "module")
+
+
+def tracked_set(name: str) -> str:
+    """The set of parameters of a `robots:` entry that measured positions identify."""
+    return MECHANISMS.get(name, GeneralRobot).TRACKED
+
+
+def searched_set(name: str) -> str:
+    """The set of parameters of a `robots:` entry that the genetic algorithm searches, empty for a robot without one."""
+    return MECHANISMS.get(name, GeneralRobot).SEARCHED
+
+
+def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Robot:
+    """The robot of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key.
+
+    Angles of the entry are in degrees, with keys that end in _deg.
+    """
+    if any(key in section for key in _OWN):
+        return _own(name, dict(section), options)
+    if name not in MECHANISMS:
+        raise ConfigError(f"unknown robot {name!r}; known: {', '.join(MECHANISMS)}, or one with urdf, mjcf or module")
+    kind = MECHANISMS[name]
+    section = {
+        key.replace("_deg", "_rad"): float(np.radians(value)) if key.endswith("_deg") else value
+        for key, value in section.items()
+    }
+    known = {f.name for f in fields(kind) if f.init}
+    for key in section:
+        if key not in known:
+            raise ConfigError(f"robot {name}: unknown key {key!r}; known: {', '.join(sorted(known))}")
+    return kind(**section, **options)
+
+
+def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robot:
+    """A robot of the user's own from a URDF or MJCF file or a Python module."""
+    tool: dict[str, Any] = {"tool_mm": tuple(section.pop("tool_mm"))} if "tool_mm" in section else {}
+    if "module" in section:
+        robot = load_object(f"robot {name}", section["module"])()
+        if not isinstance(robot, GeneralRobot):
+            raise ConfigError(f"robot {name}: {section['module']} gave a {type(robot).__name__}; allowed: GeneralRobot")
+        return replace(robot, name=name, **tool, **options)
+    from rrru.robots import from_file
+
+    read, key = (from_file.from_urdf, "urdf") if "urdf" in section else (from_file.from_mjcf, "mjcf")
+    return read(section.pop(key), **section, name=name, **tool, **options)

@@ -1,0 +1,218 @@
+"""Robots from files that other tools write: a chain of a URDF, or the legs of an MJCF with closed loops.
+
+MuJoCo's own parser reads them; `from_mjcf` and `from_urdf` say how bodies become parts and legs. A leg that ends in a
+bar is a Bar: a ball joint, a ball or universal joint, and between them nothing or a driven slide along their line. It
+has no idle spin and is faster. Columns and sites have the joints' names. Files count in m and kg, robots in mm; angles
+in rad.
+"""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+from rrru.robots import from_urdf as urdf_files
+from rrru.robots.closure import Closure, Poses, Twists, bar_ends, walk
+from rrru.robots.free_motion import free_motions
+from rrru.robots.from_chains import Chains, with_bars
+from rrru.robots.from_lumps import Lump, lumps_of
+from rrru.robots.from_mjcf import MM, Assembly
+from rrru.robots.from_seams import undone
+from rrru.robots.general import GeneralRobot
+from rrru.robots.legs import Drive, Legs, Parts, unit_twist
+
+__all__ = ["Lump", "from_mjcf", "from_urdf"]
+# a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
+# where more joints than needed do not fit each other; below the last it is not closed at all
+_OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
+# angles count in this arm
+_ARM_MM = 500.0
+# a drive without limits works this far about its home value
+_RANGE = {"rad": 1.0, "mm": 100.0}
+_UNITS = {"R": "rad", "P": "mm"}
+_TRN = mujoco.mjtTrn
+
+
+def from_urdf(path, base=None, tip=None, home=None, **options):
+    """The GeneralRobot of a URDF's chain from the link base, by default the root, to the link tip, the only last one.
+
+    All joints between them are driven. home: values by joint of the home pose in rad or mm, by default 0, or the middle
+    of a range without it; options: of GeneralRobot. The frames are the links'. Raises ConfigError for what cannot be
+    read.
+    """
+    file = _existing(path)
+    urdf = urdf_files.read(file)
+    model, known = urdf.model, {urdf.model.joint(j).name: j for j in range(urdf.model.njnt)}
+    first, last = (model.body(name).id for name in urdf_files.ends(urdf, base, tip, file))
+    (low, high), qpos, address = model.jnt_range.T, model.qpos0.copy(), model.jnt_qposadr
+    outside = model.jnt_limited.astype(bool) & ((low > 0.0) | (high < 0.0))
+    qpos[address[outside]] = 0.5 * (low + high)[outside]
+    for name, value in (home or {}).items():
+        if name not in known:
+            raise ConfigError(f"{file}: home has {name!r}; allowed: {', '.join(known)}")
+        slides = model.jnt_type[known[name]] == mujoco.mjtJoint.mjJNT_SLIDE
+        qpos[address[known[name]]] = value / MM if slides else value
+    assembly = Assembly(model, file, first, last, qpos)
+    for move in assembly.moves.values():
+        link = model.body(model.jnt_bodyid[move.joint]).name
+        if link in urdf.odd:
+            raise assembly.error(urdf.odd[link])
+    return _robot(assembly, {move.joint: [] for move in assembly.moves.values()}, options)
+
+
+def from_mjcf(path, platform, **options):
+    """The GeneralRobot whose platform is a body of an MJCF, held by chains of bodies and by connects and welds.
+
+    Joints with actuators are driven. The home pose is that of the first keyframe, else of the reference configuration;
+    loops that are open there by less than a millimetre are closed. options: of GeneralRobot. The platform's frame is
+    its body's. Raises ConfigError for what cannot be read or is no robot.
+    """
+    file = _existing(path)
+    try:
+        spec = mujoco.MjSpec.from_file(str(file))
+        spec.compiler.fusestatic = False
+        model = spec.compile()
+    except ValueError as error:
+        raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: an MJCF") from None
+    names = [model.body(k).name for k in range(1, model.nbody)]
+    if platform not in names:
+        raise ConfigError(f"{file}: platform is {platform!r}; allowed: {', '.join(name for name in names if name)}")
+    home = model.key_qpos[0] if model.nkey else model.qpos0
+    assembly = Assembly(model, file, 0, model.body(platform).id, home)
+    return _robot(assembly, _servos(assembly), options)
+
+
+def _existing(path):
+    """The Path of a file that exists."""
+    file = Path(path)
+    if not file.is_file():
+        raise ConfigError(f"{file}: there is no such file; allowed: a file")
+    return file
+
+
+def _servos(assembly):
+    """By driven joint of the legs, in the order of the actuators, ranges (low, high) of qpos that its servos allow."""
+    model, result = assembly.model, {}
+    own = {move.joint for move in assembly.moves.values()} - {None}
+    for k in range(len(model.actuator_trntype)):
+        name, kind = model.actuator(k).name or f"actuator {k + 1}", int(model.actuator_trntype[k])
+        moved = _moved_by(model, k)
+        if moved is not None and not moved & own:
+            continue
+        if kind not in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
+            raise assembly.error(f"{name} drives by {_TRN(kind).name[6:].lower()}; allowed: a joint")
+        (joint,) = moved
+        if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_BALL:
+            raise assembly.error(f"{name} drives the ball joint {assembly.joint_name(joint)}; allowed: hinge, slide")
+        if model.actuator_gear[k, 0] != 1.0:
+            raise assembly.error(f"{name} has the gear {model.actuator_gear[k, 0]:g}; allowed: 1")
+        result.setdefault(joint, [])
+        # a position servo: its force is gain (control - position)
+        if model.actuator_ctrllimited[k] and model.actuator_biasprm[k, 1] == -model.actuator_gainprm[k, 0] != 0.0:
+            result[joint].append(model.actuator_ctrlrange[k])
+    return result
+
+
+def _moved_by(model, k):
+    """Joints that an actuator moves, None where these are not told."""
+    kind, target = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
+    if kind in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
+        return {target}
+    if kind == _TRN.mjTRN_TENDON:
+        wraps = range(model.tendon_adr[target], model.tendon_adr[target] + model.tendon_num[target])
+        if all(model.wrap_type[w] == mujoco.mjtWrap.mjWRAP_JOINT for w in wraps):
+            return {int(model.wrap_objid[w]) for w in wraps}
+    return None
+
+
+def _robot(assembly, servos, options):
+    """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them."""
+    known = {one.name for one in fields(GeneralRobot) if one.init} - {"legs", "parts", "lumps"}
+    if unknown := set(options) - known:
+        raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
+    if not assembly.paths:
+        raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
+    if not servos:
+        raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
+    chains, home = Chains(assembly, servos), undone(assembly.home_of(assembly.base))
+    pose = home @ assembly.home_of(assembly.platform)
+    driven = [next(m for m in assembly.moves.values() if m.joint == joint) for joint in servos]
+    values = np.array([move.home for move in driven])
+    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3])
+    gravity = home[:3, :3] @ assembly.model.opt.gravity
+    up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
+    legs = _closed(assembly, replace(open_legs, legs=with_bars(open_legs)), options.get("up", up))
+    bars = [leg for leg in legs.legs if leg.bar]
+    arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
+    defaults = {"name": assembly.file.stem, "up": up} | ({"angle_arm_mm": arm} if arm else {})
+    ranges = np.array([_range(assembly, move, servos[move.joint]) for move in driven])
+    drives = tuple(_drive(legs, number, move, chains.sites[move.name]) for number, move in enumerate(driven))
+    parts = Parts(drives=drives, members=tuple((leg.bar_sites[0],) for leg in bars))
+    own = {"legs": legs, "parts": parts, "drive_range": ranges, "lumps": lumps_of(chains, open_legs, legs)}
+    return GeneralRobot(**defaults | own | options)
+
+
+def _range(assembly, move, servos):
+    """Lowest and highest value of a driven joint, from its own range and those of its servos."""
+    model, unit = assembly.model, MM if move.kind == "P" else 1.0
+    ranges = [*servos, *([model.jnt_range[move.joint]] if model.jnt_limited[move.joint] else [])]
+    if not ranges:
+        about = _RANGE[_UNITS[move.kind]]
+        return move.home - about, move.home + about
+    zero = model.qpos0[model.jnt_qposadr[move.joint]]
+    low, high = max(low for low, _ in ranges) - zero, min(high for _, high in ranges) - zero
+    if not low < high:
+        raise assembly.error(f"joint {move.origin} works from {low:g} to {high:g}; allowed: a range that is not empty")
+    return unit * low, unit * high
+
+
+def _drive(legs, number, move, site):
+    """The Drive of a driven Move."""
+    unit = _UNITS[move.kind]
+    for leg in legs.legs:
+        if leg.bar and leg.bar.drive == number:
+            return Drive(f"{move.origin}_{unit}", unit, leg.bar_sites[0], unit_twist(0))
+    axis, none = next(joint.axis for joint in legs.joints if joint.name == site), np.zeros(3)
+    return Drive(f"{move.origin}_{unit}", unit, site, np.concatenate([none, axis] if unit == "rad" else [axis, none]))
+
+
+def _closed(assembly, legs, up):
+    """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
+    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
+    gaps = _gaps(legs, start)
+    if gaps.max() > _OPEN_MM:
+        joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
+        text = f"the leg through {joints} misses the platform by {gaps.max():.3f} mm at the home pose"
+        raise assembly.error(f"{text}; allowed: up to {_OPEN_MM:g} mm; a keyframe may set it")
+    if free := free_motions(legs, up):
+        text = f"body {assembly.body_name(assembly.platform)} is free to {'; '.join(free)} at the home pose"
+        raise assembly.error(f"{text}; allowed: legs that hold it with locked drives")
+    if gaps.max() < _CLOSED_MM:
+        return legs
+    poses = Closure(legs).solve(legs.home_drives[None], start)
+    left = _gaps(legs, poses).max() if poses.closed.all() else gaps.max()
+    if left > _LEFT_MM:
+        raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_LEFT_MM:g} mm")
+    homes = dict(zip((joint.name for joint in legs.passive_joints), poses.passive[0], strict=True))
+    chains = tuple(
+        replace(leg, joints=tuple(replace(j, home=homes[j.name]) if j.passive else j for j in leg.joints))
+        for leg in legs.legs
+    )
+    return Legs(chains, legs.home_drives, poses.position_mm[0], poses.turn[0])
+
+
+def _gaps(legs, poses):
+    """What every leg lacks (legs,) in mm at one pose with drives at home, angles counted in the arm."""
+    result, actuators, twists = [], legs.home_drives[None], Twists(legs)
+    for leg in legs.legs:
+        way = walk(legs, leg, actuators, poses.passive, twists)
+        if leg.bar:
+            near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
+            result.append(abs(length[0] - np.linalg.norm(far - near)))
+        else:
+            off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
+            result.append(np.linalg.norm(way.place - poses.position_mm) + _ARM_MM * off)
+    return np.array(result)

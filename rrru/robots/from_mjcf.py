@@ -1,0 +1,209 @@
+"""The bodies of a MuJoCo model as rigid parts, and what joins these, for `rrru.robots.from_file`.
+
+Bodies without a joint and welded ones make one part. Seams join parts: the joints between a body and its parent, and
+the connects between two parts, where one is a ball joint and two are a hinge. A leg is a path of seams from the base to
+the platform. Values of joints count from the file's reference configuration (MuJoCo's qpos less ref); those of ball
+joints, three turns about x, y and z, from the home pose. Lengths in mm, angles in rad; placements are (4, 4).
+"""
+
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.robots.from_seams import Move, Seam, placed, turn_of, undone
+from rrru.robots.legs import X, Y, Z
+
+MM = 1000.0
+_EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
+
+
+class Assembly:
+    """The parts and seams of a compiled model between two of its bodies, by number, in a home pose qpos.
+
+    frames: by body its part and its placement there; a part is called by the number of one body, whose frame it has.
+    """
+
+    def __init__(self, model, file, base, platform, qpos):
+        self.model, self.file, self.base, self.platform = model, file, base, platform
+        self.data = mujoco.MjData(model)
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, self.data)
+        kinds = {k: int(model.eq_type[k]) for k in range(model.neq) if model.eq_active0[k]}
+        self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
+        if self.frames[platform][0] == base:
+            raise self.error(f"body {self.body_name(platform)} is fixed to the base; allowed: a body that moves")
+        self._names = set()
+        connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
+        self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
+        own = {move.joint for move in self.moves.values()}
+        for k, kind in kinds.items():
+            coupled = {int(model.eq_obj1id[k]), int(model.eq_obj2id[k])}
+            elsewhere = kind == _EQ.mjEQ_JOINT and not coupled & own
+            if kind not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD) and not elsewhere:
+                name = _EQ(kind).name.removeprefix("mjEQ_").lower()
+                raise self.error(f"equality {self._eq_name(k)} is of the kind {name}; allowed: connect, weld")
+
+    def error(self, text):
+        """The ConfigError of a text about the file."""
+        return ConfigError(f"{self.file}: {text}")
+
+    def body_name(self, body):
+        """Name of a body."""
+        return self.model.body(body).name or f"body {body}"
+
+    def joint_name(self, joint):
+        """Name of a joint, if it has none from its body's."""
+        body = int(self.model.jnt_bodyid[joint])
+        number = joint - int(self.model.body_jntadr[body]) + 1
+        return self.model.joint(joint).name or f"{self.body_name(body)} joint {number}"
+
+    def _eq_name(self, k):
+        """Name of an equality."""
+        return self.model.eq(k).name or f"equality {k + 1}"
+
+    def home_of(self, body):
+        """Placement of a body at home in MuJoCo's world."""
+        return placed(MM * self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
+
+    def _ends(self, k):
+        """Both bodies of a connect or weld, and the placements on them that it holds together."""
+        model, data = self.model, self.model.eq_data[k]
+        first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE:
+            at = [placed(MM * model.site_pos[s], turn_of(model.site_quat[s])) for s in (first, second)]
+            return int(model.site_bodyid[first]), at[0], int(model.site_bodyid[second]), at[1]
+        if model.eq_type[k] == _EQ.mjEQ_CONNECT:
+            return first, placed(MM * data[:3]), second, placed(MM * data[3:6])
+        return first, placed(MM * data[3:6], turn_of(data[6:10])), second, placed(MM * data[:3])
+
+    def _own(self, body):
+        """Placement of a body in its parent's, joints at zero."""
+        return placed(MM * self.model.body_pos[body], turn_of(self.model.body_quat[body]))
+
+    def _frames(self, welds):
+        """Part and placement there of every body, the parts named after base and platform first."""
+        near = {body: [] for body in range(self.model.nbody)}
+        fixed = [(int(self.model.body_parentid[b]), b, self._own(b)) for b in near if b and self._jointless(b)]
+        for k in welds:
+            first, at_first, second, at_second = self._ends(k)
+            fixed.append((first, second, at_first @ undone(at_second)))
+        for first, second, placement in fixed:
+            near[first].append((second, placement))
+            near[second].append((first, undone(placement)))
+        result = {}
+        for part in (self.base, self.platform, *near):
+            todo = [] if part in result else [(part, np.eye(4))]
+            for body, placement in todo:
+                if body not in result:
+                    result[body] = (part, placement)
+                    todo += [(other, placement @ there) for other, there in near[body]]
+        return result
+
+    def _jointless(self, body):
+        """Whether a body is fixed to its parent."""
+        return self.model.body_jntnum[body] == 0
+
+    def _joint_seams(self):
+        """Seams of the bodies' joints; a free body has none."""
+        result, model = [], self.model
+        for body in range(1, model.nbody):
+            first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+            if not count or model.jnt_type[first] == _JOINT.mjJNT_FREE:
+                continue
+            (near, before), (far, after) = self.frames[int(model.body_parentid[body])], self.frames[body]
+            items = [before @ self._own(body)]
+            for joint in range(first, first + count):
+                items += self._joint_items(joint)
+            if near != far:
+                result.append(Seam(near, far, (*items, undone(after))))
+        return result
+
+    def _joint_items(self, joint):
+        """Placements and Moves of one joint, in its body's frame."""
+        model, name, kind = self.model, self.joint_name(joint), self.model.jnt_type[joint]
+        at, address = MM * model.jnt_pos[joint], int(model.jnt_qposadr[joint])
+        if kind == _JOINT.mjJNT_BALL:
+            return self._ball_items(name, at, turn_of(self.data.qpos[address : address + 4]), at, joint)
+        value, axis = float(self.data.qpos[address] - model.qpos0[address]), model.jnt_axis[joint].copy()
+        if kind == _JOINT.mjJNT_SLIDE:
+            return [placed(at), Move(self._unique(name), "P", axis, name, joint, MM * value), placed(-at)]
+        return [placed(at), Move(self._unique(name), "R", axis, name, joint, value), placed(-at)]
+
+    def _connect_seams(self, connects):
+        """Seams of connects, those of the same two parts taken together."""
+        groups = {}
+        for k in connects:
+            first, at_first, second, at_second = self._ends(k)
+            (near, before), (far, after) = self.frames[first], self.frames[second]
+            near_mm, far_mm = (before @ at_first)[:3, 3], (after @ at_second)[:3, 3]
+            if near > far:
+                near, far, near_mm, far_mm = far, near, far_mm, near_mm
+            if near != far:
+                groups.setdefault((near, far), []).append((self._eq_name(k), near_mm, far_mm))
+        return [Seam(near, far, tuple(self._connect_items(near, far, group))) for (near, far), group in groups.items()]
+
+    def _connect_items(self, near, far, group):
+        """Placements and Moves of all connects (name, point of near, point of far) of two parts."""
+        turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
+        (name, near_mm, far_mm), *others = group
+        if not others:
+            return self._ball_items(name, near_mm, turn, far_mm)
+        if len(others) > 1:
+            bodies = f"{self.body_name(near)} and {self.body_name(far)}"
+            raise self.error(f"{len(group)} connects between {bodies}; allowed: one, two for a hinge, or a weld")
+        along, own = others[0][1] - near_mm, others[0][2] - far_mm
+        if min(np.linalg.norm(along), np.linalg.norm(own)) < 1e-6:
+            raise self.error(f"connects {name} and {others[0][0]} are at one point; allowed: two points make a hinge")
+        along, own = along / np.linalg.norm(along), turn @ own / np.linalg.norm(own)
+        cross, cosine = np.cross(own, along), own @ along
+        skew = np.cross(np.eye(3), cross)
+        turn = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ turn
+        return [placed(near_mm), Move(self._unique(name), "R", along, name), placed(turn=turn), placed(-far_mm)]
+
+    @cached_property
+    def moves(self):
+        """Moves of all paths by name."""
+        items = [item for path in self.paths for number in path for item in self.seams[number].items]
+        return {item.name: item for item in items if isinstance(item, Move)}
+
+    @cached_property
+    def paths(self):
+        """Paths of seams from the base to the platform that meet no part twice, in the order of their constraints."""
+        result, target = [], self.frames[self.platform][0]
+
+        def go(part, met, path):
+            if part == target:
+                result.append(path)
+                return
+            for number, seam in enumerate(self.seams):
+                if part in (seam.near, seam.far) and seam.other(part) not in met:
+                    go(seam.other(part), met | {seam.other(part)}, (*path, number))
+
+        go(self.base, {self.base}, ())
+        return sorted(result, key=lambda path: (tuple(n for n in path if self._closes(n)), path))
+
+    def names_along(self, path):
+        """Names of the joints and connects along a path."""
+        items = [item for number in path for item in self.seams[number].items]
+        return tuple(dict.fromkeys(item.origin for item in items if isinstance(item, Move)))
+
+    def _closes(self, number):
+        """Whether a seam is one of connects."""
+        return all(move.joint is None for move in self.seams[number].items if isinstance(move, Move))
+
+    def _ball_items(self, name, near_mm, turn, far_mm, joint=None):
+        """Placements and Moves of a ball joint between two points, at home turned by `turn`."""
+        moves = [
+            Move(self._unique(f"{name} {letter}"), "R", axis, name, joint)
+            for letter, axis in zip("xyz", (X, Y, Z), strict=True)
+        ]
+        return [placed(near_mm), *moves, placed(turn=turn), placed(-far_mm)]
+
+    def _unique(self, name):
+        """A name that no other Move has."""
+        while name in self._names:
+            name += "'"
+        self._names.add(name)
+        return name

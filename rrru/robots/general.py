@@ -1,0 +1,250 @@
+"""A robot that has no file of its own: legs from a description, everything else by the general model.
+
+Its parameters are directions at sites. "zero" are its drives' offsets; "full" is every geometric number that positions
+can tell, drives first, then lengths, then angles: a number that those before it imitate over the workspace is left out,
+and `gauge` says which combination stands for it. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.closure import Poses, Twists, bar_ends, walk
+from rrru.robots.drive_step import drive_step
+from rrru.robots.dynamics import gravity
+from rrru.robots.geometric_numbers import candidates_of, choose, direction
+from rrru.robots.legs import Legs, Parts
+from rrru.robots.lumps import drive_loads
+from rrru.robots.robot import Robot
+
+SETS = ("zero", "full")
+# poses over which a number has to be told from the others, their tilt, and the share of it that must be left
+_POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
+_STEPS, _REACHED_MM = 60, 1e-9
+# longest step of an inverse as a share of the drives' ranges; singular values below this share are none
+_LONGEST_STEP, _SEEN = 0.3, 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralRobot(Robot):
+    """A robot of any legs.
+
+    drive_range (K, 2): actuator values between which it works; parameter_set: one of SETS; lumps: point masses of its
+    links; sample: actuator values (n, K) and positions (n, 3) at which "full" is chosen, by default over the workspace;
+    among: names that it is chosen from, by default all.
+    """
+
+    name: str
+    legs: Legs
+    parts: Parts
+    drive_range: np.ndarray
+    angle_arm_mm: float = 500.0
+    parameter_set: str = "zero"
+    angle_limit_rad: float = 0.1
+    length_limit_mm: float = 30.0
+    tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    lumps: tuple = ()
+    sample: tuple | None = None
+    among: tuple[str, ...] = ()
+
+    TRACKED = "full"
+    # an objective that is not compiled is too slow to be searched by a genetic algorithm
+    SEARCHED = ""
+
+    def __post_init__(self):
+        if self.parameter_set not in SETS:
+            raise ConfigError(f"{self.name}: parameter_set is {self.parameter_set!r}; allowed: {', '.join(SETS)}")
+
+    @cached_property
+    def candidates(self):
+        """All Candidates, see `rrru.robots.geometric_numbers`."""
+        return candidates_of(self.legs, self.parts)
+
+    @cached_property
+    def _chosen(self):
+        """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
+        if self.parameter_set == "zero":
+            return self.candidates[: len(self.parts.drives)], {}
+        actuators, position = self.sample or self._workspace()
+        poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
+        at = self.map(actuators[poses.closed], poses.of(poses.closed))
+        columns = at.columns(np.stack([direction(self.legs, one) for one in self.candidates], axis=-1))
+        sizes = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self.candidates])
+        allowed = np.array([not self.among or one.name in self.among for one in self.candidates])
+        chosen, stands = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
+        gauge = {
+            self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
+        }
+        return tuple(self.candidates[k] for k in chosen), gauge
+
+    def _workspace(self):
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
+        generator = np.random.default_rng(0)
+        if self._bars_only:
+            low, high = np.asarray(self.drive_range, dtype=float).T
+            position = self.legs.home_mm + 0.3 * (high - low).min() * generator.uniform(-1.0, 1.0, (_POSES, 3))
+            turn = Rotation.from_rotvec(_TILT_RAD * generator.uniform(-1.0, 1.0, (_POSES, 3))).as_matrix()
+            actuators = self._bar_lengths(position, turn @ self.legs.home_turn, self.twists())
+            known = np.isfinite(actuators).all(axis=1)
+            return actuators[known], position[known]
+        low, high = np.asarray(self.drive_range, dtype=float).T
+        actuators = low + (high - low) * generator.random((_POSES, len(low)))
+        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
+
+    @cached_property
+    def parameters(self):
+        """The parameters of the chosen set, nominally zero."""
+        limits = {"mm": self.length_limit_mm, "rad": self.angle_limit_rad}
+        return ParameterSet(
+            tuple(
+                Parameter(one.name, one.unit, 0.0, -limits[one.unit], limits[one.unit], "bounds assumed", one.leg)
+                for one in self._chosen[0]
+            )
+        )
+
+    @cached_property
+    def gauge(self):
+        """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
+        names = self.parameters.names
+        return {
+            left: " + ".join(f"{c:.3g} {name}" for c, name in zip(of, names, strict=False) if abs(c) > 1e-6)
+            or "nothing"
+            for left, of in self._chosen[1].items()
+        }
+
+    @cached_property
+    def directions(self):
+        """Twists (sites, 6, p) that a unit of each parameter makes."""
+        return np.stack([direction(self.legs, one) for one in self._chosen[0]], axis=-1)
+
+    @property
+    def deviation_names(self):
+        """Names of the deviations that `twists_of` knows: all Candidates."""
+        return tuple(one.name for one in self.candidates)
+
+    def twists_of(self, values):
+        """Twists (1, sites, 6) of deviations by name."""
+        known = {one.name: one for one in self.candidates}
+        twists = [value * direction(self.legs, known[name]) for name, value in values.items()]
+        return np.sum(twists, axis=0)[None] if twists else self.twists()
+
+    def identifiable(self, values):
+        """Mapping of the parameters from values of any Candidates: what is left out counts by what stands for it."""
+        result = dict.fromkeys(self.parameters.names, 0.0)
+        for name, value in values.items():
+            if name in result:
+                result[name] += value
+            for stands, share in zip(self._chosen[0], self._chosen[1].get(name, ()), strict=False):
+                result[stands.name] += share * value
+        return result
+
+    def seen_at(self, actuators, position_mm):
+        """The robot with its set "full" chosen on poses of a campaign, (n, K) and (n, 3), by what noise lets tell.
+
+        Of a robot so chosen, on poses of a part of its campaign, it keeps a part of the numbers.
+        """
+        among = () if self.sample is None else self.parameters.names
+        sample = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float)
+        return replace(self, sample=sample, among=among)
+
+    @property
+    def reach_mm(self):
+        """Sum of the longest leg's links."""
+        return max(
+            sum(np.linalg.norm(joint.shift_mm) for joint in leg.joints[1:]) + (leg.bar.length_mm if leg.bar else 0.0)
+            for leg in self.legs.legs
+        )
+
+    def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
+        """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from the home pose does not end.
+
+        Under deviations positions are met as nearly as the drives can.
+        turn (n, 3, 3): the platform's orientation, by default that of the home pose, where the drives can choose it.
+        elbow: a general robot has the assembly of its home pose only.
+        """
+        position, twists = np.asarray(position_mm, dtype=float), self.twists(deviations)
+        wanted = np.broadcast_to(self.legs.home_turn, (len(position), 3, 3)) if turn is None else turn
+        if self._bars_only:
+            return self._bar_lengths(position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted, twists)
+        actuators = np.tile(self.legs.home_drives, (len(position), 1)).astype(float)
+        poses = self.solve(actuators, np.tile(self.legs.home_mm, (len(position), 1)))
+        left = np.full(len(position), np.inf)
+        low, high = np.asarray(self.drive_range, dtype=float).T
+        for _ in range(_STEPS):
+            rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
+            if not len(rows):
+                break
+            at = self.map(actuators[rows], poses.of(rows), twists)
+            lack = position[rows] - self.measured(at.poses, twists)
+            turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+            step, held = drive_step(at, self._freedoms, lack, turning)
+            if deviations is not None:
+                # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
+                lack = (at.drive_response @ step[:, :, None])[:, :, 0]
+            left[rows] = np.linalg.norm(lack, axis=1) + self.angle_arm_mm * held
+            longest = (np.abs(step) / (high - low)).max(axis=1, keepdims=True)
+            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
+            actuators[rows] += step
+            poses = self.model.solve(actuators, poses, twists)
+        return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+
+    def own_load(self, _masses, actuators, rate, acceleration, poses):
+        """Loads (n, K) on the drives, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
+        if not self.lumps:
+            return np.zeros(np.shape(actuators))
+        return drive_loads(self, (actuators, rate, acceleration), poses, gravity(self))
+
+    @property
+    def workspace_lines(self):
+        """Grid lines over its reach: fewer where every point's inverse takes a search."""
+        return Robot.workspace_lines if self._bars_only else 30
+
+    @property
+    def _bars_only(self):
+        """Whether every drive is a bar's length."""
+        bars = [leg.bar.drive for leg in self.legs.legs if leg.bar]
+        return None not in bars and len(bars) == len(self.parts.drives)
+
+    def _bar_lengths(self, centre_mm, turn, twists):
+        """Lengths (n, K) of the driven bars at platform poses, NaN outside of their ranges."""
+        poses = Poses(centre_mm, turn, np.zeros((len(centre_mm), 0)), None, None)
+        none, own = np.zeros((len(centre_mm), len(self.parts.drives))), Twists(self.legs, twists)
+        needed = none.copy()
+        for leg in self.legs.legs:
+            if leg.bar:
+                near, far, length = bar_ends(
+                    self.legs, leg, walk(self.legs, leg, none, poses.passive, own), poses, none, own
+                )
+                needed[:, leg.bar.drive] = np.linalg.norm(far - near, axis=1) - length
+        low, high = np.asarray(self.drive_range, dtype=float).T
+        return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)
+
+    @cached_property
+    def _freedoms(self):
+        """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
+        actuators, position = self._workspace()
+        poses = self.solve(actuators[:10], position[:10])
+        at = self.map(actuators[:10][poses.closed], poses.of(poses.closed))
+        position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
+        turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
+        both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
+        return int(position_rank), int(both - position_rank)
+
+    def near(self, position_mm, actuators):
+        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones."""
+        for leg in self.legs.legs:
+            if not leg.bar and not any(joint.passive for joint in leg.joints):
+                return end_of(self.legs, leg, np.asarray(actuators, dtype=float))
+        return super().near(position_mm, actuators)
+
+
+def end_of(legs, leg, actuators):
+    """Poses (n) at which a leg ends whose joints are all driven, at actuator values (n, K)."""
+    passive = np.zeros((len(actuators), len(legs.passive_joints)))
+    way = walk(legs, leg, actuators, passive, Twists(legs))
+    return Poses(way.place, way.turn, passive, None, None)

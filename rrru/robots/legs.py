@@ -1,0 +1,209 @@
+"""A robot as legs of screws: what every robot's file describes and the general model computes with.
+
+A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
+placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
+cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
+by legs: the two bars of a Delta's arm share its drive.
+
+Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
+(the frame in which is measured) and the tool (the measured point) is a site with a frame of its own. Lengths in mm,
+angles in rad.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import ConfigError
+
+WORLD, TOOL = "world", "tool"
+X, Y, Z = np.eye(3)
+_NO_SHIFT, _NO_TURN = np.zeros(3), np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One joint and the link before it.
+
+    kind: "R" turns about, "P" slides along `axis` (3,), "fixed" only makes a site; shift_mm (3,) and turn (3, 3): its
+    frame in the frame behind the joint before it; drive: the number of its actuator value, counted from 0, None for a
+    passive joint; home: value of a passive joint from which searches start.
+    """
+
+    name: str
+    kind: str = "fixed"
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    shift_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
+    turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    drive: int | None = None
+    home: float = 0.0
+
+    def __post_init__(self):
+        if self.kind not in ("R", "P", "fixed"):
+            raise ConfigError(f"joint {self.name}: its kind is {self.kind!r}; allowed: R, P, fixed")
+
+    @property
+    def passive(self):
+        """Whether its value follows from the others."""
+        return self.kind != "fixed" and self.drive is None
+
+
+@dataclass(frozen=True, eq=False)
+class Bar:
+    """A link of length_mm between ball joints, from the last joint's frame to the point platform_mm (3,).
+
+    drive: number of the actuator value that adds to its length, None for a link that keeps it.
+    """
+
+    length_mm: float
+    platform_mm: np.ndarray
+    drive: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A chain of joints whose last frame, turned by end_turn (3, 3), is the platform's or carries a bar to it.
+
+    The first joint's frame is where the leg stands, no length of the robot.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    end_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    bar: Bar | None = None
+
+    @property
+    def bar_sites(self):
+        """Names of the bar's site, whose x runs along it towards the platform, and of its end, in the platform's frame.
+
+        Empty without a bar.
+        """
+        return (f"{self.name} bar", f"{self.name} end") if self.bar else ()
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """All legs of a robot, and the sites and values that they make.
+
+    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace.
+    """
+
+    legs: tuple[Leg, ...]
+    home_drives: np.ndarray
+    home_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
+    home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+
+    def __post_init__(self):
+        owner = {}
+        for leg in self.legs:
+            for number, joint in enumerate(leg.joints):
+                before = leg.joints[:number]
+                if owner.setdefault(joint.name, (joint, before)) != (joint, before):
+                    raise ConfigError(f"joint {joint.name} of {leg.name}: another leg has it behind other joints")
+        shared = [j.name for j in self.passive_joints if sum(j in leg.joints for leg in self.legs) > 1]
+        if shared:
+            raise ConfigError(f"passive joint {shared[0]} is shared by several legs; allowed: driven ones")
+
+    @cached_property
+    def joints(self):
+        """All joints, each once, in the order of the legs."""
+        return tuple({joint.name: joint for leg in self.legs for joint in leg.joints}.values())
+
+    @cached_property
+    def passive_joints(self):
+        """The passive joints: the meaning of every vector of passive values."""
+        return tuple(joint for joint in self.joints if joint.passive)
+
+    @cached_property
+    def drive_count(self):
+        """Number of actuator values."""
+        drives = {joint.drive for joint in self.joints} | {leg.bar.drive for leg in self.legs if leg.bar}
+        return len(drives - {None})
+
+    @cached_property
+    def sites(self):
+        """Names of all sites: world, then leg by leg the joints' seats, bar and end, then tool."""
+        names = [name for leg in self.legs for name in (*(joint.name for joint in leg.joints), *leg.bar_sites)]
+        return (WORLD, *dict.fromkeys(names), TOOL)
+
+    @cached_property
+    def site_numbers(self):
+        """Number of every site by its name."""
+        return {name: number for number, name in enumerate(self.sites)}
+
+    @cached_property
+    def passive_numbers(self):
+        """Number of every passive joint by its name."""
+        return {joint.name: number for number, joint in enumerate(self.passive_joints)}
+
+    @cached_property
+    def growth(self):
+        """Twists (sites, 6) that make every length longer by its own size: the lengths at each site."""
+        result = np.zeros((len(self.sites), 6))
+        for leg in self.legs:
+            for joint in leg.joints[1:]:
+                result[self.site_numbers[joint.name], :3] = joint.turn.T @ joint.shift_mm
+            if leg.bar:
+                bar, end = (self.site_numbers[name] for name in leg.bar_sites)
+                result[bar, 0], result[end, :3] = leg.bar.length_mm, -leg.bar.platform_mm
+        return result
+
+    @property
+    def home_passive(self):
+        """Values (k,) of the passive joints from which searches start."""
+        return np.array([joint.home for joint in self.passive_joints])
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One actuator value: its column in tables, its unit ("rad", "mm"), and what it moves.
+
+    site, twist (6,): a change of the value acts as this twist per unit at this site.
+    """
+
+    column: str
+    unit: str
+    site: str
+    twist: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Which sites of a robot the effects act on, by legs or drives, from the first to the last.
+
+    drives: of every actuator value; feet: sites at which the legs stand on the base, x outwards and y to the side;
+    links: name of a length to the sites whose x lies along it, several for a leg of several bars; members: the links
+    that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds.
+    """
+
+    drives: tuple[Drive, ...]
+    feet: tuple[str, ...] = ()
+    links: dict = field(default_factory=dict)
+    members: tuple[tuple[str, ...], ...] = ()
+    held_from: tuple[str, ...] = ()
+
+    @property
+    def units(self):
+        """Unit of every actuator value."""
+        return tuple(drive.unit for drive in self.drives)
+
+    @property
+    def columns(self):
+        """Columns of the actuator values in tables."""
+        return [drive.column for drive in self.drives]
+
+
+def unit_twist(component, factor=1.0):
+    """The twist (6,) of one component, shift along x, y, z in mm and turn about them in rad."""
+    result = np.zeros(6)
+    result[component] = factor
+    return result
+
+
+def turn_about(axis, angle_rad):
+    """Rotation matrices (..., 3, 3) about a unit axis (3,) by angles (...,)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.asarray(angle_rad, dtype=float)[..., None, None]
+    return _NO_TURN + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)

@@ -1,0 +1,77 @@
+"""Loads on the drives by a robot's own masses, given as point masses in its moving frames (virtual work).
+
+Every point mass m at x loads drive k with
+
+    tau_k = m (g - x'') . dx/dq_k
+
+The derivatives are central differences of the exactly closed legs. Lengths in mm, masses in kg, forces in N, time in s.
+"""
+
+import numpy as np
+
+from rrru.robots.closure import Twists, bar_ends
+from rrru.robots.legs import turn_about
+
+# steps of the differences: in time, and of an actuator value by its unit
+_STEP_S, _STEP = 1e-3, {"rad": 1e-4, "mm": 1e-2}
+_PLATFORM = "platform"
+
+
+def places(robot, actuators, poses):
+    """Places (n, lumps, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them."""
+    none = Twists(robot.legs)
+    ways = dict(zip(robot.legs.legs, robot.model.walks(actuators, poses.passive, none), strict=True))
+    holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
+    result = []
+    for lump in robot.lumps:
+        if lump.joint == _PLATFORM:
+            result.append(poses.point(lump.at_mm))
+            continue
+        leg = holders[lump.joint]
+        frame = _along_bar if lump.joint in leg.bar_sites else _behind_joint
+        result.append(frame(robot.legs, leg, ways[leg], lump, (poses, actuators, none)))
+    return np.stack(result, axis=1)
+
+
+def _behind_joint(legs, leg, way, lump, state):
+    """Places (n, 3) of a lump fixed in the frame behind the motion of a joint."""
+    (poses, actuators, _), number = state, [joint.name for joint in leg.joints].index(lump.joint)
+    joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
+    if joint.kind != "fixed":
+        known = poses.passive[:, legs.passive_numbers[joint.name]] if joint.passive else actuators[:, joint.drive]
+        if joint.kind == "R":
+            turn = turn @ turn_about(joint.axis, known)
+        else:
+            place = place + known[:, None] * way.axes[number]
+    return place + turn @ lump.at_mm
+
+
+def _along_bar(legs, leg, way, lump, state):
+    """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
+    poses, actuators, none = state
+    near, far, _ = bar_ends(legs, leg, way, poses, actuators, none)
+    line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
+    return (near if lump.joint == leg.bar_sites[0] else far) + lump.at_mm[0] * line
+
+
+def drive_loads(robot, motion, poses, gravity_mm_s2):
+    """Loads (n, K) on the drives, in N mm or N.
+
+    motion: values, rates and accelerations (n, K) of the drives; poses: the Poses there. NaN where a pose is not known.
+    """
+    actuators, rate, acceleration = motion
+
+    def moved(step):
+        return places(robot, actuators + step, robot.model.solve(actuators + step, poses))
+
+    bend = 0.5 * _STEP_S**2 * acceleration
+    steps = (moved(sign * _STEP_S * rate + bend) for sign in (1.0, -1.0))
+    second = (sum(steps) - 2.0 * places(robot, actuators, poses)) / _STEP_S**2
+    mass = np.array([lump.mass_kg for lump in robot.lumps])
+    force = mass[:, None] * (gravity_mm_s2 - second) / 1000.0
+    result = np.empty(actuators.shape)
+    for k, unit in enumerate(robot.parts.units):
+        step = _STEP[unit] * np.eye(actuators.shape[1])[k]
+        slope = (moved(step) - moved(-step)) / (2.0 * _STEP[unit])
+        result[:, k] = np.einsum("nla,nla->n", slope, force)
+    return result

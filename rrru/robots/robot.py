@@ -1,0 +1,179 @@
+"""What every robot offers to calibration, plant and diagnosis, by the general model. Lengths in mm, angles in rad.
+
+A robot's class adds its legs, parts and parameters, and where it pays a closed form of what is here.
+"""
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import UnreachableError
+from rrru.parameters import ParameterSet
+from rrru.robots.closure import Closure, Poses
+from rrru.robots.legs import Legs, Parts
+from rrru.robots.twist_map import TwistMap
+
+
+class Robot:
+    """A robot as its controller believes it to be, with small deviations of its numbers.
+
+    name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.robots.legs.Legs`;
+    parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
+    parameters that measured positions identify; angle_arm_mm: the length that makes angles comparable with lengths; up
+    (3,): away from the ground.
+    """
+
+    name: str
+    parameters: ParameterSet
+    legs: Legs
+    parts: Parts
+    directions: np.ndarray
+    angle_arm_mm: float
+    TRACKED: str
+    SEARCHED: str
+    up = (0.0, 0.0, 1.0)
+    tool_mm = (0.0, 0.0, 0.0)
+    # grid lines over its longest reach in a picture of its workspace
+    workspace_lines = 130
+
+    def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
+        """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
+        raise NotImplementedError
+
+    @cached_property
+    def model(self):
+        """The legs, closed."""
+        return Closure(self.legs)
+
+    def seen_at(self, _actuators, _position_mm):
+        """The robot with its parameters chosen for poses of a campaign; those of most robots stay as they are."""
+        return self
+
+    @property
+    def seats(self):
+        """Sites of the axes that a manufacturer may have set wrongly: those of all joints that move."""
+        return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
+
+    @property
+    def deviation_names(self):
+        """Names of the deviations that `twists_of` knows."""
+        return self.parameters.names
+
+    def twists_of(self, values):
+        """Twists (1, sites, 6) of deviations by name."""
+        return self.twists(self.parameters.vector(values))
+
+    def twists(self, deviations=None):
+        """Twists (1, sites, 6) that deviations (p,) make."""
+        if deviations is None:
+            return np.zeros((1, len(self.legs.sites), 6))
+        return (self.directions @ np.asarray(deviations, dtype=float))[None]
+
+    def near(self, position_mm, actuators):
+        """Poses near which the legs close at positions (n, 3) and actuator values (n, K): an upright platform's."""
+        n = len(position_mm)
+        turn = np.broadcast_to(self.legs.home_turn, (n, 3, 3))
+        centre = np.asarray(position_mm, dtype=float) - self.legs.home_turn @ np.asarray(self.tool_mm)
+        return Poses(centre, turn, self.passive_near(centre, np.asarray(actuators, dtype=float)), None, None)
+
+    def passive_near(self, position_mm, actuators):
+        """Values (n, k) of the passive joints near platform centres (n, 3) and actuator values (n, K)."""
+        return np.broadcast_to(self.legs.home_passive, (len(position_mm), len(self.legs.passive_joints)))
+
+    def solve(self, actuators, position_mm, twists=None):
+        """Poses at actuator values (n, K) near positions (n, 3), under twists (n or 1, sites, 6) at the sites."""
+        return self.model.solve(actuators, self.near(position_mm, actuators), twists)
+
+    def measured(self, poses, twists):
+        """Positions (n, 3) of the tool in the world's frame at Poses, under the twists (n or 1, sites, 6) of both."""
+        tool = np.asarray(self.tool_mm) + twists[:, -1, :3]
+        return into_frame(poses.point(tool), twists[:, 0])
+
+    def map(self, actuators, poses, twists=None):
+        """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6)."""
+        return TwistMap(self.model, actuators, poses, twists, self.tool_mm)
+
+    def map_at(self, actuators, position_mm, deviations=None):
+        """The TwistMap under deviations (p,) at actuator values (n, K), near positions (n, 3)."""
+        twists = self.twists(deviations)
+        return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
+
+    def forward(self, actuators, deviations=None, guess_mm=None):
+        """Positions (n, 3) of the tool at actuator values (n, K); NaN where the legs do not close near guess_mm (n, 3).
+
+        Without a guess near the home position.
+        """
+        twists = self.twists(deviations)
+        guess = np.tile(self.legs.home_mm, (len(actuators), 1)) if guess_mm is None else guess_mm
+        return self.measured(self.solve(actuators, guess, twists), twists)
+
+    def forward_batch(self, actuators, deviations, guess_mm=None):
+        """Positions (m, n, 3) at n actuator values under m vectors of deviations (m, p); see `forward`."""
+        deviations, count = np.asarray(deviations, dtype=float), len(actuators)
+        twists = np.repeat(np.einsum("scp,mp->msc", self.directions, deviations), count, axis=0)
+        guess = np.tile(self.legs.home_mm, (count, 1)) if guess_mm is None else guess_mm
+        every, near = np.tile(actuators, (len(deviations), 1)), np.tile(guess, (len(deviations), 1))
+        return self.measured(self.solve(every, near, twists), twists).reshape(len(deviations), count, 3)
+
+    def mean_distance(self, actuators, nominal_mm, measured_mm):
+        """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
+
+        def evaluate(deviations):
+            off = np.linalg.norm(self.forward_batch(actuators, deviations, nominal_mm) - measured_mm, axis=2)
+            return np.where(np.isfinite(off).all(axis=1), off.mean(axis=1), np.inf)
+
+        return evaluate
+
+    def actuator_jacobian(self, position_mm, actuators, deviations=None):
+        """Derivative (n, 3, K) of the position by the actuator values."""
+        return self.map_at(actuators, position_mm, deviations).drive_response
+
+    def parameter_jacobian(self, position_mm, actuators, deviations=None):
+        """Derivative (n, 3, p) of the position by the parameters."""
+        return self.map_at(actuators, position_mm, deviations).columns(self.directions)
+
+    def singularities(self, position_mm, actuators):
+        """How far poses are from singularities: translational measure, constraint measure and determinant, each (n,).
+
+        The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
+        angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the drives'
+        Jacobian over its largest, 0 where they cannot move the point in some direction.
+        """
+        at = self.map_at(actuators, position_mm)
+        return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
+
+    def own_load(self, masses, actuators, rate, acceleration, poses):
+        """Loads (n, K) on the drives, in N mm or N, of what moves with them but for the platform; none here."""
+        return np.zeros(np.shape(actuators))
+
+    def drive_errors(self, twists):
+        """Changes (n, K) of the actuator values in twists (n, sites, 6)."""
+        numbers = self.legs.site_numbers
+        along = [twists[:, numbers[d.site]] @ (d.twist / (d.twist @ d.twist)) for d in self.parts.drives]
+        return np.stack(along, axis=1)
+
+    def require_reachable(self, position_mm, deviations=None):
+        """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
+        values = self.inverse(position_mm, deviations)
+        bad = np.flatnonzero(np.isnan(values).any(axis=1))
+        if bad.size:
+            x, y, z = np.asarray(position_mm, dtype=float)[bad[0]]
+            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(values[bad[0]])))
+            raise UnreachableError(
+                f"point {bad[0] + 1} at ({x:.3f}, {y:.3f}, {z:.3f}) mm is out of reach of leg {legs}; "
+                f"{bad.size} of {len(values)} points cannot be reached"
+            )
+        return values
+
+
+def into_frame(position_mm, frame):
+    """Positions (n, 3) carried by frames (n or 1, 6): shift in mm and rotation vector in rad."""
+    if not np.any(frame):
+        return position_mm
+    turned = np.einsum(
+        "nij,nj->ni",
+        np.broadcast_to(Rotation.from_rotvec(frame[:, 3:]).as_matrix(), (len(position_mm), 3, 3)),
+        position_mm,
+    )
+    return turned + frame[:, :3]

@@ -1,0 +1,220 @@
+"""What small twists anywhere in a robot do to the platform, to first order: one map for every robot.
+
+A twist d at a site of leg i, drives held, moves the platform by the twist T of
+
+    W_i T = W_i d,   stacked over the legs   A T = b
+
+(`rrru.robots.closure`; principle of reciprocal screws: Ball, Theory of Screws, 1900). A point at x moves by v + w x x.
+From the same A come the Jacobian by the drives, the wrenches that the legs carry under a load, A^T f = load, and how
+near a singularity is. Lengths in mm, angles in rad, forces in N, torques in N mm.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from rrru.robots.closure import Twists, bar_ends, screw
+from rrru.robots.legs import TOOL, WORLD
+
+_EYE = np.eye(3)
+
+
+class TwistMap:
+    """The map at n poses of a Closure, at actuator values (n, K) and finite twists (n or 1, sites, 6).
+
+    tool_mm: the measured point (3,), or points (n, 3), of the platform. NaN where a pose is.
+    """
+
+    def __init__(self, closure, actuators, poses, twists=None, tool_mm=(0.0, 0.0, 0.0)):
+        self.closure, self.poses, self._twists = closure, poses, Twists(closure.legs, twists)
+        self._actuators = np.asarray(actuators, dtype=float)
+        self.point_mm = poses.point(np.asarray(tool_mm, dtype=float))
+        self._ways = closure.walks(self._actuators, poses.passive, self._twists)
+        self._wrenches, self.platform = _factors(closure, self._ways, poses, self._actuators, self._twists)
+
+    def __len__(self):
+        return len(self.point_mm)
+
+    @cached_property
+    def point(self):
+        """Motion (n, 3, rows) of the measured point per unit of every constraint of A."""
+        shift, turn = self.platform[:, :3], self.platform[:, 3:]
+        return shift + np.cross(turn, self.point_mm[:, :, None], axis=1)
+
+    @cached_property
+    def frames(self):
+        """Turn (n, 3, 3) and place (n, 3) of the frame at every site but world and tool, by the site's number."""
+        return {number: frame for leg in self._legs for number, frame in self._frames(*leg[:2]).items()}
+
+    @property
+    def _legs(self):
+        """Of every leg: the leg, its walk, its wrenches and its rows of A."""
+        return zip(self.closure.legs.legs, self._ways, self._wrenches, self.closure.rows, strict=True)
+
+    @cached_property
+    def _at_sites(self):
+        """By site's number its constraints: pairs of rows of A and what they count (n, r, 6) of the site's twist."""
+        result = {}
+        for leg, way, one, rows in self._legs:
+            for number, (turn, place) in self._frames(leg, way).items():
+                own = self._own(number, turn)
+                result.setdefault(number, []).append((rows, _in_site(one, turn, place, own)))
+        return result
+
+    def _frames(self, leg, way):
+        """Turn (n, 3, 3) and place (n, 3) of every site of a leg, by the site's number."""
+        numbers = self.closure.legs.site_numbers
+        named = zip(leg.joints, way.turns, way.places, strict=True)
+        result = {numbers[joint.name]: (turn, place) for joint, turn, place in named}
+        if leg.bar:
+            near, far, _ = bar_ends(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
+            bar, end = (numbers[name] for name in leg.bar_sites)
+            result |= {bar: (_frame_along(far - near), near), end: (self.poses.turn, far)}
+        return result
+
+    def _own(self, number, turn):
+        """Axes (n, 3, 3) about which small rotations of a site's vector turn, in space: its finite one is counted."""
+        if number not in self._twists.turns:
+            return turn
+        vector = self._twists.values[:, number, 3:]
+        angle = np.linalg.norm(vector, axis=1)[:, None, None]
+        cross = np.cross(vector[:, None, :], _EYE).transpose(0, 2, 1)
+        safe = np.maximum(angle, 1e-4)
+        first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
+        second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
+        return turn @ (_EYE + first * cross + second * cross @ cross)
+
+    def counts(self, site):
+        """Constraints that twists at a site change: list of (rows of A, counts (n, r, 6)); none for world and tool."""
+        return self._at_sites.get(self.closure.legs.site_numbers[site], [])
+
+    def response(self, site):
+        """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
+        if site == WORLD:
+            turning = np.cross(_EYE, self.point_mm[:, None, :]).transpose(0, 2, 1)
+            return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
+        if site == TOOL:
+            return np.concatenate([self.poses.turn, np.zeros_like(self.poses.turn)], axis=2)
+        return sum(self.point[:, :, rows] @ counts for rows, counts in self.counts(site))
+
+    def platform_response(self, site):
+        """Twist (n, 6) of the platform at the world's origin per twist at a site: (n, 6, 6)."""
+        return sum(self.platform[:, :, rows] @ counts for rows, counts in self.counts(site))
+
+    def move(self, twists):
+        """Change (n, 3) of the measured position in mm under small twists (n or 1, sites, 6)."""
+        result, numbers = np.zeros((len(self), 3)), self.closure.legs.site_numbers
+        active = np.asarray(twists).any(axis=(0, 2))
+        for name in self.closure.legs.sites:
+            if active[numbers[name]]:
+                one = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))
+                result = result + np.einsum("naj,nj->na", self.response(name), one)
+        return result
+
+    def columns(self, directions):
+        """Derivative (n, 3, p) of the measured position by p parameters with directions (sites, 6, p) at the sites."""
+        result, numbers = np.zeros((len(self), 3, directions.shape[2])), self.closure.legs.site_numbers
+        for name in self.closure.legs.sites:
+            one = directions[numbers[name]]
+            used = one.any(axis=0)
+            if used.any():
+                result[..., used] += self.response(name) @ one[:, used]
+        return result
+
+    @cached_property
+    def drive_counts(self):
+        """Constraints (n, rows, K) that the actuator values change."""
+        legs = self.closure.legs
+        result = np.zeros((len(self), self.closure.rows[-1].stop, legs.drive_count))
+        for leg, way, one, rows in self._legs:
+            for joint, axis, place in zip(leg.joints, way.axes, way.places, strict=True):
+                if joint.drive is not None:
+                    result[:, rows, joint.drive] += np.einsum("nri,ni->nr", one, screw(joint, axis, place))
+            if leg.bar and leg.bar.drive is not None:
+                result[:, rows, leg.bar.drive] += 1.0
+        return result
+
+    def wrenches(self, load):
+        """Wrenches (legs, n, 6) of the legs on the platform that bear its load (n, 6), a force and its moment."""
+        force = -np.einsum("nir,ni->nr", self.platform, load)
+        return np.stack([np.einsum("nr,nri->ni", force[:, rows], one) for _, _, one, rows in self._legs])
+
+    @property
+    def translational_measure(self):
+        """Smallest singular value (n,) of the drives' Jacobian over its largest; 0 where they cannot move the point."""
+        size = _singular_values(self.drive_response)
+        return size[:, -1] / size[:, 0]
+
+    def constraint_measures(self, arm_mm):
+        """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by leg.
+
+        Moments count at an arm in mm. The determinant has a sign where every leg is a bar; it is positive elsewhere.
+        """
+        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in self._wrenches]
+        rows = np.concatenate(legs, axis=1)
+        if rows.shape[1] == 6 and all(leg.bar for leg in self.closure.legs.legs):
+            return _singular_values(rows)[:, -1], np.linalg.det(rows)
+        values = _singular_values(rows)
+        return values[:, -1], values.prod(axis=1)
+
+    @cached_property
+    def drive_response(self):
+        """Motion (n, 3, K) of the measured point per actuator value."""
+        return self.point @ self.drive_counts
+
+
+def _factors(closure, ways, poses, actuators, twists):
+    """`Closure.wrenches` and `Closure.inverse`, NaN where a pose is not known."""
+    if poses.closed.all():
+        wrenches = closure.wrenches(ways, poses, actuators, twists)
+        return wrenches, closure.inverse(wrenches)
+    rows, n = np.flatnonzero(poses.closed), len(poses.closed)
+    own, known, given = twists.of(rows), poses.of(rows), actuators[rows]
+    wrenches = closure.wrenches(closure.walks(given, known.passive, own), known, given, own)
+    return [_spread(one, rows, n) for one in wrenches], _spread(closure.inverse(wrenches), rows, n)
+
+
+def _about(wrenches, place):
+    """Wrenches (n, r, 6) at the origin as wrenches about places (n, 3)."""
+    force = wrenches[:, :, :3]
+    return np.concatenate([force, wrenches[:, :, 3:] + np.cross(force, place[:, None, :])], axis=2)
+
+
+def _orthonormal(rows):
+    """Rows (n, r, 6) made orthonormal, or of unit length where there is one; NaN where one is not known."""
+    if rows.shape[1] == 1:
+        return rows / np.linalg.norm(rows, axis=2, keepdims=True)
+    known = np.isfinite(rows).all(axis=(1, 2))
+    result = np.full(rows.shape, np.nan)
+    result[known] = np.linalg.qr(rows[known].transpose(0, 2, 1))[0].transpose(0, 2, 1)
+    return result
+
+
+def _singular_values(matrices):
+    """Singular values (n, k) of matrices, NaN where one is not known."""
+    result = np.full((len(matrices), min(matrices.shape[1:])), np.nan)
+    known = np.isfinite(matrices).all(axis=(1, 2))
+    result[known] = np.linalg.svd(matrices[known], compute_uv=False)
+    return result
+
+
+def _spread(part, rows, n):
+    """An array (m, ..) at some rows of one of n rows, else NaN."""
+    result = np.full((n, *part.shape[1:]), np.nan)
+    result[rows] = part
+    return result
+
+
+def _in_site(wrenches, turn, place, own):
+    """Wrenches (n, r, 6) at the origin as they count shift and rotation (n, r, 6) of a frame."""
+    about = _about(wrenches, place)
+    return np.concatenate([about[:, :, :3] @ turn, about[:, :, 3:] @ own], axis=2)
+
+
+def _frame_along(lines):
+    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
+    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
+    helper = _EYE[np.abs(x).argmin(axis=1)]
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=2)

@@ -1,0 +1,81 @@
+"""Newton on any robot's closed legs in NumPy, all points at once: slow and plain, with the helpers of the package.
+
+T is the platform's twist, S_i a leg's passive screws, e_i what it lacks, P_i the projector off S_i:
+
+    sum P_i T = sum P_i e_i,   dp_i = S_i^+ (T - e_i)
+
+A bar has w w^T in place of P_i, w its line. Lengths in mm, angles in rad; in twists lengths are counted in 500 mm.
+"""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.robots.closure import Closure, Poses, Twists, bar_ends, line_wrench, passive_screws, walk
+
+_ARM_MM = 500.0
+_SCALE = np.repeat([_ARM_MM, 1.0], 3)
+_LONGEST_MM, _LONGEST_RAD = 150.0, 0.3
+
+
+def solve(legs, actuators, start, twists=None):
+    """Poses at actuator values (n, K) next to the Poses `start`, under twists (n or 1, sites, 6); NaN where none."""
+    actuators, every, n = np.asarray(actuators, dtype=float), Twists(legs, twists), len(actuators)
+    position, turn, passive = (np.array(part, dtype=float) for part in (start.position_mm, start.turn, start.passive))
+    ranks, left = Closure(legs).ranks, np.full(n, np.inf)
+    turning = np.array([joint.kind == "R" for joint in legs.passive_joints], dtype=bool)
+    known = [np.isfinite(part).reshape(n, -1).all(axis=1) for part in (actuators, position, turn, passive)]
+    rows = np.flatnonzero(np.all(known, axis=0))
+    for _ in range(60):
+        if not len(rows):
+            break
+        here = Poses(position[rows], turn[rows], passive[rows], None, None)
+        shift, rotation, change = _step(legs, ranks, actuators[rows], here, every.of(rows))
+        moved = np.linalg.norm(shift, axis=1)
+        turned = np.maximum(np.linalg.norm(rotation, axis=1), np.abs(change[:, turning]).max(axis=1, initial=0.0))
+        slid = np.abs(change[:, ~turning]).max(axis=1, initial=0.0)
+        with np.errstate(divide="ignore"):
+            share = np.minimum(1.0, np.minimum(_LONGEST_MM / moved, _LONGEST_RAD / turned))[:, None]
+        position[rows] += share * shift
+        turn[rows] = Rotation.from_rotvec(share * rotation).as_matrix() @ turn[rows]
+        passive[rows] += share * change
+        left[rows] = np.maximum(np.maximum(moved, slid), _ARM_MM * turned)
+        rows = rows[~(left[rows] < 1e-10)]
+    closed = left < 1e-7
+    for part in (position, turn, passive):
+        part[~closed] = np.nan
+    return Poses(position, turn, passive, left, closed)
+
+
+def _step(legs, ranks, actuators, poses, twists):
+    """Shift (n, 3) and rotation (n, 3) of the platform and changes (n, k) of the passive joints."""
+    total, pull, chains = 0.0, 0.0, []
+    for leg, rank in zip(legs.legs, ranks, strict=True):
+        way = walk(legs, leg, actuators, poses.passive, twists)
+        if leg.bar:
+            near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
+            line = line_wrench(near, far) * _SCALE / _ARM_MM
+            total = total + line[:, :, None] * line[:, None, :]
+            pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _ARM_MM
+        else:
+            u, size, v = np.linalg.svd(passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
+            u, size, v = u[:, :, :rank], size[:, None, :rank], v[:, :rank]
+            lack, off = _lack(way, poses) / _SCALE, np.eye(6) - u @ u.transpose(0, 2, 1)
+            total, pull = total + off, pull + (off @ lack[:, :, None])[:, :, 0]
+            chains.append((leg, lack, (v.transpose(0, 2, 1) / size) @ u.transpose(0, 2, 1)))
+    scaled = np.linalg.solve(total, pull[:, :, None])[:, :, 0]
+    change = np.zeros_like(poses.passive)
+    for leg, lack, inverse in chains:
+        numbers = [legs.passive_numbers[joint.name] for joint in leg.joints if joint.passive]
+        change[:, numbers] = (inverse @ (scaled - lack)[:, :, None])[:, :, 0]
+    twist = scaled * _SCALE
+    return twist[:, :3] + np.cross(twist[:, 3:], poses.position_mm), twist[:, 3:], change
+
+
+def _lack(way, poses):
+    """The small twist (n, 6) at the world's origin from the platform's pose to the end of a chain."""
+    off = way.turn @ poses.turn.transpose(0, 2, 1)
+    turn = 0.5 * np.stack(
+        [off[:, 2, 1] - off[:, 1, 2], off[:, 0, 2] - off[:, 2, 0], off[:, 1, 0] - off[:, 0, 1]], axis=1
+    )
+    shift = way.place - poses.position_mm - np.cross(turn, poses.position_mm)
+    return np.concatenate([shift, turn], axis=1)

@@ -1,0 +1,151 @@
+"""Robots of a user's own, from a module and from files, the whole way from campaign to figures."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.errors import ConfigError
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.geometric_numbers import direction
+from tests.places import ROOT
+from tests.workflow.folder import run
+
+# a planar 3-RRR: three legs of two links, driven at the base, hold a plate in a plane
+_MODULE = '''
+"""A planar 3-RRR."""
+import numpy as np
+
+from rrru.robots.general import GeneralRobot
+from rrru.robots.legs import Drive, Joint, Leg, Legs, Parts, unit_twist
+
+X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+BASE, UPPER, LOWER, PLATE = 300.0, 220.0, 200.0, 80.0
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def make():
+    legs, homes = [], []
+    for k in (1, 2, 3):
+        azimuth = 2.0 * np.pi * (k - 1) / 3.0
+        # the elbow stands to the left of the line from foot to plate
+        reach = BASE - PLATE
+        lean = np.arccos((UPPER**2 + reach**2 - LOWER**2) / (2.0 * UPPER * reach))
+        bend = np.pi - np.arccos((UPPER**2 + LOWER**2 - reach**2) / (2.0 * UPPER * LOWER))
+        homes.append(np.pi + lean)
+        joints = (
+            Joint(f"leg {k} root", turn=turned(azimuth)),
+            Joint(f"leg {k} motor", "R", Z, BASE * X, drive=k - 1),
+            Joint(f"leg {k} elbow", "R", Z, UPPER * X, home=-bend),
+            Joint(f"leg {k} wrist", "R", Z, LOWER * X, home=bend - lean - np.pi),
+            Joint(f"leg {k} plate", shift_mm=-PLATE * X),
+        )
+        legs.append(Leg(f"leg {k}", joints, end_turn=turned(-azimuth)))
+    home = np.array(homes)
+    drives = tuple(Drive(f"motor{k}_rad", "rad", f"leg {k} motor", unit_twist(5)) for k in (1, 2, 3))
+    return GeneralRobot("planar", Legs(tuple(legs), home), Parts(drives), np.stack([home - 0.6, home + 0.6], axis=1))
+'''
+_OVERLAY = """
+results_dir: results
+robots: {{mine: {robot}}}
+virtual_robots:
+  own_twin: {{errors: {{{error}: {size}}}, effects: {{backlash: {play}}}, platform_mass_kg: 1.0}}
+trajectories:
+  small:
+    lines: {{start_mm: {start}, end_mm: {end}, offsets_y_mm: [0.0, 25.0, -25.0], points: 25}}
+campaigns:
+  own:
+    {{robot: mine, virtual: own_twin, trajectories: small, noise_mm: 0.01, errors: {errors},
+      passes: [{{}}, {{reverse: true}}]}}
+calibration: {{sets: {{lines: ["line_*"]}}}}
+"""
+_TABLES = ("parameters", "error_summary", "gap_verdicts")
+
+
+def _run(folder, **parts):
+    """Verdict, error summary, parameters and measurements of the whole way with an own robot."""
+    (folder / "mine.yaml").write_text(_OVERLAY.format(**parts))
+    targets = [f"results/campaigns/own/{name}.parquet" for name in _TABLES]
+    code, output = run(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
+    assert code == 0, output
+    names = (*_TABLES, "measurements")
+    return {name: pd.read_parquet(folder / f"results/campaigns/own/{name}.parquet") for name in names}
+
+
+def test_a_robot_of_a_users_module_goes_the_whole_way(tmp_path):
+    """A fourth robot in a module of less than 60 lines, no file of the package touched: its play is named."""
+    assert len(_MODULE.splitlines()) < 60
+    (tmp_path / "planar.py").write_text(_MODULE)
+    result = _run(
+        tmp_path,
+        robot='{module: "planar:make"}',
+        error="dmotor2",
+        size=0.002,
+        play="{width1: 0.001, width2: 0.001, width3: 0.001}",
+        start=[-60.0, 0.0, 0.0],
+        end=[60.0, 0.0, 0.0],
+        errors="full",
+    )
+    verdict = result["gap_verdicts"].iloc[0]
+    assert verdict["effects"] == "backlash" and verdict["share_closed"] > 0.8
+    assert verdict["where"] == "leg 1 motor to leg 3 motor"
+    assert {"motor1_rad", "motor2_rad", "motor3_rad"} <= set(result["measurements"])
+    summary = result["error_summary"].query(
+        "trajectory == 'all' and calibration in ('none', 'lines') and method in ('none', 'least_squares')"
+    )
+    means = summary.set_index("mode")["mean_mm"]
+    assert means["closed_loop"] < 0.5 * means["before"]
+
+
+def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
+    """The example arm: six drives by the names of its joints, and an offset of one found by the calibration."""
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="zero")
+    x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
+    column = arm.parts.columns[1]
+    error = f"d{column.rpartition('_')[0]}"
+    result = _run(
+        tmp_path,
+        robot="{urdf: data/robots/arm6.urdf}",
+        error=error,
+        size=0.002,
+        play="{" + ", ".join(f"width{k}: 0.0005" for k in range(1, 7)) + "}",
+        start=[x - 60.0, y, z],
+        end=[x + 60.0, y, z],
+        errors="zero",
+    )
+    assert set(arm.parts.columns) <= set(result["measurements"])
+    chosen = "calibration == 'lines' and method == 'least_squares'"
+    fitted = result["parameters"].query(chosen).set_index("parameter")
+    row = fitted.loc[error]
+    assert row["true_value"] == pytest.approx(0.002)
+    assert "backlash" in result["gap_verdicts"]["effects"].iloc[0]
+
+
+@pytest.mark.parametrize(
+    ("entry", "text"),
+    [
+        ({"module": "nothing_here:make"}, "cannot import"),
+        ({"module": "json:nothing"}, "has no 'nothing'"),
+        ({"module": "json:JSONDecoder"}, "gave a JSONDecoder"),
+        ({"urdf": "nothing.urdf"}, "nothing.urdf"),
+        ({"mjcf": "nothing.xml", "platform": "plate"}, "nothing.xml"),
+    ],
+)
+def test_an_own_robot_that_cannot_be_made_is_refused(entry, text):
+    """The message names what is missing."""
+    with pytest.raises(ConfigError, match=text):
+        make_mechanism("mine", entry, parameter_set="full")
+
+
+def test_numbers_that_others_imitate_are_left_out_and_said_so():
+    """Of an arm's numbers the rank chooses; what is left out is a stated combination of the chosen ones."""
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="full")
+    assert len(arm.parameters) < len(arm.candidates)
+    at = arm.map_at(*(values[:20] for values in arm._workspace()))
+    columns = {one.name: at.columns(direction(arm.legs, one)[..., None])[..., 0] for one in arm.candidates}
+    left_out, shares = next((name, of) for name, of in arm._chosen[1].items() if np.abs(of).max() > 1e-3)
+    combined = sum(share * columns[name] for name, share in zip(arm.parameters.names, shares, strict=False))
+    assert np.abs(columns[left_out] - combined).max() < 1e-6 * np.abs(columns[left_out]).max() + 1e-9
