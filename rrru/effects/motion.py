@@ -38,7 +38,8 @@ def make_motion(robot, masses, course):
     )
     rate, drive_acceleration = drive_rates(robot, position, velocity, acceleration)
     known = (np.isfinite(velocity) & np.isfinite(acceleration)).all(axis=1, keepdims=True)
-    nominal, carried = robot.inverse(position), np.nan_to_num(payload)
+    # where the platform's orientation is free, the values that were sent tell the pose
+    nominal, carried = course.drive if robot.orients else robot.inverse(position), np.nan_to_num(payload)
     inertial = np.where(known, acceleration, 0.0)
     turning = tuple(np.where(known, values, 0.0) for values in (rate, drive_acceleration))
     load = loads(robot, masses, position, nominal, turning, inertial, carried)

@@ -238,7 +238,12 @@ def at_reversals(motion):
 def _motion(measurements, mechanism, masses, actuators):
     """The motion that the effects see; at the measured points with the table's own actuator values."""
     path, told = driven_path(measurements)
-    path_drive = mechanism.inverse(path)
+    if mechanism.orients:
+        # positions do not tell the orientation between the points: drives are taken to move evenly
+        rows_of_path = np.arange(len(path))
+        path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
+    else:
+        path_drive = mechanism.inverse(path)
     lost = ~np.isfinite(path_drive).all(axis=1)
     if lost.any():
         # what is out of reach stays where it was last

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rrru.robots.closure import Poses, Twists, walk
+
 
 def drive_step(at, ranks, lack_mm, turning_rad):
     """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
@@ -22,3 +24,10 @@ def _inverse_of_rank(matrices, rank):
     """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values."""
     u, size, vt = np.linalg.svd(matrices, full_matrices=False)
     return (vt[:, :rank].transpose(0, 2, 1) / size[:, None, :rank]) @ u[:, :, :rank].transpose(0, 2, 1)
+
+
+def end_of(legs, leg, actuators):
+    """Poses (n) at which a leg ends whose joints are all driven, at actuator values (n, K)."""
+    passive = np.zeros((len(actuators), len(legs.passive_joints)))
+    way = walk(legs, leg, actuators, passive, Twists(legs))
+    return Poses(way.place, way.turn, passive, None, None)

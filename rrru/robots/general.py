@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from rrru.errors import ConfigError
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.closure import Poses, Twists, bar_ends, walk
-from rrru.robots.drive_step import drive_step
+from rrru.robots.drive_step import drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import candidates_of, choose, direction
 from rrru.robots.legs import Legs, Parts
@@ -53,8 +53,7 @@ class GeneralRobot(Robot):
     among: tuple[str, ...] = ()
 
     TRACKED = "full"
-    # an objective that is not compiled is too slow to be searched by a genetic algorithm
-    SEARCHED = ""
+    SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
 
     def __post_init__(self):
         if self.parameter_set not in SETS:
@@ -154,18 +153,27 @@ class GeneralRobot(Robot):
 
     @property
     def reach_mm(self):
-        """Sum of the longest leg's links."""
-        return max(
-            sum(np.linalg.norm(joint.shift_mm) for joint in leg.joints[1:]) + (leg.bar.length_mm if leg.bar else 0.0)
-            for leg in self.legs.legs
-        )
+        """Length of the longest leg from its foot."""
+        return self.legs.longest_mm(1)
+
+    @property
+    def orients(self):
+        """Whether its drives can orient its platform beside moving it."""
+        return self._freedoms[1] > 0
+
+    @property
+    def size_mm(self):
+        """Upper bound of how far the tool can get from the origin."""
+        slides = np.abs(self.drive_range)[np.array(self.parts.units) == "mm"]
+        return self.legs.longest_mm() + float(slides.max(initial=0.0) + np.linalg.norm(self.tool_mm))
+
+    farthest_mm = size_mm  # searching for it would take the inverse of many points
 
     def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
         """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from the home pose does not end.
 
-        Under deviations positions are met as nearly as the drives can.
-        turn (n, 3, 3): the platform's orientation, by default that of the home pose, where the drives can choose it.
-        elbow: a general robot has the assembly of its home pose only.
+        Under deviations positions are met as nearly as the drives can. turn (n, 3, 3): the platform's orientation, by
+        default the home pose's, where the drives can choose it; of the assemblies there is only the home pose's.
         """
         position, twists = np.asarray(position_mm, dtype=float), self.twists(deviations)
         wanted = np.broadcast_to(self.legs.home_turn, (len(position), 3, 3)) if turn is None else turn
@@ -195,9 +203,8 @@ class GeneralRobot(Robot):
 
     def own_load(self, _masses, actuators, rate, acceleration, poses):
         """Loads (n, K) on the drives, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
-        if not self.lumps:
-            return np.zeros(np.shape(actuators))
-        return drive_loads(self, (actuators, rate, acceleration), poses, gravity(self))
+        motion = actuators, rate, acceleration
+        return drive_loads(self, motion, poses, gravity(self)) if self.lumps else np.zeros(np.shape(actuators))
 
     @property
     def workspace_lines(self):
@@ -241,10 +248,3 @@ class GeneralRobot(Robot):
             if not leg.bar and not any(joint.passive for joint in leg.joints):
                 return end_of(self.legs, leg, np.asarray(actuators, dtype=float))
         return super().near(position_mm, actuators)
-
-
-def end_of(legs, leg, actuators):
-    """Poses (n) at which a leg ends whose joints are all driven, at actuator values (n, K)."""
-    passive = np.zeros((len(actuators), len(legs.passive_joints)))
-    way = walk(legs, leg, actuators, passive, Twists(legs))
-    return Poses(way.place, way.turn, passive, None, None)

@@ -149,6 +149,11 @@ class Legs:
                 result[bar, 0], result[end, :3] = leg.bar.length_mm, -leg.bar.platform_mm
         return result
 
+    def longest_mm(self, first=0):
+        """Length of the longest leg from its joint of this number on, to the platform's frame."""
+        bars = {leg: leg.bar.length_mm + np.linalg.norm(leg.bar.platform_mm) if leg.bar else 0.0 for leg in self.legs}
+        return max(float(sum(np.linalg.norm(j.shift_mm) for j in leg.joints[first:]) + bars[leg]) for leg in self.legs)
+
     @property
     def home_passive(self):
         """Values (k,) of the passive joints from which searches start."""

@@ -34,6 +34,8 @@ class Robot:
     SEARCHED: str
     up = (0.0, 0.0, 1.0)
     tool_mm = (0.0, 0.0, 0.0)
+    # whether its drives can orient its platform beside moving it
+    orients = False
     # grid lines over its longest reach in a picture of its workspace
     workspace_lines = 130
 

@@ -10,7 +10,8 @@ Lengths in mm, angles in rad.
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.general import GeneralRobot, end_of
+from rrru.robots.drive_step import end_of
+from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
 
 

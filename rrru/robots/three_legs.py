@@ -3,7 +3,7 @@
 A leg's frame has x outwards, y to the side and z as the robot's; a site's name is its leg's and what it is.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.parameters import LEGS, Parameter, ParameterSet
-from rrru.robots import singularity
+from rrru.robots import singularity, workspace
 from rrru.robots.legs import Drive, unit_twist
 from rrru.robots.robot import Robot
 
@@ -94,6 +94,16 @@ class ThreeLegs(Robot):
     def leg_map(self):
         """Derivative of the legs' numbers by the parameters, shape (3, k, p)."""
         return np.stack([self.leg_changes({name: 1.0}) for name in self.parameters.names], axis=-1)
+
+    @property
+    def size_mm(self):
+        """Sum of the robot's lengths."""
+        return float(sum(np.sum(np.abs(getattr(self, f.name))) for f in fields(self) if f.name.endswith("_mm")))
+
+    @property
+    def farthest_mm(self):
+        """Distance of the farthest reachable point from the origin."""
+        return workspace.farthest_mm(self)
 
     def identifiable(self, values):
         """Mapping of the parameters, no two of which act alike, from values of any of DEVIATIONS; absent ones are zero.

@@ -27,3 +27,14 @@ def measures(mechanism, points_mm):
     inside = points_mm[reachable]
     result[:, reachable] = mechanism.singularities(inside, theta[reachable])
     return reachable, *result
+
+
+def farthest_mm(robot):
+    """Distance of the farthest reachable point from the origin in mm, found on rays in all directions."""
+    count = 400
+    height, turn = np.linspace(-1.0, 1.0, count), np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    ring = np.sqrt(1.0 - height**2)
+    rays = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=-1)
+    radius = np.linspace(0.0, 1.0, 101)[1:] * robot.size_mm
+    points = (radius[:, None, None] * rays).reshape(-1, 3)
+    return float(np.linalg.norm(points[np.isfinite(robot.inverse(points)).all(axis=1)], axis=1).max())

@@ -1,6 +1,5 @@
 """Whether commanded, drive and measured values of a campaign belong to the robot and to each other. Lengths in mm."""
 
-from dataclasses import fields
 from itertools import permutations, product
 
 import numpy as np
@@ -25,6 +24,8 @@ def check_commands(sheet):
     command = rows.command(known)
     if not len(known):
         return True
+    if sheet.mechanism.orients and set(sheet.drives) <= set(known):
+        return _check_poses(known, command, sheet)
     if _wrong_unit(command, sheet):
         return False
     drive = sheet.mechanism.inverse(command, elbow=sheet.spec.elbow)
@@ -36,6 +37,20 @@ def check_commands(sheet):
     flipped = _upside_down(command[reached], drive[reached], sheet)
     if set(sheet.drives) <= set(known) and not flipped:
         _check_drives(known[reached], drive[reached], sheet)
+    return True
+
+
+def _check_poses(known, command, sheet):
+    """Note drive values that bring the nominal robot elsewhere than commanded; True.
+
+    Of a robot that can orient its platform the commanded positions alone do not tell the drive values.
+    """
+    back = sheet.mechanism.forward(known[[*sheet.drives]].to_numpy(), guess_mm=command)
+    off, limit = np.linalg.norm(back - command, axis=1), frame_limit(sheet.mechanism)
+    if not np.median(off) <= limit:
+        value = f"{sheet.drive_name} that bring the nominal robot {np.median(off):.6g} mm from there in the median"
+        advice = "see that unit, angle_unit, the robot's zero positions, its frame and its tool belong to the file"
+        sheet.note("angles", COMMAND, value, f"at most {limit:.4g} mm; {advice}")
     return True
 
 
@@ -79,7 +94,7 @@ def check_measured(sheet):
             value = f"run {number:g}: measured positions {median:.6g} mm from the commanded ones in the median"
             allowed = f"at most {limit:g} mm, in one frame for all runs"
             sheet.note("frame", MEASURED, value, allowed, known.index[at[0]])
-    far = _REACH_MARGIN * _farthest(sheet.mechanism)
+    far = _REACH_MARGIN * sheet.mechanism.farthest_mm
     for i in np.flatnonzero((np.linalg.norm(measured, axis=1) > far) | (measured == 0.0).all(axis=1)):
         allowed = f"within {far:.4g} mm of the robot's origin, and not 0, 0, 0"
         allowed += "; drop the row of a point that was not measured"
@@ -95,7 +110,7 @@ def doubts(frame, mechanism):
         if off > 1.0 and np.median(shifted) < 0.2 * off:
             fit = f"measured positions fit the command of the row {word} theirs to {np.median(shifted):.3g} mm"
             notes.append(f"{fit} in the median, their own to {off:.3g} mm: the rows may be shifted")
-    if off > _STRANGE_SHARE * _size(mechanism):
+    if off > _STRANGE_SHARE * mechanism.size_mm:
         far = f"measured positions are {off:.4g} mm from the commanded ones in the median"
         notes.append(f"{far}: see that unit, frame and rows belong together")
     return notes
@@ -103,23 +118,7 @@ def doubts(frame, mechanism):
 
 def frame_limit(mechanism):
     """Distance in mm between measured and commanded positions above which the frames must differ."""
-    return _FRAME_SHARE * _size(mechanism)
-
-
-def _size(mechanism):
-    """Sum of the robot's lengths in mm."""
-    return float(sum(np.sum(np.abs(getattr(mechanism, f.name))) for f in fields(mechanism) if f.name.endswith("_mm")))
-
-
-def _farthest(mechanism):
-    """Distance of the farthest reachable point from the origin in mm, found on rays in all directions."""
-    count = 400
-    height, turn = np.linspace(-1.0, 1.0, count), np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
-    ring = np.sqrt(1.0 - height**2)
-    rays = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=-1)
-    radius = np.linspace(0.0, 1.0, 101)[1:] * _size(mechanism)
-    points = (radius[:, None, None] * rays).reshape(-1, 3)
-    return float(np.linalg.norm(points[np.isfinite(mechanism.inverse(points)).all(axis=1)], axis=1).max())
+    return _FRAME_SHARE * mechanism.size_mm
 
 
 def _spread(position):

@@ -1,0 +1,54 @@
+"""Tracker files of robots of one's own: a six-axis arm whose orientation changes along the path."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.errors import IngestError
+from rrru.robots.catalogue import make_mechanism
+from tests.places import ROOT
+
+ARM = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="zero")
+
+
+def _file():
+    """Rows of a file whose drive values turn the tool by half a radian and more between the ends of the path."""
+    share = np.linspace(0.0, 1.0, 40)
+    drives = ARM.legs.home_drives + np.outer(share, [0.2, 0.15, -0.1, 0.3, 0.4, 0.6])
+    command = ARM.forward(drives)
+    measured = command + np.random.default_rng(2).normal(0.0, 0.02, command.shape)
+    frame = pd.DataFrame(drives, columns=ARM.parts.columns).assign(trajectory="swing")
+    return frame.assign(**rows.vector_columns("command", command), **rows.vector_columns("measured", measured))
+
+
+def _ingested(frame, folder, **options):
+    """What ingest makes of rows."""
+    frame.to_csv(folder / "arm.csv", index=False)
+    return ingest(IngestSpec(str(folder / "arm.csv"), **options), ARM)
+
+
+def test_drive_values_are_taken_as_they_are_where_positions_do_not_tell_them(tmp_path):
+    """The tool turns along the path, which the inverse at the home orientation knows nothing of."""
+    frame = _file()
+    assert np.abs(ARM.inverse(rows.command(frame)) - frame[ARM.parts.columns].to_numpy()).max() > 0.1
+    found = _ingested(frame, tmp_path).measurements
+    assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-12
+    assert (found["status"] == "ok").all()
+
+
+def test_degrees_of_an_arm_are_converted_when_declared_and_refused_when_not(tmp_path):
+    """Angles in degrees bring the nominal arm elsewhere than commanded."""
+    frame = _file()
+    degrees = frame.assign(**{name: np.degrees(frame[name]) for name in ARM.parts.columns})
+    found = _ingested(degrees, tmp_path, angle_unit="deg").measurements
+    assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-9
+    with pytest.raises(IngestError, match=r"bring the nominal robot .* mm from there"):
+        _ingested(degrees, tmp_path)
+
+
+def test_a_column_of_another_robot_is_refused_with_the_names_of_this_one(tmp_path):
+    """theta1_rad is no joint of the arm."""
+    with pytest.raises(IngestError, match=r"theta1_rad.*nobody declared"):
+        _ingested(_file().assign(theta1_rad=0.0), tmp_path)
