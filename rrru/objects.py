@@ -8,6 +8,11 @@ from typing import Any
 from rrru.errors import ConfigError
 
 
+def module_file(name: str) -> Path:
+    """The file below the working directory that holds the module of `module:object`."""
+    return Path(f"{name.partition(':')[0].replace('.', '/')}.py")
+
+
 def load_object(whose: str, name: str) -> Any:
     """The object that `module:object` names; the module lies in the working directory or is installed.
 

@@ -38,6 +38,4 @@ def for_robot(robot):
 
 def _seats(motion, values):
     """Twists of the feet under tilts about x and z of leg 1, then of the others, (2 legs,) in rad."""
-    twists = np.zeros((len(motion.robot.parts.feet), 1, 6))
-    twists[:, 0, [3, 5]] = np.reshape(values, (-1, 2))
-    return motion.at(dict(zip(motion.robot.parts.feet, twists, strict=True)))
+    return motion.at_feet(np.insert(np.reshape(values, (-1, 2)), 1, 0.0, axis=1))

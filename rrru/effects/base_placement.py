@@ -41,10 +41,9 @@ def for_robot(robot):
 
 def _placed(motion, values):
     """Twists of the feet under azimuth (rad), radius and height (mm) of leg 1, then of the others, (3 legs,)."""
-    joints = {joint.name: joint for joint in motion.robot.legs.joints}
-    twists = {}
-    for site, (azimuth, radius, height) in zip(motion.robot.parts.feet, np.reshape(values, (-1, 3)), strict=True):
-        drawn = joints[site].shift_mm[0]
-        place = (drawn + radius) * np.cos(azimuth) - drawn, (drawn + radius) * np.sin(azimuth), height
-        twists[site] = np.array([[*place, 0.0, 0.0, azimuth]])
-    return motion.at(twists)
+    shifts = {joint.name: joint.shift_mm for joint in motion.robot.legs.joints}
+    drawn = np.array([shifts[site][0] for site in motion.robot.parts.feet])
+    azimuth, radius, height = np.reshape(values, (-1, 3)).T
+    placed, nothing = drawn + radius, np.zeros(len(drawn))
+    shift = np.stack([placed * np.cos(azimuth) - drawn, placed * np.sin(azimuth), height], axis=1)
+    return motion.at_feet(np.stack([nothing, nothing, azimuth], axis=1), shift)

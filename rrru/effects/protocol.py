@@ -65,6 +65,11 @@ class Motion:
         named = [(site, k) for k, group in enumerate(groups) for site in group]
         return self.at({site: np.multiply.outer(shifts_mm[:, k], _ALONG) for site, k in named})
 
+    def at_feet(self, turns_rad: np.ndarray, shifts_mm: np.ndarray | float = 0.0) -> Contribution:
+        """Contribution of rotation vectors (legs, 3) and shifts (legs, 3) of the legs' feet."""
+        twists = np.concatenate([np.zeros_like(turns_rad) + shifts_mm, turns_rad], axis=1)
+        return self.at(dict(zip(self.robot.parts.feet, twists[:, None], strict=True)))
+
     def at(self, twists: Mapping[str, np.ndarray]) -> Contribution:
         """Contribution of twists (n or 1, 6) by the site's name."""
         numbers = self.robot.legs.site_numbers

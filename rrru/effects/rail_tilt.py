@@ -36,6 +36,4 @@ def for_robot(robot):
 
 def _seats(motion, values):
     """Twists of the rails' seats under lean, rise and swing of leg 1, then of the others, (3 legs,) in rad."""
-    turns = np.reshape(values, (-1, 1, 3)) * [1.0, -1.0, 1.0]
-    twists = np.concatenate([np.zeros_like(turns), turns], axis=2)
-    return motion.at(dict(zip(motion.robot.parts.feet, twists, strict=True)))
+    return motion.at_feet(np.reshape(values, (-1, 3)) * [1.0, -1.0, 1.0])

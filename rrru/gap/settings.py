@@ -4,8 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from rrru.effects.library import BY_DEFAULT, find
 from rrru.errors import ConfigError
-from rrru.robots.ptt3 import Ptt3
-from rrru.robots.rrru3 import Rrru3
+from rrru.robots.catalogue import MECHANISMS
 
 
 @dataclass(frozen=True)
@@ -75,5 +74,5 @@ def _with_known(effect, values):
 
 def check(config):
     """Raise ConfigError where the `gap` section names an effect or a parameter that does not exist."""
-    for robot in (Rrru3(), Ptt3()):
-        GapSettings.from_config(config["gap"]).library(robot)
+    for kind in MECHANISMS.values():
+        GapSettings.from_config(config["gap"]).library(kind())

@@ -167,21 +167,41 @@ def _spare(screws):
     return np.diff([rank_of(screws[:, :count]) for count in range(screws.shape[1] + 1)]) == 0
 
 
+def walks(legs, actuators, passive, twists):
+    """The Walks of all legs."""
+    return [walk(legs, leg, actuators, passive, twists) for leg in legs.legs]
+
+
+def screws_off_home(legs):
+    """Passive screws (6, k) of every leg a little off its home values, where joints may stand in line."""
+    offset = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints)))
+    ways = walks(legs, legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs))
+    return [passive_screws(leg, way)[0] for leg, way in zip(legs.legs, ways, strict=True)]
+
+
+def wrenches_of(legs, ranks, ways, poses, actuators, twists):
+    """Wrenches (n, r, 6) of every leg that its passive joints, of these ranks, do not feel."""
+    result = []
+    for leg, way, rank in zip(legs.legs, ways, ranks, strict=True):
+        if leg.bar:
+            near, far, _ = bar_ends(legs, leg, way, poses, actuators, twists)
+            result.append(line_wrench(near, far)[:, None])
+        else:
+            result.append(wrenches_beside(passive_screws(leg, way), rank))
+    return result
+
+
 class Closure:
     """The closed legs of a robot; raises ConfigError where they do not hold the platform."""
 
     def __init__(self, legs):
         self.legs = legs
-        # a little off the home values, where joints may stand in line
-        offset = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints)))
-        actuators, passive = legs.home_drives[None], (legs.home_passive + offset)[None]
-        ways = self.walks(actuators, passive, Twists(legs))
-        self.ranks = [rank_of(passive_screws(leg, way)[0]) for leg, way in zip(legs.legs, ways, strict=True)]
+        screws = screws_off_home(legs)
+        self.ranks = [rank_of(one) for one in screws]
         counts = [1 if leg.bar else 6 - rank for leg, rank in zip(legs.legs, self.ranks, strict=True)]
         if sum(counts) < 6:
             raise ConfigError(f"the legs hold the platform by {sum(counts)} constraints; allowed: at least 6")
-        spare = [one for leg, way in zip(legs.legs, ways, strict=True) for one in _spare(passive_screws(leg, way)[0])]
-        self._tables = tables(legs, spare)
+        self._tables = tables(legs, [spare for one in screws for spare in _spare(one)])
         # of more than six constraints a bar's length counts as what it turns at the arm, as the chains' shifts do
         weights = [1.0 / ARM_MM if leg.bar else 1.0 for leg in legs.legs]
         self._weights = np.repeat(weights, counts)[:, None]
@@ -190,38 +210,15 @@ class Closure:
 
     def walks(self, actuators, passive, twists):
         """The Walks of all legs."""
-        return [walk(self.legs, leg, actuators, passive, twists) for leg in self.legs.legs]
+        return walks(self.legs, actuators, passive, twists)
 
     def wrenches(self, ways, poses, actuators, twists):
         """Wrenches (n, r, 6) of every leg that its passive joints do not feel."""
-        result = []
-        for leg, way, rank in zip(self.legs.legs, ways, self.ranks, strict=True):
-            if leg.bar:
-                near, far, _ = bar_ends(self.legs, leg, way, poses, actuators, twists)
-                result.append(line_wrench(near, far)[:, None])
-            else:
-                result.append(wrenches_beside(passive_screws(leg, way), rank))
-        return result
+        return wrenches_of(self.legs, self.ranks, ways, poses, actuators, twists)
 
     def inverse(self, wrenches):
         """Twists (n, 6, rows) of the platform per constraint, the inverse of the wrenches A of all legs."""
         return _SCALE[:, None] * _inverse(np.concatenate(wrenches, axis=1) * _SCALE * self._weights) * self._weights.T
-
-    def lacks(self, ways, poses, actuators, twists):
-        """Of a chain the twist (n, 6) from the platform's pose to its end, of a bar the length (n,) that it lacks."""
-        result = []
-        for leg, way in zip(self.legs.legs, ways, strict=True):
-            if leg.bar:
-                near, far, length = bar_ends(self.legs, leg, way, poses, actuators, twists)
-                result.append(length - np.linalg.norm(far - near, axis=1))
-            else:
-                off = way.turn @ poses.turn.transpose(0, 2, 1)
-                turn = 0.5 * np.stack(
-                    [off[:, 2, 1] - off[:, 1, 2], off[:, 0, 2] - off[:, 2, 0], off[:, 1, 0] - off[:, 0, 1]], axis=1
-                )
-                shift = way.place - poses.position_mm - np.cross(turn, poses.position_mm)
-                result.append(np.concatenate([shift, turn], axis=1))
-        return result
 
     def solve(self, actuators, start, twists=None):
         """Poses at actuator values (n, K) next to the Poses `start`, under finite twists (n or 1, sites, 6).

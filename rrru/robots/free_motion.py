@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from rrru.robots.closure import Poses, Twists, bar_ends, line_wrench, passive_screws, rank_of, walk, wrenches_beside
+from rrru.robots.closure import Poses, Twists, rank_of, screws_off_home, walks, wrenches_of
+from rrru.robots.closure_kernel import ARM_MM
 
-# lengths count in this arm; singular values below this share of the largest are none
-_ARM_MM, _NONE = 500.0, 1e-6
-_SCALE = np.repeat([_ARM_MM, 1.0], 3)
+# singular values below this share of the largest are none
+_NONE = 1e-6
+_SCALE = np.repeat([ARM_MM, 1.0], 3)
 
 
 def free_motions(legs, up=(0.0, 0.0, 1.0)):
     """The motions in words, at the home pose of Legs, such as "turn about the vertical axis through the platform"."""
     free = _free_twists(legs)
     # at the platform's centre: shifts, turns about it, then what is left of both
-    free[:, :3] += np.cross(free[:, 3:], legs.home_mm / _ARM_MM)
+    free[:, :3] += np.cross(free[:, 3:], legs.home_mm / ARM_MM)
     shifts, turns = _without(free, slice(3, 6)), _without(free, slice(0, 3))
     pure = np.concatenate([shifts, turns])
     left = np.linalg.svd(free - free @ np.linalg.pinv(pure) @ pure)[2][: len(free) - len(pure)]
@@ -25,19 +26,10 @@ def free_motions(legs, up=(0.0, 0.0, 1.0)):
 def _free_twists(legs):
     """Twists (k, 6) at the world's origin, lengths counted in the arm, that no leg resists."""
     twists, actuators = Twists(legs), legs.home_drives[None]
-    # a leg's freedoms are counted a little off its home values, where joints may stand in line
-    offset = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints)))
     home = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
-    rows = [np.zeros((6, 6))]
-    for leg in legs.legs:
-        way = walk(legs, leg, actuators, home.passive, twists)
-        if leg.bar:
-            near, far, _ = bar_ends(legs, leg, way, home, actuators, twists)
-            rows.append(line_wrench(near, far))
-        else:
-            rank = rank_of(passive_screws(leg, walk(legs, leg, actuators, home.passive + offset, twists))[0])
-            rows.append(wrenches_beside(passive_screws(leg, way), rank)[0])
-    wrenches = np.concatenate(rows) * _SCALE
+    ranks = [rank_of(screws) for screws in screws_off_home(legs)]
+    rows = wrenches_of(legs, ranks, walks(legs, actuators, home.passive, twists), home, actuators, twists)
+    wrenches = np.concatenate([np.zeros((6, 6)), *(one[0] for one in rows)]) * _SCALE
     _, size, vectors = np.linalg.svd(wrenches / np.maximum(np.linalg.norm(wrenches, axis=1, keepdims=True), 1e-300))
     return vectors[size <= _NONE * size[0]]
 
@@ -69,9 +61,9 @@ def _direction(vector, up):
 
 def _screw(twist, centre_mm, up):
     """A twist (6,) at the platform's centre, lengths counted in the arm, in words."""
-    shift, turn = twist[:3] * _ARM_MM, twist[3:]
+    shift, turn = twist[:3] * ARM_MM, twist[3:]
     square = turn @ turn
     x, y, z = centre_mm + np.cross(turn, shift) / square
     pitch = shift @ turn / square
-    screw = f" while shifting along it by {pitch:.3g} mm per rad" if abs(pitch) > _ARM_MM * _NONE else ""
+    screw = f" while shifting along it by {pitch:.3g} mm per rad" if abs(pitch) > ARM_MM * _NONE else ""
     return f"turn about {_direction(turn, up)} through ({x:.3f}, {y:.3f}, {z:.3f}) mm{screw}"

@@ -12,8 +12,8 @@ import numpy as np
 from rrru.robots.closure import Twists, rank_of, screw, walk
 from rrru.robots.from_seams import Move, placed
 from rrru.robots.legs import TOOL, WORLD, Bar, Joint, Leg, Z
+from rrru.robots.lumps import PLATFORM
 
-PLATFORM = "platform"
 # axes meet in a point and a slide goes along a line to within this, in mm and rad
 _MEET_MM, _ALONG = 1e-6, 1e-9
 

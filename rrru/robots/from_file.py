@@ -16,20 +16,18 @@ from scipy.spatial.transform import Rotation
 from rrru.errors import ConfigError
 from rrru.robots import from_urdf as urdf_files
 from rrru.robots.closure import Closure, Poses, Twists, bar_ends, walk
+from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.free_motion import free_motions
 from rrru.robots.from_chains import Chains, with_bars
-from rrru.robots.from_lumps import Lump, lumps_of
+from rrru.robots.from_lumps import lumps_of
 from rrru.robots.from_mjcf import MM, Assembly
 from rrru.robots.from_seams import undone
 from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Drive, Legs, Parts, unit_twist
 
-__all__ = ["Lump", "from_mjcf", "from_urdf"]
 # a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
 # where more joints than needed do not fit each other; below the last it is not closed at all
 _OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
-# angles count in this arm
-_ARM_MM = 500.0
 # a drive without limits works this far about its home value
 _RANGE = {"rad": 1.0, "mm": 100.0}
 _UNITS = {"R": "rad", "P": "mm"}
@@ -214,5 +212,5 @@ def _gaps(legs, poses):
             result.append(abs(length[0] - np.linalg.norm(far - near)))
         else:
             off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
-            result.append(np.linalg.norm(way.place - poses.position_mm) + _ARM_MM * off)
+            result.append(np.linalg.norm(way.place - poses.position_mm) + ARM_MM * off)
     return np.array(result)

@@ -8,29 +8,14 @@ Of a bar only what lies along it is known: two points have its mass, its centre'
 Lengths in mm, masses in kg.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rrru.robots.closure import Twists, walk
-from rrru.robots.from_chains import PLATFORM
 from rrru.robots.from_mjcf import MM
 from rrru.robots.from_seams import placed, turn_of, undone
 from rrru.robots.from_urdf import NO_MASS_KG
 from rrru.robots.legs import turn_about
-
-
-@dataclass(frozen=True, eq=False)
-class Lump:
-    """A point mass in mass_kg at at_mm (3,) of the frame behind the motion of a joint, called by its site.
-
-    joint "platform": the platform's frame. Of a bar's mass, lumps of the site "<leg> bar" count along it from its first
-    ball joint, those of "<leg> end", at negative x, along it from its end: what moves with a driven slide.
-    """
-
-    joint: str
-    mass_kg: float
-    at_mm: np.ndarray
+from rrru.robots.lumps import PLATFORM, Lump
 
 
 def points_of(model, body):

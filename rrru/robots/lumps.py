@@ -7,6 +7,8 @@ Every point mass m at x loads drive k with
 The derivatives are central differences of the exactly closed legs. Lengths in mm, masses in kg, forces in N, time in s.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rrru.robots.closure import Twists, bar_ends
@@ -14,7 +16,21 @@ from rrru.robots.legs import turn_about
 
 # steps of the differences: in time, and of an actuator value by its unit
 _STEP_S, _STEP = 1e-3, {"rad": 1e-4, "mm": 1e-2}
-_PLATFORM = "platform"
+# what a lump of the platform is fixed in
+PLATFORM = "platform"
+
+
+@dataclass(frozen=True, eq=False)
+class Lump:
+    """A point mass in mass_kg at at_mm (3,) of the frame behind the motion of a joint, called by its site.
+
+    joint "platform": the platform's frame. Of a bar's mass, lumps of the site "<leg> bar" count along it from its first
+    ball joint, those of "<leg> end", at negative x, along it from its end: what moves with a driven slide.
+    """
+
+    joint: str
+    mass_kg: float
+    at_mm: np.ndarray
 
 
 def places(robot, actuators, poses):
@@ -24,7 +40,7 @@ def places(robot, actuators, poses):
     holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
     result = []
     for lump in robot.lumps:
-        if lump.joint == _PLATFORM:
+        if lump.joint == PLATFORM:
             result.append(poses.point(lump.at_mm))
             continue
         leg = holders[lump.joint]

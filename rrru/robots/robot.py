@@ -3,6 +3,7 @@
 A robot's class adds its legs, parts and parameters, and where it pays a closed form of what is here.
 """
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +16,7 @@ from rrru.robots.legs import Legs, Parts
 from rrru.robots.twist_map import TwistMap
 
 
-class Robot:
+class Robot(ABC):
     """A robot as its controller believes it to be, with small deviations of its numbers.
 
     name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.robots.legs.Legs`;
@@ -39,9 +40,9 @@ class Robot:
     # grid lines over its longest reach in a picture of its workspace
     workspace_lines = 130
 
+    @abstractmethod
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
-        raise NotImplementedError
 
     @cached_property
     def model(self):

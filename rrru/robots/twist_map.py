@@ -97,10 +97,6 @@ class TwistMap:
             return np.concatenate([self.poses.turn, np.zeros_like(self.poses.turn)], axis=2)
         return sum(self.point[:, :, rows] @ counts for rows, counts in self.counts(site))
 
-    def platform_response(self, site):
-        """Twist (n, 6) of the platform at the world's origin per twist at a site: (n, 6, 6)."""
-        return sum(self.platform[:, :, rows] @ counts for rows, counts in self.counts(site))
-
     def move(self, twists):
         """Change (n, 3) of the measured position in mm under small twists (n or 1, sites, 6)."""
         result, numbers = np.zeros((len(self), 3)), self.closure.legs.site_numbers

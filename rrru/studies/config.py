@@ -7,6 +7,7 @@ import hashlib
 from pathlib import Path
 
 from rrru.errors import ConfigError
+from rrru.objects import module_file
 
 
 def part(config, *keys):
@@ -34,7 +35,7 @@ def robot(config, section):
 def own_robot_file(dimensions):
     """The file of a `robots:` entry that describes a robot of the user's own, None for a built-in one."""
     if "module" in dimensions:
-        return Path(f"{dimensions['module'].partition(':')[0].replace('.', '/')}.py")
+        return module_file(dimensions["module"])
     return next((Path(dimensions[key]) for key in ("urdf", "mjcf") if key in dimensions), None)
 
 

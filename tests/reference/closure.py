@@ -59,7 +59,7 @@ def _step(legs, ranks, actuators, poses, twists):
         else:
             u, size, v = np.linalg.svd(passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
             u, size, v = u[:, :, :rank], size[:, None, :rank], v[:, :rank]
-            lack, off = _lack(way, poses) / _SCALE, np.eye(6) - u @ u.transpose(0, 2, 1)
+            lack, off = lack_of(way, poses) / _SCALE, np.eye(6) - u @ u.transpose(0, 2, 1)
             total, pull = total + off, pull + (off @ lack[:, :, None])[:, :, 0]
             chains.append((leg, lack, (v.transpose(0, 2, 1) / size) @ u.transpose(0, 2, 1)))
     scaled = np.linalg.solve(total, pull[:, :, None])[:, :, 0]
@@ -71,7 +71,7 @@ def _step(legs, ranks, actuators, poses, twists):
     return twist[:, :3] + np.cross(twist[:, 3:], poses.position_mm), twist[:, 3:], change
 
 
-def _lack(way, poses):
+def lack_of(way, poses):
     """The small twist (n, 6) at the world's origin from the platform's pose to the end of a chain."""
     off = way.turn @ poses.turn.transpose(0, 2, 1)
     turn = 0.5 * np.stack(

@@ -16,7 +16,7 @@ from rrru.studies import setup
 def main(settings, inputs, outputs):
     """Write the campaign's runs, their history, the comparison with least squares and the times."""
     searched = searched_set(settings["nominal"]["name"])
-    frames = _runs(settings, inputs, searched) if searched else _nothing()
+    frames = _runs(settings, inputs, searched) if searched else _nothing(outputs)
     frames = {table: frame.assign(campaign=settings["campaign"]) for table, frame in frames.items()}
     tables.write_all(TABLES, frames, outputs)
 
@@ -41,9 +41,8 @@ def _runs(settings, inputs, searched):
     return frames | {"genetic_against_least_squares": compared}
 
 
-def _nothing():
-    """Empty frames by table, for a robot without an objective fast enough."""
-    names = ("genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares", "timings")
+def _nothing(names):
+    """Empty frames of the tables of these names, for a robot without an objective fast enough."""
     return {table.name: pd.DataFrame(columns=table.names) for table in TABLES if table.name in names}
 
 

@@ -1,6 +1,7 @@
 import hashlib
 from pathlib import Path
 
+from rrru.objects import module_file
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
 from rrru.studies.checks import check_once
@@ -117,7 +118,7 @@ def own_effects_digests():
 
 def own_effects():
     """The files that hold the user's own effects."""
-    return [Path(f"{name.partition(':')[0].replace('.', '/')}.py") for name in config["gap"]["own_effects"]]
+    return [module_file(name) for name in config["gap"]["own_effects"]]
 
 
 def campaign_options(campaign):
