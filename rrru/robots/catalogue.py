@@ -9,6 +9,7 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.objects import load_object
 from rrru.robots.delta import Delta
+from rrru.robots.free_motion import free_motions
 from rrru.robots.general import GeneralRobot
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.robot import Robot
@@ -57,6 +58,8 @@ def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robo
         robot = load_object(f"robot {name}", section["module"])()
         if not isinstance(robot, GeneralRobot):
             raise ConfigError(f"robot {name}: {section['module']} gave a {type(robot).__name__}; allowed: GeneralRobot")
+        if free := free_motions(robot.legs, robot.up):
+            raise ConfigError(f"robot {name}: its platform is free to {'; '.join(free)}; allowed: legs that hold it")
         return replace(robot, name=name, **tool, **options)
     from rrru.robots import from_file
 

@@ -2,7 +2,7 @@
 
 Its parameters are directions at sites. "zero" are its drives' offsets; "full" is every geometric number that positions
 can tell, drives first, then lengths, then angles: a number that those before it imitate over the workspace is left out,
-and `gauge` says which combination stands for it. Lengths in mm, angles in rad.
+and `gauge` says what stands for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -67,14 +67,15 @@ class GeneralRobot(Robot):
     @cached_property
     def _chosen(self):
         """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
-        if self.parameter_set == "zero":
-            return self.candidates[: len(self.parts.drives)], {}
+        wanted = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else self.candidates
+        if self.parameter_set == "zero" and not self.sample:
+            return wanted, {}
         actuators, position = self.sample or self._workspace()
         poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
         at = self.map(actuators[poses.closed], poses.of(poses.closed))
         columns = at.columns(np.stack([direction(self.legs, one) for one in self.candidates], axis=-1))
         sizes = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self.candidates])
-        allowed = np.array([not self.among or one.name in self.among for one in self.candidates])
+        allowed = [one in wanted and (not self.among or one.name in self.among) for one in self.candidates]
         chosen, stands = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
         gauge = {
             self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
@@ -99,11 +100,9 @@ class GeneralRobot(Robot):
     def parameters(self):
         """The parameters of the chosen set, nominally zero."""
         limits = {"mm": self.length_limit_mm, "rad": self.angle_limit_rad}
+        bounds = ((one, limits[one.unit]) for one in self._chosen[0])
         return ParameterSet(
-            tuple(
-                Parameter(one.name, one.unit, 0.0, -limits[one.unit], limits[one.unit], "bounds assumed", one.leg)
-                for one in self._chosen[0]
-            )
+            tuple(Parameter(one.name, one.unit, 0.0, -most, most, "bounds assumed", one.leg) for one, most in bounds)
         )
 
     @cached_property

@@ -149,3 +149,32 @@ def test_numbers_that_others_imitate_are_left_out_and_said_so():
     left_out, shares = next((name, of) for name, of in arm._chosen[1].items() if np.abs(of).max() > 1e-3)
     combined = sum(share * columns[name] for name, share in zip(arm.parameters.names, shares, strict=False))
     assert np.abs(columns[left_out] - combined).max() < 1e-6 * np.abs(columns[left_out]).max() + 1e-9
+
+
+def test_the_example_hexapod_of_an_mjcf_file_goes_the_whole_way(tmp_path):
+    """Its six legs' play is named at the legs, in its own columns."""
+    hexapod = make_mechanism("h", {"mjcf": str(ROOT / "data/robots/hexapod.xml"), "platform": "plate"})
+    x, y, z = (float(value) for value in hexapod.legs.home_mm.round(1))
+    result = _run(
+        tmp_path,
+        robot="{mjcf: data/robots/hexapod.xml, platform: plate}",
+        error=f"d{hexapod.parts.columns[2].rpartition('_')[0]}",
+        size=0.4,
+        play="{" + ", ".join(f"width{k}: 0.1" for k in range(1, 7)) + "}",
+        start=[x - 60.0, y, z],
+        end=[x + 60.0, y, z],
+        errors="zero",
+    )
+    assert set(hexapod.parts.columns) <= set(result["measurements"])
+    verdict = result["gap_verdicts"].iloc[0]
+    assert "backlash" in verdict["effects"] and verdict["where"].startswith(hexapod.parts.drives[0].site)
+
+
+def test_a_module_whose_platform_is_not_held_says_what_it_is_free_to_do(tmp_path, monkeypatch):
+    """A planar robot with one leg less turns about the vertical."""
+    source = _MODULE.replace("for k in (1, 2, 3):\n        azimuth", "for k in (1,):\n        azimuth", 1)
+    source = source.replace("unit_twist(5)) for k in (1, 2, 3))", "unit_twist(5)) for k in (1,))")
+    (tmp_path / "loose_planar.py").write_text(source)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ConfigError, match=r"robot mine: its platform is free to .*; allowed: legs that hold it"):
+        make_mechanism("mine", {"module": "loose_planar:make"}, parameter_set="zero")
