@@ -1,8 +1,8 @@
-"""Newton steps of the actuator values of a robot without a closed inverse. Lengths in mm, angles in rad."""
+"""Actuator values of a robot without a file: Newton steps, lengths of driven bars. Lengths in mm, angles in rad."""
 
 import numpy as np
 
-from rrru.robots.closure import Poses, Twists, walk
+from rrru.robots.closure import Poses, Twists, bar_ends, walk
 
 
 def drive_step(at, ranks, lack_mm, turning_rad):
@@ -31,3 +31,19 @@ def end_of(legs, leg, actuators):
     passive = np.zeros((len(actuators), len(legs.passive_joints)))
     way = walk(legs, leg, actuators, passive, Twists(legs))
     return Poses(way.place, way.turn, passive, None, None)
+
+
+def bar_lengths(legs, drive_range, place, twists):
+    """Lengths (n, K) of driven bars at places of the platform, NaN where one is outside of its range (K, 2).
+
+    place: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
+    """
+    poses = Poses(*place, np.zeros((len(place[0]), 0)), None, None)
+    none, own = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
+    needed = none.copy()
+    for leg in legs.legs:
+        if leg.bar:
+            near, far, length = bar_ends(legs, leg, walk(legs, leg, none, poses.passive, own), poses, none, own)
+            needed[:, leg.bar.drive] = np.linalg.norm(far - near, axis=1) - length
+    low, high = np.asarray(drive_range, dtype=float).T
+    return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)

@@ -13,10 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.closure import Poses, Twists, bar_ends, walk
-from rrru.robots.drive_step import drive_step, end_of
+from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
-from rrru.robots.geometric_numbers import candidates_of, choose, direction
+from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, open_numbers
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import drive_loads
 from rrru.robots.robot import Robot
@@ -34,8 +33,8 @@ class GeneralRobot(Robot):
     """A robot of any legs.
 
     drive_range (K, 2): actuator values between which it works; parameter_set: one of SETS; lumps: point masses of its
-    links; sample: actuator values (n, K) and positions (n, 3) at which "full" is chosen, by default over the workspace;
-    among: names that it is chosen from, by default all.
+    links; sample: actuator values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the
+    workspace; among: names that it is chosen from, by default all; reads: what a campaign's readings leave open.
     """
 
     name: str
@@ -51,6 +50,7 @@ class GeneralRobot(Robot):
     lumps: tuple = ()
     sample: tuple | None = None
     among: tuple[str, ...] = ()
+    reads: Reads = Reads()
 
     TRACKED = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
@@ -62,20 +62,23 @@ class GeneralRobot(Robot):
     @cached_property
     def candidates(self):
         """All Candidates, see `rrru.robots.geometric_numbers`."""
-        return candidates_of(self.legs, self.parts)
+        return candidates_of(self.legs, self.parts, self.reads)
 
     @cached_property
     def _chosen(self):
         """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
-        wanted = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else self.candidates
+        drives = self.candidates[: len(self.parts.drives)]
+        wanted = (*drives, *open_numbers(self.reads)) if self.parameter_set == "zero" else self.candidates
         if self.parameter_set == "zero" and not self.sample:
             return wanted, {}
-        actuators, position = self.sample or self._workspace()
+        actuators, position, readings = self.sample or (*self._workspace(), None)
         poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
-        at = self.map(actuators[poses.closed], poses.of(poses.closed))
+        seen = poses.closed
+        at = self.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
         columns = at.columns(np.stack([direction(self.legs, one) for one in self.candidates], axis=-1))
         sizes = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self.candidates])
-        allowed = [one in wanted and (not self.among or one.name in self.among) for one in self.candidates]
+        names = {one.name for one in wanted} & set(self.among or [one.name for one in wanted])
+        allowed = [one.name in names for one in self.candidates]
         chosen, stands = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
         gauge = {
             self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
@@ -89,7 +92,8 @@ class GeneralRobot(Robot):
             low, high = np.asarray(self.drive_range, dtype=float).T
             position = self.legs.home_mm + 0.3 * (high - low).min() * generator.uniform(-1.0, 1.0, (_POSES, 3))
             turn = Rotation.from_rotvec(_TILT_RAD * generator.uniform(-1.0, 1.0, (_POSES, 3))).as_matrix()
-            actuators = self._bar_lengths(position, turn @ self.legs.home_turn, self.twists())
+            place = position, turn @ self.legs.home_turn
+            actuators = bar_lengths(self.legs, self.drive_range, place, self.twists())
             known = np.isfinite(actuators).all(axis=1)
             return actuators[known], position[known]
         low, high = np.asarray(self.drive_range, dtype=float).T
@@ -141,13 +145,18 @@ class GeneralRobot(Robot):
                 result[stands.name] += share * value
         return result
 
-    def seen_at(self, actuators, position_mm):
-        """The robot with its set "full" chosen on poses of a campaign, (n, K) and (n, 3), by what noise lets tell.
+    def reading(self, reads):
+        """The robot with what a campaign's readings leave open, `rrru.robots.geometric_numbers.Reads`."""
+        return replace(self, legs=replace(self.legs, reflectors=reads.reflectors), reads=reads)
 
-        Of a robot so chosen, on poses of a part of its campaign, it keeps a part of the numbers.
+    def seen_at(self, actuators, position_mm, readings=None):
+        """The robot with its set chosen on poses of a campaign, (n, K) and (n, 3), by what noise lets tell.
+
+        readings: what was read at these poses, by default positions of the tool. Of a robot so chosen, on poses of a
+        part of its campaign, it keeps a part of the numbers.
         """
         among = () if self.sample is None else self.parameters.names
-        sample = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float)
+        sample = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float), readings
         return replace(self, sample=sample, among=among)
 
     @property
@@ -177,7 +186,8 @@ class GeneralRobot(Robot):
         position, twists = np.asarray(position_mm, dtype=float), self.twists(deviations)
         wanted = np.broadcast_to(self.legs.home_turn, (len(position), 3, 3)) if turn is None else turn
         if self._bars_only:
-            return self._bar_lengths(position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted, twists)
+            place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
+            return bar_lengths(self.legs, self.drive_range, place, twists)
         actuators = np.tile(self.legs.home_drives, (len(position), 1)).astype(float)
         poses = self.solve(actuators, np.tile(self.legs.home_mm, (len(position), 1)))
         left = np.full(len(position), np.inf)
@@ -215,20 +225,6 @@ class GeneralRobot(Robot):
         """Whether every drive is a bar's length."""
         bars = [leg.bar.drive for leg in self.legs.legs if leg.bar]
         return None not in bars and len(bars) == len(self.parts.drives)
-
-    def _bar_lengths(self, centre_mm, turn, twists):
-        """Lengths (n, K) of the driven bars at platform poses, NaN outside of their ranges."""
-        poses = Poses(centre_mm, turn, np.zeros((len(centre_mm), 0)), None, None)
-        none, own = np.zeros((len(centre_mm), len(self.parts.drives))), Twists(self.legs, twists)
-        needed = none.copy()
-        for leg in self.legs.legs:
-            if leg.bar:
-                near, far, length = bar_ends(
-                    self.legs, leg, walk(self.legs, leg, none, poses.passive, own), poses, none, own
-                )
-                needed[:, leg.bar.drive] = np.linalg.norm(far - near, axis=1) - length
-        low, high = np.asarray(self.drive_range, dtype=float).T
-        return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)
 
     @cached_property
     def _freedoms(self):

@@ -19,8 +19,35 @@ class Candidate:
     twists: dict
 
 
-def candidates_of(legs, parts):
-    """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world."""
+@dataclass(frozen=True)
+class Reads:
+    """What the readings of a campaign leave open.
+
+    reflectors: names of the sites of the reflectors that were read, none where the tool was; fitted: those of them
+    whose place on the tool is not known; turned: whether orientations were read; frame: whether it is only roughly
+    known how the instrument's frame, and where orientations were read the tool's, lie.
+    """
+
+    reflectors: tuple[str, ...] = ()
+    fitted: tuple[str, ...] = ()
+    turned: bool = False
+    frame: bool = False
+
+
+def open_numbers(reads):
+    """Candidates that Reads leave open: places of reflectors, the tool's pose where orientations tell it, the frame."""
+    first = 3 if reads.fitted else 0
+    tool = range(first, 6) if reads.turned and reads.frame else ()
+    places = [(name, k) for name in reads.fitted for k in range(3)] + [(TOOL, k) for k in tool]
+    return tuple(_at(*place) for place in places + [(WORLD, k) for k in range(6) if reads.frame])
+
+
+def candidates_of(legs, parts, reads=None):
+    """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
+
+    What Reads leave open comes before the rest of tool and world.
+    """
+    reads = reads or Reads()
     drives = [
         Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, {drive.site: drive.twist})
         for number, drive in enumerate(parts.drives, 1)
@@ -39,8 +66,10 @@ def candidates_of(legs, parts):
             bar, end = leg.bar_sites
             lengths.append((bar, 0))
             shifts += [(end, k) for k in range(3)]
-    own = [(TOOL, k) for k in range(3)] + [(WORLD, k) for k in range(6)]
-    return (*drives, *(_at(*place) for place in (*lengths, *shifts, *turns, *own) if place not in taken))
+    own = [(TOOL, k) for k in range(6 if reads.turned or reads.reflectors else 3)] + [(WORLD, k) for k in range(6)]
+    numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
+    every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in own)]
+    return tuple({one.name: one for one in every}.values())
 
 
 def _at(site, component):
@@ -57,12 +86,13 @@ def direction(legs, candidate):
     return result
 
 
-def choose(columns, allowed, least):
+def choose(columns, allowed, least, basis=None):
     """Numbers of the columns (m, c) that those chosen before them leave more than the share `least` of.
 
-    allowed (c,): which may be chosen. With {number: combination (k,) of the chosen before it} of the others.
+    allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. With {number:
+    combination (k,) of the chosen before it} of the others.
     """
-    basis, chosen, stands = np.zeros((len(columns), 0)), [], {}
+    basis, chosen, stands = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
     for number, column in enumerate(columns.T):
         left = column - basis @ (basis.T @ column)
         left -= basis @ (basis.T @ left)

@@ -6,8 +6,8 @@ cable between two ball joints, which only holds its length. Joints of one name, 
 by legs: the two bars of a Delta's arm share its drive.
 
 Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
-(the frame in which is measured) and the tool (the measured point) is a site with a frame of its own. Lengths in mm,
-angles in rad.
+(the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
+own, the last ones the platform's. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field
@@ -86,13 +86,15 @@ class Leg:
 class Legs:
     """All legs of a robot, and the sites and values that they make.
 
-    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace.
+    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
+    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured.
     """
 
     legs: tuple[Leg, ...]
     home_drives: np.ndarray
     home_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
     home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    reflectors: tuple[str, ...] = ()
 
     def __post_init__(self):
         owner = {}
@@ -123,9 +125,9 @@ class Legs:
 
     @cached_property
     def sites(self):
-        """Names of all sites: world, then leg by leg the joints' seats, bar and end, then tool."""
+        """Names of all sites: world, then leg by leg the joints' seats, bar and end, then tool and its reflectors."""
         names = [name for leg in self.legs for name in (*(joint.name for joint in leg.joints), *leg.bar_sites)]
-        return (WORLD, *dict.fromkeys(names), TOOL)
+        return (WORLD, *dict.fromkeys(names), TOOL, *self.reflectors)
 
     @cached_property
     def site_numbers(self):

@@ -4,15 +4,17 @@ A robot's class adds its legs, parts and parameters, and where it pays a closed 
 """
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
 from rrru.robots.closure import Closure, Poses
 from rrru.robots.legs import Legs, Parts
+from rrru.robots.reading_map import ReadingMap
+from rrru.robots.readings import place_on_platform, turned_by
 from rrru.robots.twist_map import TwistMap
 
 
@@ -49,9 +51,19 @@ class Robot(ABC):
         """The legs, closed."""
         return Closure(self.legs)
 
-    def seen_at(self, _actuators, _position_mm):
+    def reading(self, reads):
+        """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""
+        from rrru.robots.as_read import AsRead
+
+        return AsRead(self, reads) if reads.reflectors or reads.turned or reads.frame else self
+
+    def seen_at(self, _actuators, _position_mm, _readings=None):
         """The robot with its parameters chosen for poses of a campaign; those of most robots stay as they are."""
         return self
+
+    def widened(self, angle_rad, length_mm):
+        """The robot with other bounds of its parameters."""
+        return replace(self, angle_limit_rad=angle_rad, length_limit_mm=length_mm)
 
     @property
     def seats(self):
@@ -88,14 +100,23 @@ class Robot(ABC):
         """Poses at actuator values (n, K) near positions (n, 3), under twists (n or 1, sites, 6) at the sites."""
         return self.model.solve(actuators, self.near(position_mm, actuators), twists)
 
-    def measured(self, poses, twists):
-        """Positions (n, 3) of the tool in the world's frame at Poses, under the twists (n or 1, sites, 6) of both."""
-        tool = np.asarray(self.tool_mm) + twists[:, -1, :3]
-        return into_frame(poses.point(tool), twists[:, 0])
+    def measured(self, poses, twists, readings=None):
+        """Positions (n, 3) in the world's frame at Poses, under the twists (n or 1, sites, 6) of both.
 
-    def map(self, actuators, poses, twists=None):
-        """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6)."""
-        return TwistMap(self.model, actuators, poses, twists, self.tool_mm)
+        Of the tool, or of the reflectors of `rrru.robots.readings.Readings`.
+        """
+        return into_frame(poses.point(place_on_platform(self, twists, readings)), twists[:, 0])
+
+    def map(self, actuators, poses, twists=None, readings=None):
+        """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6).
+
+        Of the tool, or of Readings at these poses.
+        """
+        own = self.twists() if twists is None else twists
+        place = place_on_platform(self, own, readings)
+        if readings is None or readings.plain:
+            return TwistMap(self.model, actuators, poses, twists, place)
+        return ReadingMap(self, actuators, poses, own, place, readings)
 
     def map_at(self, actuators, position_mm, deviations=None):
         """The TwistMap under deviations (p,) at actuator values (n, K), near positions (n, 3)."""
@@ -174,9 +195,4 @@ def into_frame(position_mm, frame):
     """Positions (n, 3) carried by frames (n or 1, 6): shift in mm and rotation vector in rad."""
     if not np.any(frame):
         return position_mm
-    turned = np.einsum(
-        "nij,nj->ni",
-        np.broadcast_to(Rotation.from_rotvec(frame[:, 3:]).as_matrix(), (len(position_mm), 3, 3)),
-        position_mm,
-    )
-    return turned + frame[:, :3]
+    return turned_by(frame[:, 3:], position_mm) + frame[:, :3]

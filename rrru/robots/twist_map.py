@@ -12,6 +12,7 @@ near a singularity is. Lengths in mm, angles in rad, forces in N, torques in N m
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rrru.robots.closure import Twists, bar_ends, screw
 from rrru.robots.legs import TOOL, WORLD
@@ -22,10 +23,10 @@ _EYE = np.eye(3)
 class TwistMap:
     """The map at n poses of a Closure, at actuator values (n, K) and finite twists (n or 1, sites, 6).
 
-    tool_mm: the measured point (3,), or points (n, 3), of the platform. NaN where a pose is.
+    tool_mm: the measured points (n or 1, 3) of the platform. NaN where a pose is.
     """
 
-    def __init__(self, closure, actuators, poses, twists=None, tool_mm=(0.0, 0.0, 0.0)):
+    def __init__(self, closure, actuators, poses, twists=None, tool_mm=((0.0, 0.0, 0.0),)):
         self.closure, self.poses, self._twists = closure, poses, Twists(closure.legs, twists)
         self._actuators = np.asarray(actuators, dtype=float)
         self.point_mm = poses.point(np.asarray(tool_mm, dtype=float))
@@ -37,9 +38,21 @@ class TwistMap:
 
     @cached_property
     def point(self):
-        """Motion (n, 3, rows) of the measured point per unit of every constraint of A."""
+        """Motion (n, 3, rows) of the measured point, in the world's frame, per unit of every constraint of A."""
         shift, turn = self.platform[:, :3], self.platform[:, 3:]
-        return shift + np.cross(turn, self.point_mm[:, :, None], axis=1)
+        return self._in_world(shift + np.cross(turn, self.point_mm[:, :, None], axis=1))
+
+    @cached_property
+    def turn(self):
+        """Turn (n, 3, rows) of the platform, in the world's frame, per unit of every constraint of A."""
+        return self._in_world(self.platform[:, 3:])
+
+    def _in_world(self, columns):
+        """Vectors (n, 3, k) of the base's frame as the twist of the world turns them."""
+        number = self.closure.legs.site_numbers[WORLD]
+        if number not in self._twists.turns:
+            return columns
+        return Rotation.from_rotvec(self._twists.values[:, number, 3:]).as_matrix() @ columns
 
     @cached_property
     def frames(self):
@@ -72,6 +85,10 @@ class TwistMap:
             result |= {bar: (_frame_along(far - near), near), end: (self.poses.turn, far)}
         return result
 
+    def _own_turns(self, site, turn):
+        """`_own` of a site by its name."""
+        return self._own(self.closure.legs.site_numbers[site], turn)
+
     def _own(self, number, turn):
         """Axes (n, 3, 3) about which small rotations of a site's vector turn, in space: its finite one is counted."""
         if number not in self._twists.turns:
@@ -91,30 +108,43 @@ class TwistMap:
     def response(self, site):
         """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
         if site == WORLD:
-            turning = np.cross(_EYE, self.point_mm[:, None, :]).transpose(0, 2, 1)
+            point = self._in_world(self.point_mm[:, :, None])
+            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ self._own_turns(WORLD, _EYE)
             return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
         if site == TOOL:
-            return np.concatenate([self.poses.turn, np.zeros_like(self.poses.turn)], axis=2)
+            turn = self._in_world(self.poses.turn)
+            return np.concatenate([turn, np.zeros_like(turn)], axis=2)
+        if site in self.closure.legs.reflectors:
+            return np.zeros((len(self), 3, 6))
         return sum(self.point[:, :, rows] @ counts for rows, counts in self.counts(site))
 
+    def effect(self, site):
+        """Change (m, 3, 6) of what is read per twist at a site, in the site's frame: here `response`."""
+        return self.response(site)
+
+    @property
+    def rows(self):
+        """Pose (m,) of each row of what is read."""
+        return np.arange(len(self))
+
     def move(self, twists):
-        """Change (n, 3) of the measured position in mm under small twists (n or 1, sites, 6)."""
-        result, numbers = np.zeros((len(self), 3)), self.closure.legs.site_numbers
-        active = np.asarray(twists).any(axis=(0, 2))
+        """Change (m, 3) of what is read, a position in mm, under small twists (n or 1, sites, 6)."""
+        rows, numbers = self.rows, self.closure.legs.site_numbers
+        result, active = np.zeros((len(rows), 3)), np.asarray(twists).any(axis=(0, 2))
         for name in self.closure.legs.sites:
             if active[numbers[name]]:
-                one = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))
-                result = result + np.einsum("naj,nj->na", self.response(name), one)
+                one = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))[rows]
+                result = result + np.einsum("naj,nj->na", self.effect(name), one)
         return result
 
     def columns(self, directions):
-        """Derivative (n, 3, p) of the measured position by p parameters with directions (sites, 6, p) at the sites."""
-        result, numbers = np.zeros((len(self), 3, directions.shape[2])), self.closure.legs.site_numbers
+        """Derivative (m, 3, p) of what is read by p parameters with directions (sites, 6, p) at the sites."""
+        result, numbers = np.zeros((len(self.rows), 3, directions.shape[2])), self.closure.legs.site_numbers
         for name in self.closure.legs.sites:
             one = directions[numbers[name]]
             used = one.any(axis=0)
             if used.any():
-                result[..., used] += self.response(name) @ one[:, used]
+                result[..., used] += self.effect(name) @ one[:, used]
         return result
 
     @cached_property
@@ -157,6 +187,11 @@ class TwistMap:
     def drive_response(self):
         """Motion (n, 3, K) of the measured point per actuator value."""
         return self.point @ self.drive_counts
+
+    @property
+    def drive_effect(self):
+        """Change (m, 3, K) of what is read per actuator value: here `drive_response`."""
+        return self.drive_response
 
 
 def _factors(closure, ways, poses, actuators, twists):
