@@ -14,6 +14,21 @@ _SLOWER = 0.9
 
 
 def driven_path(measurements):
+    """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
+    stop = stops(measurements)
+    path, told = _path_through(measurements[np.diff(stop, prepend=-1) > 0])
+    return path, {name: values[stop] for name, values in told.items()}
+
+
+def stops(measurements):
+    """Number (n,) from 0 on of the stop at which each row was measured: several reflectors may be seen at one."""
+    if "target" not in measurements:
+        return np.arange(len(measurements))
+    told = measurements[["run", *(name for name in measurements if name.startswith("command_"))]].to_numpy(dtype=float)
+    return np.cumsum(np.concatenate([[False], (np.nan_to_num(told[1:]) != np.nan_to_num(told[:-1])).any(axis=1)]))
+
+
+def _path_through(measurements):
     """The path (N, 3) of everything that is driven, transfers included, and what a robot was told to do on it.
 
     That is by name, of the n rows of a measurement table, all of them in the order driven: position_mm, velocity_mm_s,

@@ -6,6 +6,10 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from rrru.robots.geometric_numbers import Reads
+from rrru.robots.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
 
@@ -28,6 +32,72 @@ def command(measurements: pd.DataFrame) -> np.ndarray:
 def measured(measurements: pd.DataFrame) -> np.ndarray:
     """Measured positions (n, 3), NaN where not measured."""
     return vectors(measurements, "measured")
+
+
+def turn_columns(name: str, turns: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns name_rx_rad, name_ry_rad and name_rz_rad from orientations (n, 3, 3): rotation vectors, NaN where NaN."""
+    vectors, known = np.full((len(turns), 3), np.nan), np.isfinite(turns).all(axis=(1, 2))
+    if known.any():
+        vectors[known] = Rotation.from_matrix(turns[known]).as_rotvec()
+    return {f"{name}_r{axis}_rad": vectors[:, k] for k, axis in enumerate("xyz")}
+
+
+def turns(measurements: pd.DataFrame, name: str) -> np.ndarray:
+    """Orientations (n, 3, 3) that a table holds as rotation vectors in columns as of `turn_columns`, NaN where null."""
+    vectors = measurements[[f"{name}_r{axis}_rad" for axis in "xyz"]].to_numpy(dtype=float)
+    result, known = np.full((len(vectors), 3, 3), np.nan), np.isfinite(vectors).all(axis=1)
+    if known.any():
+        result[known] = Rotation.from_rotvec(vectors[known]).as_matrix()
+    return result
+
+
+def has_turns(measurements: pd.DataFrame) -> bool:
+    """Whether orientations were measured."""
+    return "measured_rx_rad" in measurements and bool(measurements["measured_rx_rad"].notna().any())
+
+
+def readings(measurements: pd.DataFrame, arm_mm: float = np.nan) -> Readings | None:
+    """What was read at the n rows of a table, None where that are positions of the tool and nothing else.
+
+    arm_mm: see Readings.
+    """
+    reflectors = place = None
+    if "target" in measurements:
+        reflectors, place = sites(measurements["target"]).to_numpy(), vectors(measurements, "target")
+    elif not has_turns(measurements):
+        return None
+    turn = turns(measurements, "measured") if has_turns(measurements) else None
+    return Readings(measured(measurements), reflectors, place, turn, arm_mm)
+
+
+def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> Reads:
+    """What a campaign's readings leave open; known: reflectors whose places are stated; registered: its frame was."""
+    names = tuple(pd.unique(sites(measurements["target"]))) if "target" in measurements else ()
+    stated = set(sites(pd.Series([*known], dtype=object)))
+    fitted = tuple(name for name in names if name not in stated)
+    return Reads(names, fitted, has_turns(measurements), registered)
+
+
+def sites(targets: pd.Series) -> pd.Series:
+    """Names of the sites of reflectors by the names of these."""
+    return "reflector " + targets.astype(str)
+
+
+def series(measurements: pd.DataFrame) -> np.ndarray:
+    """Numbers (n,) of the runs, those of each reflector apart: rows that follow one another smoothly."""
+    if "target" not in measurements:
+        return measurements["run"].to_numpy()
+    return measurements.groupby(["run", "target"], sort=False).ngroup().to_numpy() + 1
+
+
+def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
+    """The table with the measured positions of reflectors carried to the tool, as the nominal robot holds it."""
+    if "target" not in measurements:
+        return measurements
+    poses, place = robot.solve(actuators(measurements, robot), command(measurements)), vectors(measurements, "target")
+    offset = poses.point(place) - poses.point(place_on_platform(robot, robot.twists()))
+    plain = measurements.drop(columns=["target", *(f"target_{axis}_mm" for axis in "xyz")])
+    return plain.assign(**vector_columns("measured", measured(measurements) - offset))
 
 
 def actuators(measurements: pd.DataFrame, robot: Any) -> np.ndarray:

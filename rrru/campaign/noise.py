@@ -31,34 +31,52 @@ def repeat_noise(measurements):
     frame = measurements.loc[rows.usable(measurements)]
     frame = frame.assign(direction=rows.direction(frame))
     axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
-    keys = ["trajectory", "direction", *places, "speed_mm_s", "payload_kg"]
+    told = [name for name in frame if name == "target" or name.startswith("command_r")]
+    keys = ["trajectory", "direction", *places, *told, "speed_mm_s", "payload_kg"]
     groups = frame.groupby(keys, dropna=False, sort=False)[axes]
     deviation = (frame[axes] - groups.transform("mean")).to_numpy()
     freedom = 3 * int(len(frame) - groups.ngroups)
     return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
 
 
-def estimate(measurements, residual_mm, columns):
-    """Noise per axis in mm and where it is from: "high_frequency", or "repeats" where these say clearly less.
+def estimate(measurements, residual_mm, columns, readings=None):
+    """Noise per axis in mm, of orientations at their arm, and where they are from.
 
-    measurements: the n points used; residual_mm (n, 3): what a calibration leaves of them; columns (n, 3, k): whatever
-    may still be fitted. High frequency: what these leave in the upper half of the half-wave numbers along each run; a
-    gap that is smooth along the path leaves it alone, as time and hysteresis, which spoil repeats, do.
+    measurements: the n points used; residual_mm (m, 3): what a calibration leaves of the readings there, by default
+    their positions; columns (m, 3, k): whatever may still be fitted. "high_frequency": what these leave in the upper
+    half of the half-wave numbers along each run; a gap that is smooth along the path leaves it alone, as time and
+    hysteresis, which spoil repeats, do. "repeats" where these say clearly less. NaN for orientations that were not
+    read.
     """
-    run = measurements["run"].to_numpy()
+    run = reading_series(measurements, readings)
     flat = columns.reshape(-1, columns.shape[-1])
     size = np.linalg.norm(flat, axis=0)
     unit = flat / np.where(size > 0.0, size, 1.0)
     fitted, _, rank, _ = np.linalg.lstsq(unit, residual_mm.ravel(), rcond=1e-9)
     cosines, wave = along_runs((residual_mm.ravel() - unit @ fitted).reshape(-1, 3), run)
     length = np.array([np.count_nonzero(run == label) for label in run])
-    upper = cosines[wave > 0.5 * length]
-    freedom = 1.0 - rank / flat.shape[0]
-    rough = float(np.sqrt((upper**2).mean() / max(freedom, 0.1)))
+    upper, freedom = wave > 0.5 * length, max(1.0 - rank / flat.shape[0], 0.1)
+    positions = np.arange(len(run)) < len(measurements)
+
+    def rough(chosen):
+        return float(np.sqrt((cosines[upper & chosen] ** 2).mean() / freedom)) if (upper & chosen).any() else np.nan
+
+    noise_mm, turned = rough(positions), rough(~positions)
     repeated, count = repeat_noise(measurements)
-    if count >= ENOUGH_REPEATS and 0.0 < repeated < rough * (1.0 - 3.0 / np.sqrt(2.0 * count)):
-        return repeated, "repeats"
-    return rough, "high_frequency"
+    if count >= ENOUGH_REPEATS and 0.0 < repeated < noise_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
+        return repeated, turned, "repeats"
+    return noise_mm, turned, "high_frequency"
+
+
+def reading_series(measurements, readings=None):
+    """Numbers (m,) of what follows one another smoothly in the rows of the readings of n points, by default positions.
+
+    Runs, of each reflector apart, and orientations apart from positions.
+    """
+    number = rows.series(measurements)
+    if readings is None:
+        return number
+    return np.concatenate([number, number.max() + number[readings.turned]])
 
 
 def isolated(residual_mm, run, floor_mm):

@@ -19,7 +19,9 @@ campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
 One row per commanded point: what was commanded and what the instrument saw. After the commanded position stand the
-robot's own columns of commanded actuator values, here those of the 3-RRRU.
+robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
+command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
+target_x_mm, its nominal place on the platform.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -75,6 +77,7 @@ outlier                int    points with status outlier
 near_singularity       int    points with status near_singularity
 unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma
+noise_rad              float? noise of measured orientations per axis, 1 sigma; null where none was measured
 noise_from             str    given: by the configuration; repeats: pooled over repeated points; high_frequency: from
     the residuals along the path of a fit of all points {given, repeats, high_frequency}
 platform_mass_kg       float? the real robot's platform, as given; null where it was not
@@ -86,9 +89,29 @@ notes                  str    what was computed or missing on ingest; empty wher
 """)
 
 
-def measurement_table(robot):
-    """The table `measurements` with a robot's own columns of actuator values."""
+# columns of `measurements` that a campaign has where more than the tool's position was read, and after which they stand
+_MORE = (
+    ("command_z_mm", "command_r{}_rad", "commanded orientation, rotation vector, robot frame"),
+    (
+        "measured_z_mm",
+        "measured_r{}_rad",
+        "measured orientation, rotation vector, robot frame",
+    ),
+    ("measured_z_mm", "target_{}_mm", "nominal place of the reflector on the platform"),
+)
+
+
+def measurement_table(robot, names=()):
+    """The table `measurements` with a robot's own columns of actuator values, and those of `names` beyond them."""
     table = next(table for table in TABLES if table.name == "measurements")
     first, last = table.names.index("theta1_rad"), table.names.index("theta3_rad") + 1
     own = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in robot.parts.drives]
-    return replace(table, columns=(*table.columns[:first], *own, *table.columns[last:]))
+    columns = [*table.columns[:first], *own, *table.columns[last:]]
+    more = {after: [] for after, *_ in _MORE}
+    for after, name, text in _MORE:
+        more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", "_r" in name) for axis in "xyz"]
+    more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
+    for after, added in more.items():
+        at = [column.name for column in columns].index(after) + 1
+        columns[at:at] = [column for column in added if column.name in names]
+    return replace(table, columns=tuple(columns))

@@ -22,7 +22,7 @@ def under_calibrations(measurements, mechanism, parameters, drive=None):
     drive: makes measurements with a controller, positions (n, 3) to actuator values; None where the robot is not at
     hand and every calibration is judged by its model alone.
     """
-    frames = [before(measurements)]
+    frames = [before(rows.at_tool(measurements, mechanism))]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):
         deviations = deviation_vector(parameters, calibration, method, mechanism)
         parts = {"model": model_residual(measurements, mechanism, deviations)}
@@ -33,14 +33,17 @@ def under_calibrations(measurements, mechanism, parameters, drive=None):
 
 
 def before(measurements):
-    """Rows of `errors` before any calibration: measured minus commanded position."""
+    """Rows of `errors` before any calibration: measured minus commanded position of the tool."""
     return _errors(measurements, rows.command(measurements)).assign(calibration="none", method="none", mode="before")
 
 
 def model_residual(measurements, mechanism, deviations):
     """Measured position minus the calibrated model's for the values that were sent: `errors` without names."""
-    model = mechanism.forward(rows.actuators(measurements, mechanism), deviations, rows.command(measurements))
-    return _errors(measurements, model)
+    actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
+    if (readings := rows.readings(measurements)) is None:
+        return _errors(measurements, mechanism.forward(actuators, deviations, command))
+    twists = mechanism.twists(deviations)
+    return _errors(measurements, mechanism.measured(mechanism.solve(actuators, command, twists), twists, readings))
 
 
 def closed_loop(drive, mechanism, deviations):
@@ -48,7 +51,7 @@ def closed_loop(drive, mechanism, deviations):
 
     The controller sends the actuator values with which the calibrated model lands on the target.
     """
-    measurements = drive(lambda position: mechanism.inverse(position, deviations))
+    measurements = rows.at_tool(drive(lambda position: mechanism.inverse(position, deviations)), mechanism)
     return _errors(measurements, rows.command(measurements))
 
 
@@ -92,7 +95,9 @@ def _path_geometry(measurements):
         along = np.gradient(points, axis=0, edge_order=2) if len(run) > 2 else points[-1:] - points[:1]
         length = np.linalg.norm(along, axis=1, keepdims=True)
         tangent[run] = np.divide(along, length, out=np.zeros_like(along), where=length > 0.0)
-    keys = [frame["trajectory"], rows.direction(measurements), frame["speed_mm_s"], frame["payload_kg"], *position.T]
+    told = [measurements[name].to_numpy() for name in measurements if name == "target" or name.startswith("command_r")]
+    keys = [frame["trajectory"], rows.direction(measurements), frame["speed_mm_s"], frame["payload_kg"]]
+    keys += [*position.T, *told]
     station = frame.groupby(keys, dropna=False, sort=False).ngroup()
     return frame[["run", "point"]].assign(station=station, **dict(zip(_TANGENT, tangent.T, strict=True)))
 

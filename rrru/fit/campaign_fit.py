@@ -31,30 +31,42 @@ class CalibrationSettings:
 
 
 def select(
-    measurements: pd.DataFrame, mechanism: Robot, patterns: Iterable[str], use_near_singularity: bool = True
+    measurements: pd.DataFrame,
+    mechanism: Robot,
+    patterns: Iterable[str],
+    use_near_singularity: bool = True,
+    arm_mm: float = np.nan,
 ) -> Residuals | None:
-    """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit."""
+    """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit.
+
+    arm_mm: length at which a measured orientation counts beside a position.
+    """
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if not chosen.any():
         return None
     frame = measurements.loc[chosen]
     actuators, command = rows.actuators(frame, mechanism), rows.command(frame)
-    mechanism = mechanism.seen_at(actuators, command)
+    readings = rows.readings(frame, arm_mm)
+    mechanism = mechanism.seen_at(actuators, command, readings)
     if 3 * len(frame) < len(mechanism.parameters):
         return None
-    return Residuals(mechanism, actuators, rows.measured(frame), command)
+    return Residuals(mechanism, actuators, rows.measured(frame), command, readings)
 
 
 def fit_sets(
-    measurements: pd.DataFrame, mechanism: Robot, settings: CalibrationSettings, noise_mm: float | None = None
+    measurements: pd.DataFrame,
+    mechanism: Robot,
+    settings: CalibrationSettings,
+    noise_mm: float | None = None,
+    arm_mm: float = np.nan,
 ) -> dict[tuple[str, str], Fit]:
     """Fits {(set, method): Fit} of all sets of the CalibrationSettings that the campaign has points for.
 
-    Raises ConfigError where no set matches.
+    noise_mm, arm_mm: of the campaign, see `rrru.fit.campaign_noise.Noise`. Raises ConfigError where no set matches.
     """
     fits = {}
     for name, patterns in settings.sets.items():
-        residuals = select(measurements, mechanism, patterns, settings.use_near_singularity)
+        residuals = select(measurements, mechanism, patterns, settings.use_near_singularity, arm_mm)
         if residuals is not None:
             fit = least_squares(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
             fits[name, "least_squares"] = fit
@@ -88,12 +100,13 @@ def tables(
 
 def _calibration_row(fit: Fit) -> pd.DataFrame:
     """One row of `calibrations`."""
-    ident, distance = fit.identifiability, np.linalg.norm(fit.residual_mm, axis=1)
+    ident, distance = fit.identifiability, fit.distance_mm
     row = {
         "points": len(distance),
         "mean_mm": distance.mean(),
         "rms_mm": fit.rms_mm,
         "max_mm": distance.max(),
+        "turn_rms_rad": fit.turn_rms_rad,
         "noise_mm": fit.noise_mm,
         "noise_from": fit.noise_from,
         "rank": ident.rank,

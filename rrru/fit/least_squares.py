@@ -11,6 +11,7 @@ import numpy.typing as npt
 from rrru.errors import FitError
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
 from rrru.parameters import ParameterSet
+from rrru.robots.readings import Readings
 
 if TYPE_CHECKING:
     from rrru.fit.residuals import Residuals
@@ -48,6 +49,7 @@ class Fit:
 
     standard_errors (p,): NaN for a parameter at a bound, inf for one that the points do not see. noise_mm: noise per
     axis that they assume, from where `noise_from` says ("given", "residuals"). evaluations: of all residuals.
+    residual_mm (m, 3): positions, and after them orientations where `readings` have any.
     """
 
     parameters: ParameterSet
@@ -59,16 +61,35 @@ class Fit:
     standard_errors: np.ndarray
     identifiability: Identifiability
     evaluations: int
+    readings: Readings | None = None
+
+    @property
+    def _lacking_mm(self) -> np.ndarray:
+        """The residual (n, 3) of the positions."""
+        return self.residual_mm[: len(self.readings) if self.readings else None]
+
+    @property
+    def distance_mm(self) -> np.ndarray:
+        """Distances (n,) of the positions."""
+        return np.linalg.norm(self._lacking_mm, axis=1)
 
     @property
     def rms_mm(self) -> float:
         """Root mean square of the distances."""
-        return float(np.sqrt((self.residual_mm**2).sum(axis=1).mean()))
+        return float(np.sqrt((self._lacking_mm**2).sum(axis=1).mean()))
 
     @property
     def mean_mm(self) -> float:
         """Mean distance: the objective of paper A."""
-        return float(np.linalg.norm(self.residual_mm, axis=1).mean())
+        return float(self.distance_mm.mean())
+
+    @property
+    def turn_rms_rad(self) -> float:
+        """Root mean square angle that the orientations are off by, NaN where none was read."""
+        if self.readings is None or not len(self.readings.turned):
+            return np.nan
+        turns = self.residual_mm[len(self.readings) :] / self.readings.arm_mm
+        return float(np.sqrt((turns**2).sum(axis=1).mean()))
 
 
 def least_squares(
@@ -168,4 +189,8 @@ def make_fit(
         standard_errors[free] = reduced.robust_standard_errors(jacobian, first * residual, first + 2.0 * z * second)
     else:
         standard_errors[free] = reduced.standard_errors(noise)
-    return Fit(parameters, deviations, residual, noise, noise_from, at_bound, standard_errors, ident, evaluations)
+    # distances, heights and the like have none
+    readings = getattr(residuals, "readings", None)
+    return Fit(
+        parameters, deviations, residual, noise, noise_from, at_bound, standard_errors, ident, evaluations, readings
+    )

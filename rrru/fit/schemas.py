@@ -16,6 +16,8 @@ points                 int    points fitted
 mean_mm                float  mean distance: the paper's objective
 rms_mm                 float  root mean square distance
 max_mm                 float  largest distance
+turn_rms_rad           float? root mean square angle between measured and model orientations; null where none was
+    measured
 noise_mm               float  noise per axis that the standard errors assume
 noise_from             str    given: by the configuration or of the whole campaign, see campaigns; residuals: of
     this fit, where more is left {given, residuals}

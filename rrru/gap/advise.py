@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.gap.case import make_case
+from rrru.gap.make_case import make_case
 from rrru.gap.terms import signatures, spread
 from rrru.gap.verdict import label
 
@@ -37,7 +37,7 @@ def advise(attribution, verdict, masses, most=3):
     if not candidates:
         return nothing
     case, result = attribution.case, []
-    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects)
+    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
     for names in rivals[:_MOST_RIVALS]:
         other = attribution.posterior.best_of(names)
         # the answer with more effects makes the data: the smaller one could not make the larger one's

@@ -59,10 +59,9 @@ class Attribution:
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    frame = case.points
-    fit = least_squares(
-        Residuals(case.mechanism, rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame))
-    )
+    frame = case.measurements[case.used]
+    driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)
+    fit = least_squares(Residuals(case.mechanism, *driven, rows.readings(frame, case.arm_mm)))
     return State(fit.deviations, {})
 
 
@@ -73,29 +72,29 @@ def with_noise(case, calibrated):
     if columns.shape[-1] > len(case):
         # too few points to fit everything: what the calibration leaves has to do
         columns = linear.base
-    noise_mm, source = noise.estimate(case.points, linear.data, columns)
+    used = case.measurements[case.used]
+    noise_mm, _, source = noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
     return replace(case, noise_mm=noise_mm), source
 
 
 def attribute(case, prior, noise_from="given"):
     """Attribution of a case; its noise is estimated first where noise_from is not "given"."""
-    total = len(case)
+    total = case.count
     for cleaning in range(_MOST_CLEANINGS + 1):
         calibrated = calibrate(case)
         if noise_from != "given":
             # spikes would pass for noise
-            outliers = noise.isolated(case.measured_mm - case.model(calibrated), case.run, 0.0)
+            outliers = noise.isolated(case.residual(calibrated), case.series, 0.0)
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
             case, noise_from = with_noise(case, calibrated)
         attribution = _rounds(case, calibrated, prior)
-        residual = case.measured_mm - case.model(attribution.state)
-        outliers = noise.isolated(residual, case.run, case.noise_mm)
+        outliers = noise.isolated(case.residual(attribution.state), case.series, case.noise_mm)
         if cleaning == _MOST_CLEANINGS or not outliers.any():
             break
         case = case.without(outliers)
-    return replace(attribution, noise_from=noise_from, dropped=total - len(case))
+    return replace(attribution, noise_from=noise_from, dropped=total - case.count)
 
 
 def with_effects(attribution, effects):
@@ -121,7 +120,7 @@ def _rounds(case, calibrated, prior):
     """Search and refinement in turn until the best hypothesis repeats itself."""
     state, covariance, last = calibrated, _NO_COVARIANCE, None
     linear = case.linearise(state)
-    evidence = ModelEvidence(case.library, linear, case.run, case.noise_mm)
+    evidence = ModelEvidence(case.library, linear, case.series, case.noise_mm)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
     # linear sim or a law's shape is still to be fitted
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
@@ -141,7 +140,7 @@ def _rounds(case, calibrated, prior):
             hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
             state, covariance = refine(case, state, hypothesis, level)
-            evidence = ModelEvidence(case.library, case.linearise(state), case.run, case.noise_mm)
+            evidence = ModelEvidence(case.library, case.linearise(state), case.series, case.noise_mm)
         except FitError:
             # the sim cannot follow: what the last linearisation says stands
             break

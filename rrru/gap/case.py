@@ -5,24 +5,20 @@ best one found. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs
-from rrru.effects.motion import Course, make_motion
+from rrru.campaign import noise
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
-from rrru.gap.unknown import UNKNOWN, unknown_functions
+from rrru.gap.unknown import UNKNOWN
+from rrru.robots.readings import lacking
 
 # a parameter of a law's shape may be off by this share
 _SHAPE_STEP = 0.3
-# an effect is tested where at least this share of the points has what it needs
-_ENOUGH = 0.8
-# nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
-_STANDS = {"rad": 1e-8, "mm": 1e-6}
-_NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
 @dataclass(frozen=True)
@@ -54,11 +50,11 @@ class State:
 class Linear:
     """The sim linearised about a state.
 
-    data (n, 3): measured minus model, with the state's effects taken out again; base (n, 3, p): derivative by the
-    mechanism's deviations; columns: (effect, shape) to the derivative (n, 3, c) by the effect's coordinates;
-    shape_columns: effect of the state to what its shape's parameters may be wrong by, (n, 3, q), each column one
-    standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (n, 3 axes,
-    K): derivative by the actuator values.
+    data (m, 3): what was read minus model, with the state's effects taken out again; base (m, 3, p): derivative by the
+    mechanism's deviations; columns: (effect, shape) to the derivative (m, 3, c) by the effect's coordinates;
+    shape_columns: effect of the state to what its shape's parameters may be wrong by, (m, 3, q), each column one
+    standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
+    derivative by the actuator values.
     """
 
     data: np.ndarray
@@ -71,10 +67,11 @@ class Linear:
 
 @dataclass(frozen=True)
 class Case:
-    """Points of a campaign, all m of them, of which the n used ones are fitted.
+    """Points of a campaign, all N of them, of which the used ones are fitted.
 
+    What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
     library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can;
-    untestable: name to the reason for the other effects.
+    untestable: name to the reason for the other effects; arm_mm: of `rrru.robots.readings.Readings`.
     """
 
     mechanism: object
@@ -84,79 +81,134 @@ class Case:
     library: dict
     untestable: dict
     noise_mm: float
+    arm_mm: float = np.nan
 
     def __len__(self):
-        return int(self.used.sum())
+        return len(self.at)
 
     @property
     def effects(self):
         """The library without the unknown functions."""
         return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
 
-    @property
-    def points(self):
-        """The measurement table of the n used points."""
-        return self.measurements.iloc[np.flatnonzero(self.used)]
+    @cached_property
+    def _readings(self):
+        """What was read at all points, None where that are positions of the tool."""
+        return rows.readings(self.measurements, self.arm_mm)
+
+    @cached_property
+    def _kept(self):
+        """Rows (m,) of the used points among those of all readings."""
+        points = np.arange(len(self.used)) if self._readings is None else self._readings.rows
+        return np.flatnonzero(self.used[points])
+
+    @cached_property
+    def at(self):
+        """Number (m,) of the point that each row was read at."""
+        return self._kept if self._readings is None else self._readings.rows[self._kept]
+
+    @cached_property
+    def positions(self):
+        """Which rows (m,) are positions."""
+        return self._kept < len(self.used)
 
     @property
-    def measured_mm(self):
-        """Measured positions (n, 3)."""
-        return rows.measured(self.measurements)[self.used]
+    def count(self):
+        """Number of used points."""
+        return int(self.used.sum())
+
+    @property
+    def points(self):
+        """The measurement table, row by row of what was read (m)."""
+        return self.measurements.iloc[self.at]
 
     @property
     def run(self):
-        """Run numbers (n,)."""
-        return self.measurements["run"].to_numpy()[self.used]
+        """Run numbers (m,)."""
+        return self.measurements["run"].to_numpy()[self.at]
+
+    @cached_property
+    def series(self):
+        """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
+        return noise.reading_series(self.measurements, self._readings)[self._kept]
+
+    def by_point(self, values):
+        """Values (m, 3, ..) of rows as those of the used points (n, 3 or 6, ..), zero where no orientation was read."""
+        if self.positions.all():
+            return values
+        result = np.zeros((self.count, 6, *values.shape[2:]))
+        result[:, :3] = values[self.positions]
+        result[np.searchsorted(np.flatnonzero(self.used), self.at[~self.positions]), 3:] = values[~self.positions]
+        return result
 
     def without(self, dropped):
-        """The case without the used points flagged in (n,)."""
+        """The case without the used points of the rows flagged in (m,)."""
         used = self.used.copy()
-        used[np.flatnonzero(used)[dropped]] = False
+        used[self.at[dropped]] = False
         return replace(self, used=used)
 
+    @cached_property
+    def _driven(self):
+        """Actuator values (N, K) and commanded positions (N, 3)."""
+        return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
+
     def sim(self, deviations):
-        """Positions (m, 3) of the calibrated sim without effects."""
-        return self.mechanism.forward(
-            rows.actuators(self.measurements, self.mechanism), deviations, rows.command(self.measurements)
-        )
+        """Positions (N, 3) of the tool by the calibrated sim without effects."""
+        actuators, command = self._driven
+        return self.mechanism.forward(actuators, deviations, command)
 
-    def exact(self, state):
-        """Positions (n, 3) of the sim corrected by a state: the exact closure with its effects."""
+    def posed(self, state):
+        """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         change = sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
-        actuators, command = rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
+        actuators, command = self._driven
         twists = self.mechanism.twists(state.deviations) + change.twists
-        return self.mechanism.measured(self.mechanism.solve(actuators, command, twists), twists)[self.used]
+        return self.mechanism.solve(actuators, command, twists), twists
 
-    def model(self, state):
-        """Positions (n, 3) of a state's sim: exact where it has effects, the calibrated one where it has none."""
-        return self.exact(state) if state.effects else self.sim(state.deviations)[self.used]
+    def left(self, state):
+        """What is read minus the sim corrected by a state, of all points: positions (N, 3), then orientations.
+
+        The sim is the exact closure where the state has effects, the calibrated one where it has none.
+        """
+        if self._readings is not None:
+            return lacking(self.mechanism, self._readings, *self.posed(state))
+        model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
+        return rows.measured(self.measurements) - model
+
+    def residual(self, state):
+        """What is read minus the sim corrected by a state, (m, 3)."""
+        return self.left(state)[self._kept]
 
     def linearise(self, state, keys=None):
         """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
 
         keys: (effect, shape) pairs to make columns for, by default all.
         """
-        actuators, position = rows.actuators(self.measurements, self.mechanism), self.sim(state.deviations)
-        at = self.mechanism.map_at(actuators, position, state.deviations)
-        model = self.model(state)
-        lost = ~np.isfinite(model).all(axis=1) | ~np.isfinite(position[self.used]).all(axis=1)
+        at, data = self._map(state), self.residual(state)
+        lost = ~np.isfinite(data).all(axis=1) | ~np.isfinite(at.point_mm[self.at]).all(axis=1)
         if lost.any():
             raise FitError(f"the sim has no pose at {int(lost.sum())} points")
         if keys is None:
             keys = [(name, k) for name, effect in self.library.items() for k in range(len(effect.coordinates.shapes))]
         columns = {key: self._columns(at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
         by_shape = {key[0]: self._by_shape(at, key, state) for key in state.effects}
-        data = self.measured_mm - model
         for key, coordinates in state.effects.items():
             data = data + columns[key] @ coordinates
         return Linear(
             data,
-            at.columns(self.mechanism.directions)[self.used],
+            at.columns(self.mechanism.directions)[self._kept],
             columns,
             {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
             {name: steps for name, (_, steps) in by_shape.items()},
-            at.drive_response[self.used],
+            at.drive_effect[self._kept],
         )
+
+    def _map(self, state):
+        """The map at a state's deviations, without its effects."""
+        actuators, command = self._driven
+        if self._readings is None:
+            return self.mechanism.map_at(actuators, self.sim(state.deviations), state.deviations)
+        twists = self.mechanism.twists(state.deviations)
+        return self.mechanism.map(actuators, self.mechanism.solve(actuators, command, twists), twists, self._readings)
 
     def _by_shape(self, at, key, state):
         """`Linear.shape_columns` and `Linear.shape_steps` of one effect of the state."""
@@ -169,7 +221,7 @@ class Case:
                 stepped = value * (1.0 - _SHAPE_STEP)
             if stepped != value:
                 other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
-                columns.append(at.move((other - own).twists)[self.used])
+                columns.append(at.move((other - own).twists)[self._kept])
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
         return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
@@ -183,71 +235,5 @@ class Case:
         result = np.empty((len(self), 3, len(step)))
         for k, one in enumerate(np.diag(step)):
             change = state.contribution(self.library, key, self.motion, one)
-            result[..., k] = at.move(change.twists)[self.used] / step[k]
+            result[..., k] = at.move(change.twists)[self._kept] / step[k]
         return result
-
-
-def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True):
-    """The case of a measurement table.
-
-    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what
-    a tested effect needs are left out. Raises FitError for an empty table.
-    """
-    if not len(measurements):
-        raise FitError("the campaign has no points")
-    actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
-    motion = _motion(measurements, mechanism, masses, actuators)
-    used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
-    # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
-    used &= ~starts_of_runs(measurements["run"].to_numpy()) & ~at_reversals(motion)
-    used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
-    if not used.any():
-        raise FitError("the campaign has no point that a diagnosis can use")
-    testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
-    for name, effect in library.items():
-        known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
-        missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
-        if missing:
-            untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
-        else:
-            testable[name] = effect
-            complete = np.all([complete, *known.values()], axis=0)
-    used &= complete
-    for name, function in unknown_functions(mechanism).items():
-        values = [getattr(motion, need)[used] for need in function.needs]
-        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
-            testable[name] = function
-    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm))
-
-
-def at_reversals(motion):
-    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell."""
-    path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
-    for leg, unit in enumerate(motion.robot.parts.units):
-        step = np.diff(path[:, leg])
-        # a drive that stands still does not turn back
-        moving = np.flatnonzero(~(np.abs(step) < _STANDS[unit]))
-        reversals = moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
-        if len(reversals):
-            nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
-            close = np.abs(nearest - motion.path_index) <= STEPS
-            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[unit])
-    return result
-
-
-def _motion(measurements, mechanism, masses, actuators):
-    """The motion that the effects see; at the measured points with the table's own actuator values."""
-    path, told = driven_path(measurements)
-    if mechanism.orients:
-        # positions do not tell the orientation between the points: drives are taken to move evenly
-        rows_of_path = np.arange(len(path))
-        path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
-    else:
-        path_drive = mechanism.inverse(path)
-    lost = ~np.isfinite(path_drive).all(axis=1)
-    if lost.any():
-        # what is out of reach stays where it was last
-        good = np.flatnonzero(~lost)
-        path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
-    path_drive[told["path_index"]] = actuators
-    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, **told))

@@ -23,7 +23,8 @@ _EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_g
 def details_of(attribution, steps, residual_mm, generator, draws):
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
     case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
-    exact = case.measured_mm - case.exact(attribution.state) if attribution.state.effects else None
+    exact = case.residual(attribution.state) if attribution.state.effects else None
+    drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
     return {
         "gap_locate": locate(case, residual_mm, linear.drive, generator, draws),
         "gap_identifiability": identify(case, linear),
@@ -31,7 +32,7 @@ def details_of(attribution, steps, residual_mm, generator, draws):
         "gap_sets": _set_rows(attribution),
         "gap_shrink": shrink_table(case, steps, exact),
         "gap_parameters": _parameter_rows(attribution),
-        "gap_points": _point_rows(attribution, steps[-1].residual_mm, drive_errors(residual_mm, linear.drive)),
+        "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
     }
 
 
@@ -151,10 +152,10 @@ def _slope(effect, coordinates, shape):
 
 
 def _point_rows(attribution, after, drive):
-    """Rows of `gap_points`; after, drive (n, 3): residuals of the corrected sim and errors of the drives."""
+    """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected sim and errors of the drives."""
     case = attribution.case
     frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
-    before = rows.measured(case.measurements) - case.sim(attribution.calibrated.deviations)
+    before = case.left(attribution.calibrated)[: len(frame)]
     units = case.mechanism.parts.units
     after, drive = (_at(case.used, values) for values in (after, drive))
     unknown = np.full(len(before), np.nan)

@@ -1,18 +1,21 @@
 """The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from rrru.campaign import measurements as rows
 from rrru.errors import FitError
+from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, with_effects
-from rrru.gap.case import State, make_case
+from rrru.gap.case import State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
+from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.verdict import Verdict, decide
@@ -34,13 +37,15 @@ class MeasuredRobot:
     """What is known of the robot that a campaign was measured on.
 
     mechanism: its nominal one; masses: `rrru.robots.dynamics.Masses`; noise_mm: of the instrument, per axis, None or 0
-    where it is to be estimated; campaign: name of the campaign, for its random stream.
+    where it is to be estimated, and noise_rad: of the orientations that it reads; campaign: name of the campaign, for
+    its random stream.
     """
 
     mechanism: Robot
     masses: Masses = field(default_factory=Masses)
     noise_mm: float | None = None
     campaign: str = ""
+    noise_rad: float | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +62,7 @@ class Diagnosis:
 
 def sim(mechanism: Any) -> Any:
     """The mechanism with bounds wide enough for a gap to show itself in the deviations."""
-    return replace(mechanism, angle_limit_rad=_ANGLE_LIMIT_RAD, length_limit_mm=_LENGTH_LIMIT_MM)
+    return mechanism.widened(_ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM)
 
 
 def diagnose(
@@ -70,18 +75,21 @@ def diagnose(
     library = settings.library(robot.mechanism)
     noise_mm, noise_from = (robot.noise_mm, "given") if robot.noise_mm else (1.0, "")
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
-    case = make_case(measurements, nominal, robot.masses, noise_mm, library, near)
+    arm_mm = np.nan
+    if rows.has_turns(measurements):
+        arm_mm = campaign_noise(nominal, measurements, (robot.noise_mm or None, robot.noise_rad), near).arm_mm
+    case = make_case(measurements, nominal, robot.masses, noise_mm, library, near, arm_mm)
     least = _POINTS_PER_PARAMETER * len(nominal.parameters)
     if len(case) < least:
         whose = f"campaign {robot.campaign}: " if robot.campaign else ""
-        raise FitError(f"{whose}{len(case)} usable points are too few for a diagnosis; allowed: at least {least}")
+        raise FitError(f"{whose}{case.count} usable points are too few for a diagnosis; allowed: at least {least}")
     generator = stream(settings.seed, "gap", robot.campaign)
     verdict, attribution, ordered = _decide(attribute(case, settings.prior, noise_from))
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
     case = attribution.case
-    residual = case.measured_mm - case.model(attribution.calibrated)
+    residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
-    row = _row(attribution, verdict, steps, worst_spot(case.motion.position_mm[case.used], residual), further)
+    row = _row(attribution, verdict, steps, worst_spot(case.motion.position_mm[case.at], residual), further)
     tables = {}
     if details:
         tables = details_of(attribution, steps, residual, generator, settings.draws)
@@ -107,7 +115,7 @@ def _row(
         **dict(zip(("worst_x_mm", "worst_y_mm", "worst_z_mm"), worst_mm.tolist(), strict=True)),
         "next_runs": "; ".join(further["run"]),
         "noise_from": attribution.noise_from,
-        "points": len(case),
+        "points": case.count,
         "dropped_points": attribution.dropped,
         "notes": "; ".join(f"{effect} not tested: {note}" for effect, note in case.untestable.items()),
     }

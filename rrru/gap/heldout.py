@@ -58,10 +58,7 @@ class HeldOut:
         frame, run = self.case.points, self.case.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
             return np.unique(run, return_inverse=True)[1]
-        result = np.empty(len(frame), dtype=int)
-        for label in np.unique(run):
-            rows = np.flatnonzero(run == label)
-            result[rows] = (np.arange(len(rows)) // _STRETCH + label) % _FOLDS
+        result = (within(run, self.case.at) // _STRETCH + run) % _FOLDS
         return np.unique(result, return_inverse=True)[1]
 
     def predict(self, terms, strengths, level):
@@ -94,7 +91,7 @@ class HeldOut:
 
         Where folds are whole runs they are along these runs' cosines.
         """
-        data, run, variance = self.evidence.linear.data, self.case.run, self.case.noise_mm**2
+        data, run, variance = self.evidence.linear.data, self.case.series, self.case.noise_mm**2
         if not all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run)):
             return np.full(len(run), 1.0 / (variance * (1.0 + LEVELS[level] ** 2))), columns, data
         together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), run)
@@ -102,12 +99,19 @@ class HeldOut:
         return weights, together[..., :-1], together[..., -1]
 
 
-def resampled_rows(run, generator, draws):
-    """Rows (draws, n) of points resampled by runs (n,), or by stretches of five points where there are few runs."""
-    block = run
+def within(run, at):
+    """Number (m,) from 0 on of the point in its run (m,); at (m,): of which point of the campaign each row is."""
+    result = np.empty(len(run), dtype=int)
+    for label in np.unique(run):
+        result[run == label] = np.unique(at[run == label], return_inverse=True)[1]
+    return result
+
+
+def resampled_rows(case, generator, draws):
+    """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
+    block = run = case.run
     if len(np.unique(run)) < _ENOUGH_RUNS:
-        within = np.concatenate([np.arange(np.count_nonzero(run == label)) for label in dict.fromkeys(run.tolist())])
-        block = run * (len(run) + 1) + within // _STRETCH
+        block = run * (len(run) + 1) + within(run, case.at) // _STRETCH
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

@@ -21,11 +21,11 @@ _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 def locate(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
-    residual_mm (n, 3): measured minus calibrated sim; drive (n, 3 axes, 3): derivative of the position by the actuator
-    values. Shares are of the mean square with the noise taken off; their 95 % intervals come from resampled runs
-    (stretches where there are fewer than ten).
+    residual_mm (m, 3): what was read minus calibrated sim; drive (m, 3, K): derivative by the actuator values. Shares
+    are of the mean square with the noise taken off; their 95 % intervals come from resampled runs (stretches where
+    there are fewer than ten).
     """
-    resampled = resampled_rows(case.run, generator, draws)
+    resampled = resampled_rows(case, generator, draws)
     whole = _Whole((residual_mm**2).sum(axis=1), case.noise_mm**2, resampled)
     rows = []
     for name, levels in _levels(case).items():
@@ -33,7 +33,7 @@ def locate(case, residual_mm, drive, generator, draws=200):
             chosen = levels == level
             rows.append(whole.row(name.split()[0], level, np.where(chosen, whole.squares, 0.0), 3.0 * chosen))
             if name == "region":
-                centre = case.motion.position_mm[case.used][chosen].mean(axis=0)
+                centre = case.motion.position_mm[case.at][chosen].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
     one = np.ones(len(residual_mm))
     rows.extend(whole.row("direction", axis, residual_mm[:, k] ** 2, one) for k, axis in enumerate("xyz"))
@@ -50,7 +50,10 @@ def worst_spot(position_mm, residual_mm):
 
 
 def drive_errors(residual_mm, drive):
-    """Errors (n, K) of the actuator values that would make the residuals (n, 3), the smallest where K is above 3."""
+    """Errors (n, K) of the actuator values that would make residuals (n, k), the smallest where K is above k.
+
+    drive (n, k, K): derivative of what was read by the actuator values.
+    """
     return (np.linalg.pinv(drive) @ residual_mm[..., None])[..., 0]
 
 
@@ -87,7 +90,7 @@ class _Whole:
 
 def _levels(case):
     """Level (n,) of each point by factor; an empty text where it is unknown."""
-    frame, position, rate = case.points, case.motion.position_mm[case.used], case.motion.drive_rate[case.used]
+    frame, position, rate = case.points, case.motion.position_mm[case.at], case.motion.drive_rate[case.at]
     result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
     for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
         values = frame[column].to_numpy(dtype=float)
@@ -116,12 +119,14 @@ def _cells(position):
 
 def _leg_rows(case, residual_mm, drive, resampled):
     """Rows of the factor leg: shares of the squared errors of the drives."""
-    errors = drive_errors(residual_mm, drive)
+    residual_mm, drive = case.by_point(residual_mm), case.by_point(drive)
+    errors, number = drive_errors(residual_mm, drive), np.flatnonzero(case.used)
+    resampled = np.searchsorted(number, case.at[resampled])
     # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
     scaled = errors**2 / (case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1))
     whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
     for leg, unit in enumerate(case.mechanism.parts.units):
-        moved = np.linalg.norm(drive[:, :, leg] * errors[:, leg, None], axis=1)
+        moved = np.linalg.norm(drive[:, :3, leg] * errors[:, leg, None], axis=1)
         row = whole.row("leg", f"leg {leg + 1}", scaled[:, leg], np.ones(len(scaled)))
         row["rms_mm"] = float(np.sqrt((moved**2).mean()))
         row[f"drive_rms_{unit}"] = float(np.sqrt((errors[:, leg] ** 2).mean()))

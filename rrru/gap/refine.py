@@ -29,7 +29,7 @@ def refine(case, state, hypothesis, level):
     cost, covariance = _cost(case, state), None
     for _ in range(_STEPS):
         linear = case.linearise(state, keys)
-        evidence = ModelEvidence(library, linear, case.run, case.noise_mm)
+        evidence = ModelEvidence(library, linear, case.series, case.noise_mm)
         mean, covariance = evidence.coefficients(hypothesis.terms, strengths, level)
         target = _target(linear, state, hypothesis, mean, library)
         last = cost
@@ -82,5 +82,5 @@ def _between(first, second, share):
 
 def _cost(case, state):
     """Sum of squares of the exact sim's residuals; inf where it has no pose."""
-    cost = float(((case.measured_mm - case.exact(state)) ** 2).sum())
+    cost = float((case.residual(state) ** 2).sum())
     return cost if np.isfinite(cost) else np.inf

@@ -65,7 +65,7 @@ def shrink_steps(attribution, ordered, generator, draws):
     redraw the fitted numbers.
     """
     case, hypothesis, level = attribution.case, attribution.hypothesis, attribution.level
-    picks = resampled_rows(case.run, generator, draws)
+    picks = resampled_rows(case, generator, draws)
     result = []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]

@@ -20,7 +20,7 @@ _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
 
 @dataclass(frozen=True, eq=False)
 class AsRead(Robot):
-    """A robot and what its campaign's Reads leave open; added: the Candidates that join its parameters, None for all."""
+    """A robot and what its campaign's Reads leave open; added: Candidates that join its parameters, None for all."""
 
     robot: Robot
     reads: object

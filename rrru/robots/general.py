@@ -5,7 +5,7 @@ can tell, drives first, then lengths, then angles: a number that those before it
 and `gauge` says what stands for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -50,7 +50,7 @@ class GeneralRobot(Robot):
     lumps: tuple = ()
     sample: tuple | None = None
     among: tuple[str, ...] = ()
-    reads: Reads = Reads()
+    reads: Reads = field(default_factory=Reads)
 
     TRACKED = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm

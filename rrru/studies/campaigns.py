@@ -4,25 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.noise import estimate
-from rrru.errors import ConfigError
-from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.robots import workspace
-
-
-def noise(robot, measurements, given, use_near_singularity):
-    """Noise per axis in mm and where it is from: given, else what a fit of all points leaves, or repeats, tell.
-
-    See `rrru.campaign.noise.estimate`. Raises ConfigError where there are too few points.
-    """
-    if given is not None:
-        return given, "given"
-    residuals = select(measurements, robot, ["*"], use_near_singularity)
-    if residuals is None:
-        raise ConfigError("too few usable points to estimate noise_mm; give it")
-    fit, used = least_squares(residuals), rows.usable(measurements, use_near_singularity)
-    return estimate(measurements[used], fit.residual_mm, residuals.jacobian(fit.deviations))
 
 
 def with_singularities(robot, measurements, margin):
@@ -54,8 +36,8 @@ def workspace_table(robot, measurements):
     return pd.concat(frames, ignore_index=True)
 
 
-def campaign_row(section, measurements, singular, noise_mm, notes, registration=None):
-    """The row of `campaigns`; noise_mm: the noise and where it is from."""
+def campaign_row(section, measurements, singular, noise, notes, registration=None):
+    """The row of `campaigns`; noise: a `rrru.fit.campaign_noise.Noise`."""
     counts = measurements["status"].value_counts()
     source = f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}"
     return {
@@ -64,8 +46,9 @@ def campaign_row(section, measurements, singular, noise_mm, notes, registration=
         "points": len(measurements),
         "runs": measurements["run"].nunique(),
         **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "near_singularity", "unsolved")},
-        "noise_mm": noise_mm[0],
-        "noise_from": noise_mm[1],
+        "noise_mm": noise.mm,
+        "noise_rad": noise.rad,
+        "noise_from": noise.source,
         "platform_mass_kg": section.get("platform_mass_kg", np.nan),
         "registration_rms_mm": registration.rms_mm if registration else np.nan,
         "registration_max_mm": registration.max_mm if registration else np.nan,

@@ -23,13 +23,21 @@ def part(config, *keys):
 
 
 def robot(config, section):
-    """The robot of a campaign's section: name, dimensions, and the set of parameters where the section chooses one."""
+    """The robot of a campaign's section: name, dimensions, and the set of parameters where the section chooses one.
+
+    With what is known of its readings: reflectors whose places are stated, and whether its frame was registered.
+    """
     name = section["robot"]
     dimensions = {**config["robots"].get(name, {}), **section.get("dimensions", {})}
     own = own_robot_file(dimensions)
     # a robot of the user's own changes with its file
     digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
-    return {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
+    chosen = {"name": name, "dimensions": dimensions, "parameter_set": section.get("errors"), **digest}
+    if "targets" in section:
+        chosen["targets"] = sorted(section["targets"])
+    if section.get("frame") == "register":
+        chosen["registered"] = True
+    return chosen
 
 
 def own_robot_file(dimensions):

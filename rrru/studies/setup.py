@@ -25,10 +25,15 @@ def mechanism(nominal, parameter_set=None):
 
 
 def measured_robot(nominal, measurements, parameter_set=None):
-    """The `mechanism` of a campaign that has been measured: its parameters are those that these poses can tell."""
-    robot = mechanism(nominal, parameter_set)
+    """The `mechanism` of a campaign that has been measured: its parameters are those that these poses can tell.
+
+    With those that its readings leave open: frame, tool, places of reflectors.
+    """
+    open_numbers = rows.reads(measurements, nominal.get("targets", ()), nominal.get("registered", False))
+    robot = mechanism(nominal, parameter_set).reading(open_numbers)
     known = measurements[rows.usable(measurements)]
-    return robot.seen_at(rows.actuators(known, robot), rows.command(known))
+    actuators = rows.actuators(known, robot)
+    return robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))
 
 
 @dataclass(frozen=True)

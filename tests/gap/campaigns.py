@@ -12,8 +12,8 @@ from rrru.campaign.trajectories import Line, Spiral
 from rrru.effects.protocol import ActiveEffect
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.gap.case import make_case
 from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
+from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses

@@ -12,11 +12,17 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State, at_reversals
+from rrru.gap.case import State
+from rrru.gap.make_case import at_reversals
 from tests.gap import campaigns
 from tests.gap.campaigns import EFFECTS, ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 
 STATE_ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
+
+
+def _exact(case, state):
+    """Positions (n, 3) of the exact closure with a state's effects, none included."""
+    return case.mechanism.measured(*case.posed(state))[case.used]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +35,7 @@ def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
     np.testing.assert_array_equal(case.used, ~starts & ~at_reversals(case.motion))
-    assert len(case) == case.used.sum() == len(case.measured_mm) == len(case.run)
+    assert len(case) == case.used.sum() == len(case.points) == len(case.run) == case.count
 
 
 def test_points_that_are_lost_or_marked_are_not_used():
@@ -49,7 +55,7 @@ def test_points_dropped_later_stay_dropped(case):
     flagged = np.zeros(len(case), dtype=bool)
     flagged[[0, 5]] = True
     smaller = case.without(flagged)
-    np.testing.assert_array_equal(smaller.measured_mm, case.measured_mm[~flagged])
+    np.testing.assert_array_equal(rows.measured(smaller.points), rows.measured(case.points)[~flagged])
     assert len(smaller) == len(case) - 2 and len(smaller.without(np.zeros(len(smaller), dtype=bool))) == len(smaller)
 
 
@@ -80,7 +86,7 @@ def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name
     shape = len(EFFECTS[name].coordinates.shapes) - 1
     state = _state(name, shape)
     robot = robot_of((active(name, state.effects[name, shape], shape),))
-    found = case.exact(state)
+    found = _exact(case, state)
     same, _ = robot.positions(case.motion, rows.command(case.measurements))
     np.testing.assert_allclose(found, same[case.used], atol=1e-7)
     driven, _ = robot.positions(robot.motion(plan_of(), ROBOT.inverse), plan_of().targets())
@@ -89,19 +95,19 @@ def test_the_corrected_sim_is_the_virtual_robot_with_the_same_numbers(case, name
 
 
 def test_without_effects_the_corrected_sim_is_the_calibrated_one(case):
-    np.testing.assert_allclose(case.exact(State(STATE_ERRORS, {})), case.sim(STATE_ERRORS)[case.used], atol=1e-7)
+    np.testing.assert_allclose(_exact(case, State(STATE_ERRORS, {})), case.sim(STATE_ERRORS)[case.used], atol=1e-7)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_signatures_are_secants_of_the_exact_sim(case, name):
     """Every coordinate of every shape, over its typical size, to first order in the closure."""
     effect, plain = EFFECTS[name], State(STATE_ERRORS, {})
-    linear, still = case.linearise(plain), case.exact(plain)
+    linear, still = case.linearise(plain), _exact(case, plain)
     for shape in range(len(effect.coordinates.shapes)):
         for k, typical in enumerate(effect.coordinates.typical):
             step = np.zeros(len(effect.coordinates))
             step[k] = typical
-            slope = (case.exact(State(STATE_ERRORS, {(name, shape): step})) - still) / typical
+            slope = (_exact(case, State(STATE_ERRORS, {(name, shape): step})) - still) / typical
             off = np.abs(linear.columns[name, shape][..., k] - slope).max()
             assert off < 0.01 * np.abs(slope).max(), (shape, k)
 
@@ -126,9 +132,7 @@ def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, na
     state = _state(name, 1 if len(EFFECTS[name].coordinates.shapes) > 1 else 0, size=4.0)
     linear = case.linearise(state)
     (key, coordinates), *_ = state.effects.items()
-    np.testing.assert_allclose(
-        linear.data - linear.columns[key] @ coordinates, case.measured_mm - case.exact(state), atol=1e-9
-    )
+    np.testing.assert_allclose(linear.data - linear.columns[key] @ coordinates, case.residual(state), atol=1e-9)
     steps = {step[0] for step in linear.shape_steps[name]}
     assert steps <= set(EFFECTS[name].coordinates.shapes[0])
     assert (
@@ -155,7 +159,7 @@ def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
     (name, value, stepped), *_ = linear.shape_steps["thermal_growth"]
     assert name == "time_constant" and stepped != value
     other = replace(state, shape_values={"thermal_growth": {name: stepped}})
-    change = case.exact(other) - case.exact(state)
+    change = _exact(case, other) - _exact(case, state)
     np.testing.assert_allclose(
         linear.shape_columns["thermal_growth"][..., -1], change, atol=0.02 * np.abs(change).max()
     )

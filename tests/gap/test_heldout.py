@@ -3,6 +3,7 @@ computations.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,12 +12,12 @@ from scipy.stats import norm
 
 from rrru.campaign.noise import isolated
 from rrru.errors import ConfigError
+from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap import shrink
 from rrru.gap.attribute import calibrate, with_noise
 from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.heldout import HeldOut, Prediction, resampled_rows
 from rrru.gap.terms import Term
-from rrru.studies import campaigns
 from tests.gap.campaigns import (
     EFFECTS,
     FORWARD,
@@ -111,15 +112,20 @@ def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full)
     assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.case))))
 
 
+def _of_runs(run):
+    """What is asked of a case whose points were driven in runs (n,)."""
+    return SimpleNamespace(run=run, at=np.arange(len(run)))
+
+
 def test_rows_are_resampled_by_runs_or_by_stretches():
     generator = np.random.default_rng(0)
     run = np.repeat(np.arange(12), 5)
-    drawn = resampled_rows(run, generator, 20)
+    drawn = resampled_rows(_of_runs(run), generator, 20)
     assert drawn.shape == (20, 60) and set(drawn.ravel()) <= set(range(60))
     assert (drawn.reshape(20, 12, 5) == drawn.reshape(20, 12, 5)[..., :1] + np.arange(5)).all() and (
         drawn[:, ::5] % 5 == 0
     ).all()
-    few = resampled_rows(np.repeat([3, 1], 10), generator, 20).reshape(20, 4, 5)
+    few = resampled_rows(_of_runs(np.repeat([3, 1], 10)), generator, 20).reshape(20, 4, 5)
     assert (few == few[..., :1] + np.arange(5)).all() and set(few[..., 0].ravel()) == {0, 5, 10, 15}
 
 
@@ -135,8 +141,7 @@ def test_the_share_closed_holds_on_other_trajectories(name):
     effect = strong(name, 5.0)
     found = diagnosed(measure((effect,)))
     case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
-    before = case.measured_mm - case.sim(found.attribution.calibrated.deviations)[case.used]
-    after = case.measured_mm - case.exact(found.state)
+    before, after = case.residual(found.attribution.calibrated), case.residual(found.state)
     true = 1.0 - np.sqrt((after**2).sum() / (before**2).sum())
     assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
     assert found.verdict["share_closed_low"] <= found.verdict["share_closed"] <= found.verdict["share_closed_high"]
@@ -169,11 +174,12 @@ def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
 
 def test_a_campaigns_own_noise_is_told_by_the_same_rule():
     frame = measure((strong("leg_asymmetry", 6.0),))
-    assert campaigns.noise(SIM, frame, 0.5, True) == (0.5, "given")
-    estimated, source = campaigns.noise(SIM, frame, None, True)
-    assert source == "high_frequency" and estimated == pytest.approx(NOISE_MM, rel=0.15)
+    given = campaign_noise(SIM, frame, (0.5, None))
+    assert (given.mm, given.source) == (0.5, "given") and np.isnan(given.rad)
+    found = campaign_noise(SIM, frame, (None, None))
+    assert found.source == "high_frequency" and found.mm == pytest.approx(NOISE_MM, rel=0.15)
     with pytest.raises(ConfigError, match="too few"):
-        campaigns.noise(SIM, frame.head(2), None, True)
+        campaign_noise(SIM, frame.head(2), (None, None))
 
 
 def test_repeats_give_the_noise_where_they_are_clearly_quieter():

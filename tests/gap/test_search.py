@@ -76,8 +76,7 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
     state, covariance = refine(case, start, _hypothesis(Term(name)), 0)
-    before = np.abs(case.measured_mm - case.sim(start.deviations)[case.used])
-    after = np.abs(case.measured_mm - case.exact(state))
+    before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth),) * 2
     # the motion read from the columns is not quite the one driven
@@ -102,7 +101,7 @@ def test_an_exact_fit_from_another_fit_keeps_what_both_share():
     direct, _ = refine(case, calibrate(case), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
     error = np.sqrt(np.diag(covariance)[:3])
     assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
-    left = np.sqrt(((case.measured_mm - case.exact(two)) ** 2).mean())
+    left = np.sqrt((case.residual(two) ** 2).mean())
     assert left == pytest.approx(case.noise_mm, rel=0.1)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rrru.effects.protocol import Contribution
-from rrru.gap.case import make_case
+from rrru.gap.make_case import make_case
 from rrru.gap.unknown import UNKNOWN, unknown_functions
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3

@@ -1,6 +1,7 @@
 """Calibrations of one campaign on every set of trajectories."""
 
 from rrru.fit import campaign_fit
+from rrru.fit.campaign_noise import Noise
 from rrru.fit.schemas import TABLES
 from rrru.store import tables
 from rrru.store.job import run
@@ -13,7 +14,8 @@ def main(settings, inputs, outputs):
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
     robot = setup.measured_robot(nominal, measurements)
-    fits = campaign_fit.fit_sets(measurements, robot, calibration, info["noise_mm"])
+    noise = Noise(info["noise_mm"], info["noise_rad"], info["noise_from"])
+    fits = campaign_fit.fit_sets(measurements, robot, calibration, noise.mm, noise.arm_mm)
     truth = setup.true_deviations(robot, settings["truth"])
     tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 

@@ -3,6 +3,7 @@
 import pandas as pd
 
 from rrru.campaign.schemas import TABLES, measurement_table
+from rrru.fit.campaign_noise import campaign_noise
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies import campaigns, setup
@@ -23,12 +24,9 @@ def main(settings, inputs, outputs):
         measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))
         notes, registration = ingested.notes, ingested.registration
     measurements, singular = campaigns.with_singularities(robot, measurements, settings["singularity_margin"])
-    noise = campaigns.noise(
-        setup.measured_robot(nominal, measurements),
-        measurements,
-        section.get("noise_mm"),
-        settings["use_near_singularity"],
-    )
+    given = section.get("noise_mm"), section.get("noise_rad")
+    known = setup.measured_robot(nominal, measurements)
+    noise = campaign_noise(known, measurements, given, settings["use_near_singularity"])
     notes = (*notes, *campaigns.unmatched_sets(settings["sets"], measurements))
     row = campaigns.campaign_row(section, measurements, singular, noise, notes, registration)
     if row["notes"]:
@@ -39,7 +37,8 @@ def main(settings, inputs, outputs):
         "workspace": campaigns.workspace_table(robot, measurements).assign(campaign=name),
         "campaigns": pd.DataFrame([row]).assign(campaign=name),
     }
-    tables.write_all((measurement_table(robot),), {"measurements": measurements}, outputs)
+    table = measurement_table(robot, measurements.columns)
+    tables.write_all((table,), {"measurements": measurements}, outputs)
     tables.write_all(TABLES, frames, outputs)
 
 

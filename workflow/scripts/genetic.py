@@ -3,6 +3,7 @@
 import pandas as pd
 from tqdm import tqdm
 
+from rrru.campaign.measurements import at_tool
 from rrru.fit.campaign_fit import select
 from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set
 from rrru.genetic.schemas import TABLES
@@ -23,8 +24,10 @@ def main(settings, inputs, outputs):
 
 def _runs(settings, inputs, searched):
     """Frames by table of all runs; searched: the set of parameters that they search."""
-    measurements, genetic = tables.read(inputs["measurements"]), settings["genetic"]
-    name, nominal, calibration = settings["campaign"], settings["nominal"], settings["calibration"]
+    genetic, name, nominal = settings["genetic"], settings["campaign"], settings["nominal"]
+    calibration = settings["calibration"]
+    # its objective knows positions of the tool alone
+    measurements = at_tool(tables.read(inputs["measurements"]), setup.mechanism(nominal))
     robots = [setup.measured_robot(nominal, measurements, one) for one in (searched, None)]
     runs = Runs(GeneticSettings.from_config(genetic), genetic["seeds"], settings["seed"], (name,))
     results = []

@@ -5,7 +5,8 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from rrru.gap.case import State, make_case
+from rrru.gap.case import State
+from rrru.gap.make_case import make_case
 from rrru.studies.withheld.draw import fresh
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS
@@ -49,6 +50,5 @@ def true_share(robot, conditions, calibrated, state, library):
     if driven is None:
         return np.nan
     case = _case(driven, conditions, library)
-    before = case.measured_mm - case.model(State(calibrated, {}))
-    after = case.measured_mm - case.model(state)
+    before, after = case.residual(State(calibrated, {})), case.residual(state)
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))

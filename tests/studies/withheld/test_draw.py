@@ -10,7 +10,7 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
-from rrru.gap.case import make_case
+from rrru.gap.make_case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.studies.withheld import draw

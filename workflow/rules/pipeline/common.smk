@@ -104,6 +104,7 @@ def diagnosed(wildcards):
         "robot": parts.robot(config, section),
         "masses": parts.masses(config, section),
         "noise_mm": section.get("noise_mm") or None,
+        "noise_rad": section.get("noise_rad"),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
         "figures": GAP_FIGURE,
         "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},

@@ -1,0 +1,51 @@
+"""The measuring noise of a campaign, given or from what a calibration of all its points leaves."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.noise import estimate
+from rrru.errors import ConfigError
+from rrru.fit.campaign_fit import select
+from rrru.fit.least_squares import least_squares
+from rrru.robots.robot import Robot
+
+
+class Noise(NamedTuple):
+    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and where from."""
+
+    mm: float
+    rad: float
+    source: str
+
+    @property
+    def arm_mm(self) -> float:
+        """Length at which an orientation counts beside a position."""
+        return self.mm / self.rad if self.mm > 0.0 and self.rad > 0.0 else np.nan
+
+
+def campaign_noise(
+    robot: Robot,
+    measurements: pd.DataFrame,
+    given: tuple[float | None, float | None],
+    use_near_singularity: bool = True,
+) -> Noise:
+    """The Noise of a campaign: of what is not given, see `rrru.campaign.noise.estimate`.
+
+    given: of positions in mm and of orientations in rad, None where nobody states it. Raises ConfigError where there
+    are too few points to estimate it.
+    """
+    noise_mm, noise_rad = given
+    turned = rows.has_turns(measurements)
+    if noise_mm is not None and (noise_rad or not turned):
+        return Noise(noise_mm, noise_rad if noise_rad and turned else np.nan, "given")
+    residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
+    if residuals is None:
+        raise ConfigError("too few usable points to estimate noise_mm; give it")
+    fit, used = least_squares(residuals), measurements[rows.usable(measurements, use_near_singularity)]
+    left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
+    found_mm, found_turned, source = estimate(used, left, columns, residuals.readings)
+    found_rad = noise_rad or found_turned / robot.angle_arm_mm
+    return Noise(found_mm, found_rad, source) if noise_mm is None else Noise(noise_mm, found_rad, "given")

@@ -1,0 +1,86 @@
+"""Making the case of a campaign: its motion, which points can be used, which effects they can test.
+
+Lengths in mm, angles in rad.
+"""
+
+import numpy as np
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs, stops
+from rrru.effects.motion import Course, make_motion
+from rrru.errors import FitError
+from rrru.gap.case import Case
+from rrru.gap.unknown import unknown_functions
+
+# an effect is tested where at least this share of the points has what it needs
+_ENOUGH = 0.8
+# nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
+_STANDS = {"rad": 1e-8, "mm": 1e-6}
+_NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
+
+
+def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
+    """The case of a measurement table.
+
+    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what
+    a tested effect needs are left out. Raises FitError for an empty table.
+    """
+    if not len(measurements):
+        raise FitError("the campaign has no points")
+    actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
+    motion = _motion(measurements, mechanism, masses, actuators)
+    used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
+    # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
+    stop = stops(measurements)
+    used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())]) & ~at_reversals(motion)
+    used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
+    if not used.any():
+        raise FitError("the campaign has no point that a diagnosis can use")
+    testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
+    for name, effect in library.items():
+        known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
+        missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
+        if missing:
+            untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
+        else:
+            testable[name] = effect
+            complete = np.all([complete, *known.values()], axis=0)
+    used &= complete
+    for name, function in unknown_functions(mechanism).items():
+        values = [getattr(motion, need)[used] for need in function.needs]
+        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
+            testable[name] = function
+    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+
+
+def at_reversals(motion):
+    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell."""
+    path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
+    for leg, unit in enumerate(motion.robot.parts.units):
+        step = np.diff(path[:, leg])
+        # a drive that stands still does not turn back
+        moving = np.flatnonzero(~(np.abs(step) < _STANDS[unit]))
+        reversals = moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
+        if len(reversals):
+            nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
+            close = np.abs(nearest - motion.path_index) <= STEPS
+            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[unit])
+    return result
+
+
+def _motion(measurements, mechanism, masses, actuators):
+    """The motion that the effects see; at the measured points with the table's own actuator values."""
+    path, told = driven_path(measurements)
+    if mechanism.orients:
+        # positions do not tell the orientation between the points: drives are taken to move evenly
+        rows_of_path = np.arange(len(path))
+        path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
+    else:
+        path_drive = mechanism.inverse(path)
+    lost = ~np.isfinite(path_drive).all(axis=1)
+    if lost.any():
+        # what is out of reach stays where it was last
+        good = np.flatnonzero(~lost)
+        path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
+    path_drive[told["path_index"]] = actuators
+    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, **told))
