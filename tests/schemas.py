@@ -14,4 +14,4 @@ def check(name, frame):
 
 def check_measurements(robot, frame):
     """The frame, checked as the measurement table of a robot."""
-    return tables.check(measurement_table(robot), frame)
+    return tables.check(measurement_table(robot, frame.columns), frame)

@@ -9,6 +9,8 @@ from rrru.campaign.plan import connect
 
 # points of the path from one commanded point to the next, and of a transfer between runs with its ends
 STEPS, _TRANSFER_STEPS = 8, 30
+# a path through points turns by more than a right angle at fewer of them; of poses in any order it is three of four
+_MOST_TURNS = 0.5
 # an interval at a run's end that is this much slower than the next leads to rest
 _SLOWER = 0.9
 
@@ -35,16 +37,27 @@ def _path_through(measurements):
     acceleration_mm_s2 (n, 3), time_s, payload_kg and path_index, their places on the path (n,); NaN where nobody knows.
 
     # ASSUME the robot passes smoothly through a run's commanded points and rests where it slows down at an end. Speeds
-    and accelerations come from the times; where a run has no increasing times they are NaN.
+    and accelerations come from the times; where a run has no increasing times, or its points follow no path, they are
+    NaN.
     """
     position, run = rows.command(measurements), measurements["run"].to_numpy()
     told = {name: measurements[name].to_numpy(dtype=float) for name in ("time_s", "payload_kg")}
     pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
-    derivatives = [_derivatives(position[piece], told["time_s"][piece]) for piece in pieces]
+    known = told["time_s"] if follows_path(position, run) else np.full(len(run), np.nan)
+    derivatives = [_derivatives(position[piece], known[piece]) for piece in pieces]
     velocity, acceleration = (np.concatenate(parts) for parts in zip(*derivatives, strict=True))
     path, index = connect(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_STEPS)
     told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, told | {"path_index": index}
+
+
+def follows_path(position_mm, run):
+    """Whether positions (n, 3) in runs (n,) lie along paths: else each is a stop, arrived at from the one before."""
+    moved = np.concatenate([[True], (np.diff(position_mm, axis=0) != 0.0).any(axis=1)])
+    position_mm, run = position_mm[moved], np.asarray(run)[moved]
+    step, same = np.diff(position_mm, axis=0), run[1:] == run[:-1]
+    turns = (np.einsum("na,na->n", step[1:], step[:-1]) < 0.0)[same[1:] & same[:-1]]
+    return not len(turns) or turns.mean() <= _MOST_TURNS
 
 
 def starts_of_runs(run):

@@ -71,7 +71,8 @@ class Residuals:
         """Derivative (m, 3, p) of the residual by the deviations."""
         if self.readings is None:
             return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
-        at = self.mechanism.map(self.actuators, *self._poses(deviations), self.readings)
+        poses, twists = self._poses(deviations)
+        at = self.mechanism.map(self.actuators, poses, twists, self.readings)
         return -at.columns(self.mechanism.directions)
 
     @cached_property

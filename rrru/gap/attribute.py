@@ -65,16 +65,28 @@ def calibrate(case):
     return State(fit.deviations, {})
 
 
+def with_arm(case, noise_mm=None, noise_rad=None):
+    """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
+    positions, turned, _ = _rough(case, calibrate(case))
+    positions, turned = noise_mm or positions, noise_rad or turned / case.arm_mm
+    return replace(case, arm_mm=positions / turned)
+
+
 def with_noise(case, calibrated):
     """The case with its noise estimated, and where from: from what neither calibration nor any effect can fit."""
+    noise_mm, _, source = _rough(case, calibrated)
+    return replace(case, noise_mm=noise_mm), source
+
+
+def _rough(case, calibrated):
+    """`rrru.campaign.noise.estimate` of a case with everything fitted that may be."""
     linear = case.linearise(calibrated)
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
     if columns.shape[-1] > len(case):
         # too few points to fit everything: what the calibration leaves has to do
         columns = linear.base
     used = case.measurements[case.used]
-    noise_mm, _, source = noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
-    return replace(case, noise_mm=noise_mm), source
+    return noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
 
 
 def attribute(case, prior, noise_from="given"):

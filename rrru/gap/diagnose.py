@@ -9,9 +9,8 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.errors import FitError
-from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap.advise import advise
-from rrru.gap.attribute import Attribution, attribute, with_effects
+from rrru.gap.attribute import Attribution, attribute, with_arm, with_effects
 from rrru.gap.case import State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
@@ -75,14 +74,14 @@ def diagnose(
     library = settings.library(robot.mechanism)
     noise_mm, noise_from = (robot.noise_mm, "given") if robot.noise_mm else (1.0, "")
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
-    arm_mm = np.nan
-    if rows.has_turns(measurements):
-        arm_mm = campaign_noise(nominal, measurements, (robot.noise_mm or None, robot.noise_rad), near).arm_mm
+    arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, noise_mm, library, near, arm_mm)
     least = _POINTS_PER_PARAMETER * len(nominal.parameters)
     if len(case) < least:
         whose = f"campaign {robot.campaign}: " if robot.campaign else ""
         raise FitError(f"{whose}{case.count} usable points are too few for a diagnosis; allowed: at least {least}")
+    if rows.has_turns(measurements):
+        case = with_arm(case, robot.noise_mm, robot.noise_rad)
     generator = stream(settings.seed, "gap", robot.campaign)
     verdict, attribution, ordered = _decide(attribute(case, settings.prior, noise_from))
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)

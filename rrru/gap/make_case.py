@@ -6,7 +6,7 @@ Lengths in mm, angles in rad.
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import STEPS, driven_path, starts_of_runs, stops
+from rrru.campaign.driven_path import STEPS, driven_path, follows_path, starts_of_runs, stops
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.case import Case
@@ -32,12 +32,17 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
     stop = stops(measurements)
-    used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())]) & ~at_reversals(motion)
+    used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
+    if follows_path(motion.position_mm, measurements["run"].to_numpy()):
+        used &= ~at_reversals(motion)
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
     for name, effect in library.items():
+        if _fitted(effect, motion):
+            untestable[name] = "the calibration's own parameters take it up"
+            continue
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
         missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
         if missing:
@@ -51,6 +56,14 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+
+
+def _fitted(effect, motion):
+    """Whether an effect changes nothing but constant numbers that the calibration chooses its parameters from."""
+    coordinates = effect.coordinates
+    values = coordinates.to_values(np.array(coordinates.typical), coordinates.shapes[0])
+    twists = np.asarray(effect.contribute(motion, values).twists)
+    return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
 
 
 def at_reversals(motion):

@@ -5,15 +5,17 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.campaign.measurements import vector_columns
+from rrru.campaign.measurements import turn_columns, vector_columns
 from rrru.effects.library import active_effects
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import together
 from rrru.errors import ConfigError
-from rrru.plant.tracker import measure
+from rrru.plant.tracker import Sees, measure
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.robots.rrru3 import Rrru3
+
+_ONLY_TOOL = Sees()
 
 
 @dataclass(frozen=True)
@@ -34,26 +36,34 @@ class VirtualRobot:
     masses: Masses = field(default_factory=Masses)
     rotation_limit_rad: float = 0.05
 
-    def run(self, plan, noise_mm, generator, controller=None):
+    def run(self, plan, noise_mm, generator, controller=None, sees=_ONLY_TOOL):
         """Drive a plan; returns (measurements, truth) as frames.
 
         controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse
-        kinematics. `measurements` fits the schema of that name with the commanded positions of the plan and the values
-        that the controller sent; `truth` holds the exact position in the tracker's frame and the platform's rotation.
+        kinematics; sees: what the tracker reads beside the tool's position. `measurements` fits the schema of that name
+        with the commanded positions of the plan and the values that the controller sent, `truth` holds the exact
+        position in the tracker's frame and the platform's rotation, both a row for every reflector at every point.
         Noise is drawn for every row, solved or not, so that one lost point does not change the others.
         """
         commands, target = plan.commands(self.mechanism), plan.targets()
         motion = self.motion(plan, controller or self.mechanism.inverse)
-        position, turned = self.positions(motion, target)
-        solved = np.isfinite(position).all(axis=1)
-        position = position + self.non_repeatability_mm * non_repeatability(generator, len(target))
-        measurements = commands.assign(
-            **dict(zip(self.mechanism.parts.columns, motion.drive.T, strict=True)),
+        poses, twists, turned = self._posed(motion, target)
+        solved, row = poses.closed & (turned <= self.rotation_limit_rad), sees.rows(len(target))
+        lost = non_repeatability(generator, len(target))[row]
+        position = np.where(solved[row, None], sees.positions(self.mechanism, poses, twists), np.nan)
+        position = position + self.non_repeatability_mm * lost
+        measurements = commands.assign(**dict(zip(self.mechanism.parts.columns, motion.drive.T, strict=True)))
+        if not sees.only_tool:
+            near = self.mechanism.near(target, motion.drive)
+            measurements = measurements.assign(**turn_columns("command", near.turn)).iloc[row].reset_index(drop=True)
+            measurements["point"] = measurements.groupby("run").cumcount() + 1
+        truth = measurements[["run", "trajectory", "point"]]
+        measurements = measurements.assign(
             **vector_columns("measured", measure(position, noise_mm, generator)),
-            status=np.where(solved, "ok", "unsolved"),
+            **sees.columns(self.mechanism, poses, twists, generator),
+            status=np.where(solved[row], "ok", "unsolved"),
         )
-        truth = commands[["run", "trajectory", "point"]]
-        return measurements, truth.assign(**vector_columns("true", position), platform_rotation_rad=turned)
+        return measurements, truth.assign(**vector_columns("true", position), platform_rotation_rad=turned[row])
 
     def motion(self, plan, controller):
         """What the effects may know about a plan driven through a controller; the nominal mechanism's loads."""
@@ -82,12 +92,15 @@ class VirtualRobot:
         target (n, 3): the commanded positions by default. NaN where the legs do not close near the target or the
         platform would turn by more than the limit.
         """
-        twists = self.twists + together(self.effects, motion).twists
-        near = self.mechanism.near(motion.position_mm if target is None else target, motion.drive)
-        poses = self.mechanism.model.solve(motion.drive, near, twists)
-        turned = np.linalg.norm(poses.turned_from(near.turn), axis=1)
+        poses, twists, turned = self._posed(motion, motion.position_mm if target is None else target)
         solved = poses.closed & (turned <= self.rotation_limit_rad)
         return np.where(solved[:, None], self.mechanism.measured(poses, twists), np.nan), turned
+
+    def _posed(self, motion, target):
+        """Poses (n) near targets (n, 3), twists of all that is off, and sizes (n,) of the platform's rotation."""
+        twists, near = self.twists + together(self.effects, motion).twists, self.mechanism.near(target, motion.drive)
+        poses = self.mechanism.model.solve(motion.drive, near, twists)
+        return poses, twists, np.linalg.norm(poses.turned_from(near.turn), axis=1)
 
 
 def non_repeatability(generator, count):

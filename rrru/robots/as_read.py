@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.geometric_numbers import choose, direction, open_numbers
+from rrru.robots.geometric_numbers import choose, direction, offered, open_numbers
 from rrru.robots.robot import Robot
 
 # share of a number that the poses must leave beside the others
@@ -49,6 +49,11 @@ class AsRead(Robot):
         """Twists (sites, 6, p) that a unit of each parameter makes."""
         own = np.pad(self.robot.directions, ((0, len(self.legs.reflectors)), (0, 0), (0, 0)))
         return np.concatenate([own, *(direction(self.legs, one)[:, :, None] for one in self._added)], axis=2)
+
+    @property
+    def offered(self):
+        """Which components (sites, 6) of constant twists its readings leave open."""
+        return offered(self.legs, open_numbers(self.reads))
 
     def seen_at(self, actuators, position_mm, readings=None):
         """The robot with what is open and told, beside its own numbers, by poses (n, K), (n, 3) and Readings."""

@@ -15,7 +15,7 @@ from rrru.errors import ConfigError
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
-from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, open_numbers
+from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import drive_loads
 from rrru.robots.robot import Robot
@@ -67,8 +67,7 @@ class GeneralRobot(Robot):
     @cached_property
     def _chosen(self):
         """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
-        drives = self.candidates[: len(self.parts.drives)]
-        wanted = (*drives, *open_numbers(self.reads)) if self.parameter_set == "zero" else self.candidates
+        wanted = self._wanted
         if self.parameter_set == "zero" and not self.sample:
             return wanted, {}
         actuators, position, readings = self.sample or (*self._workspace(), None)
@@ -84,6 +83,17 @@ class GeneralRobot(Robot):
             self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
         }
         return tuple(self.candidates[k] for k in chosen), gauge
+
+    @property
+    def offered(self):
+        """Which components (sites, 6) of constant twists its parameters are chosen from."""
+        return offered(self.legs, self._wanted)
+
+    @cached_property
+    def _wanted(self):
+        """The Candidates that the set is chosen from."""
+        drives = self.candidates[: len(self.parts.drives)]
+        return (*drives, *open_numbers(self.reads)) if self.parameter_set == "zero" else self.candidates
 
     def _workspace(self):
         """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
@@ -112,12 +122,7 @@ class GeneralRobot(Robot):
     @cached_property
     def gauge(self):
         """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
-        names = self.parameters.names
-        return {
-            left: " + ".join(f"{c:.3g} {name}" for c, name in zip(of, names, strict=False) if abs(c) > 1e-6)
-            or "nothing"
-            for left, of in self._chosen[1].items()
-        }
+        return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
 
     @cached_property
     def directions(self):

@@ -86,6 +86,11 @@ def direction(legs, candidate):
     return result
 
 
+def offered(legs, candidates):
+    """Which components (sites, 6) of twists Candidates stand for."""
+    return np.any([direction(legs, one).astype(bool) for one in candidates], axis=0)
+
+
 def choose(columns, allowed, least, basis=None):
     """Numbers of the columns (m, c) that those chosen before them leave more than the share `least` of.
 
@@ -103,3 +108,10 @@ def choose(columns, allowed, least, basis=None):
         else:
             stands[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
     return chosen, stands
+
+
+def in_words(combination, names):
+    """A combination (k,) of the first k names, such as "0.71 base1_x - 0.2 dl1"; "nothing" where it is none."""
+    return (
+        " + ".join(f"{c:.3g} {name}" for c, name in zip(combination, names, strict=False) if abs(c) > 1e-6) or "nothing"
+    )

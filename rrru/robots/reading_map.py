@@ -20,6 +20,7 @@ class ReadingMap(TwistMap):
     def __init__(self, robot, actuators, poses, twists, place_mm, readings):
         super().__init__(robot.model, actuators, poses, twists, place_mm)
         self._robot, self._at, self._readings = robot, twists, readings
+        self._world, self._tool = (robot.legs.site_numbers[site] for site in (WORLD, TOOL))
 
     @property
     def rows(self):
@@ -30,10 +31,10 @@ class ReadingMap(TwistMap):
         """Motion (n, 3, 6) of the points that are read per twist at a site, in the site's frame."""
         if site == TOOL and self._readings.reflectors is not None:
             lever = self._readings.place_mm - np.asarray(self._robot.tool_mm)
-            tool = self._at[:, self._robot.legs.site_numbers[TOOL], 3:]
+            tool = self._at[:, self._tool, 3:]
             turning = np.cross(_EYE, turned_by(tool, lever)[:, None, :]).transpose(0, 2, 1)
             turn = self._in_world(self.poses.turn)
-            return np.concatenate([turn, turn @ turning @ self._own_turns(TOOL, _EYE)], axis=2)
+            return np.concatenate([turn, turn @ turning @ self._own(self._tool, _EYE)], axis=2)
         if site in self.closure.legs.reflectors:
             its = reflector_numbers(self.closure.legs, self._readings) == self.closure.legs.site_numbers[site]
             turn = np.where(its[:, None, None], self._in_world(self.poses.turn), 0.0)
@@ -43,9 +44,9 @@ class ReadingMap(TwistMap):
     def turning(self, site):
         """Turn (n, 3, 6) in rad of the platform, as it is read, per twist at a site, in the site's frame."""
         if site == WORLD:
-            return self._about(self._own_turns(WORLD, _EYE))
+            return self._about(self._own(self._world, _EYE))
         if site == TOOL:
-            return self._about(self._own_turns(TOOL, self._in_world(self.poses.turn)))
+            return self._about(self._own(self._tool, self._in_world(self.poses.turn)))
         return sum((self.turn[:, :, rows] @ one for rows, one in self.counts(site)), np.zeros((len(self), 3, 6)))
 
     def _about(self, axes):

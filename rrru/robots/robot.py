@@ -71,6 +71,11 @@ class Robot(ABC):
         return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
 
     @property
+    def offered(self):
+        """Which components (sites, 6) of constant twists its parameters are chosen from; none of a fixed set."""
+        return np.zeros((len(self.legs.sites), 6), dtype=bool)
+
+    @property
     def deviation_names(self):
         """Names of the deviations that `twists_of` knows."""
         return self.parameters.names

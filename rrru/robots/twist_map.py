@@ -85,10 +85,6 @@ class TwistMap:
             result |= {bar: (_frame_along(far - near), near), end: (self.poses.turn, far)}
         return result
 
-    def _own_turns(self, site, turn):
-        """`_own` of a site by its name."""
-        return self._own(self.closure.legs.site_numbers[site], turn)
-
     def _own(self, number, turn):
         """Axes (n, 3, 3) about which small rotations of a site's vector turn, in space: its finite one is counted."""
         if number not in self._twists.turns:
@@ -109,7 +105,7 @@ class TwistMap:
         """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
         if site == WORLD:
             point = self._in_world(self.point_mm[:, :, None])
-            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ self._own_turns(WORLD, _EYE)
+            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ self._own(self.closure.legs.site_numbers[WORLD], _EYE)
             return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
         if site == TOOL:
             turn = self._in_world(self.poses.turn)

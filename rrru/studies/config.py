@@ -76,6 +76,7 @@ def virtual(config, name):
         "passes": section.get("passes", [{"reverse": False, "payload_kg": 0.0}]),
         "motion": config["motion"],
         "noise_mm": section["noise_mm"],
+        **{key: section[key] for key in ("targets", "noise_rad") if key in section},
     }
 
 

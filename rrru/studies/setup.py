@@ -1,11 +1,12 @@
 """The only builder: from parts of the configuration, which `rrru.studies.config` makes, to robots and campaigns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
 from rrru.plant import virtual_robot
+from rrru.plant.tracker import Sees
 from rrru.robots.catalogue import make_mechanism, tracked_set
 from rrru.seeds import stream
 
@@ -41,7 +42,7 @@ class VirtualCampaign:
     """A campaign of a virtual robot: the robot, what it is told to do and the tracker's noise.
 
     origin: first label of its random streams, beside its name; drive: actuator values (N, k) that the controller wants,
-    in the order driven, to those sent to the motors, None where these are the same.
+    in the order driven, to those sent to the motors, None where these are the same; sees: what the tracker reads.
     """
 
     robot: virtual_robot.VirtualRobot
@@ -51,6 +52,7 @@ class VirtualCampaign:
     name: str
     origin: str = "campaign"
     drive: object = None
+    sees: Sees = field(default_factory=Sees)
 
     def generator(self, *labels):
         """Random stream of this campaign for a purpose."""
@@ -64,7 +66,7 @@ class VirtualCampaign:
         """
         mechanism, generator = self.robot.mechanism, self.generator(label)
         if self.drive is None:
-            return self.robot.run(self.plan, self.noise_mm, generator, controller)
+            return self.robot.run(self.plan, self.noise_mm, generator, controller, self.sees)
         path, index = self.plan.path()
         wanted = (controller or mechanism.inverse)(path)
         measurements, truth = self.robot.run(self.plan, self.noise_mm, generator, lambda _: self.drive(wanted))
@@ -88,7 +90,8 @@ def virtual_campaign(nominal, virtual):
     )
     real = real_robot(nominal, virtual["robot"])
     origin = virtual.get("origin", "campaign")
-    return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin)
+    sees = Sees(virtual.get("targets", {}), virtual.get("noise_rad"))
+    return VirtualCampaign(real, plan, virtual["noise_mm"], virtual["seed"], virtual["name"], origin, sees=sees)
 
 
 def true_deviations(robot, truth):

@@ -3,7 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
+from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.geometric_numbers import direction
@@ -58,15 +60,16 @@ trajectories:
     lines: {{start_mm: {start}, end_mm: {end}, offsets_y_mm: [0.0, 25.0, -25.0], points: 25}}
 campaigns:
   own:
-    {{robot: mine, virtual: own_twin, trajectories: small, noise_mm: 0.01, errors: {errors},
+    {{robot: mine, virtual: own_twin, trajectories: small, noise_mm: 0.01, errors: {errors},{reads}
       passes: [{{}}, {{reverse: true}}]}}
 calibration: {{sets: {{lines: ["line_*"]}}}}
 """
 _TABLES = ("parameters", "error_summary", "gap_verdicts")
 
 
-def _run(folder, **parts):
+def _run(folder, reads="", **parts):
     """Verdict, error summary, parameters and measurements of the whole way with an own robot."""
+    parts["reads"] = reads
     (folder / "mine.yaml").write_text(_OVERLAY.format(**parts))
     targets = [f"results/campaigns/own/{name}.parquet" for name in _TABLES]
     code, output = run(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
@@ -101,7 +104,10 @@ def test_a_robot_of_a_users_module_goes_the_whole_way(tmp_path):
 
 
 def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
-    """The example arm: six drives by the names of its joints, and an offset of one found by the calibration."""
+    """The example arm: six drives by the names of its joints, and an offset of one found by the calibration.
+
+    The tracker sees two reflectors at every point and the orientation.
+    """
     arm = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="zero")
     x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
     column = arm.parts.columns[1]
@@ -115,7 +121,14 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
         start=[x - 60.0, y, z],
         end=[x + 60.0, y, z],
         errors="zero",
+        reads=" noise_rad: 1.0e-4, targets: {ball: [20.0, 0.0, 60.0], nest: [-30.0, 10.0, 50.0]},",
     )
+    measured = result["measurements"]
+    assert len(measured) == 2 * 2 * 3 * 25 and set(measured["target"]) == {"ball", "nest"}
+    # where the robot was sent, an orientation is read with its noise alone and the little that the errors turn it by
+    off = rows.turns(measured, "measured") @ rows.turns(measured, "command").transpose(0, 2, 1)
+    assert 1e-4 < np.sqrt((Rotation.from_matrix(off).magnitude() ** 2).mean()) < 5e-3
+    assert result["error_summary"].query("mode == 'model'")["mean_mm"].max() < 0.5
     assert set(arm.parts.columns) <= set(result["measurements"])
     chosen = "calibration == 'lines' and method == 'least_squares'"
     fitted = result["parameters"].query(chosen).set_index("parameter")

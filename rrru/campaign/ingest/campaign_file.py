@@ -9,15 +9,16 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign.ingest.cells import read_cells
-from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, path_length, resolution
+from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution
 from rrru.campaign.ingest.columns import MM, RAD, REQUIRED, convert, known_columns, resolve
-from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts, frame_limit
-from rrru.campaign.ingest.outliers import flag_outliers, reproduced
+from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts
+from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
+from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
-from rrru.campaign.ingest.registration import Registration, register
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED, Sheet
-from rrru.campaign.measurements import command, measured, vector_columns
-from rrru.errors import ConfigError, FitError
+from rrru.campaign.ingest.registration import Registration
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS, Sheet
+from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
+from rrru.errors import ConfigError
 from rrru.robots.robot import Robot
 
 _CHOICES = {
@@ -36,7 +37,8 @@ class IngestSpec:
     columns: our name -> the file's column name, absent = the same name. unit: of the file's positions ("mm", "m",
     "inch"; speeds are mm/s, payloads kg). angle_unit: "rad" or "deg". frame: of the measured positions; "register"
     solves the six numbers between it and the robot frame from `registration_points`, pairs (run, point), none for all.
-    extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in".
+    extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
+    places of reflectors on the platform in mm, by name; others are found from the file.
     """
 
     path: str
@@ -47,6 +49,7 @@ class IngestSpec:
     registration_points: tuple = ()
     extra_columns: str = "refuse"
     elbow: str = "out"
+    targets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
@@ -67,7 +70,8 @@ class IngestSpec:
         """From a campaign's section of the configuration, whose key `ingest` is the path."""
         given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
         points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
-        return cls(section["ingest"], registration_points=points, **given)
+        places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
+        return cls(section["ingest"], registration_points=points, targets=places, **given)
 
 
 @dataclass(frozen=True)
@@ -89,24 +93,28 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     sheet, notes = _read(spec, mechanism)
     digit_mm = MM[spec.unit] * resolution(measured(sheet.frame) / MM[spec.unit])
     check_runs(sheet, digit_mm)
-    if check_commands(sheet):
-        check_speed(sheet)
-        if check_sizes(sheet) and spec.frame == "robot":
-            check_measured(sheet)
+    if not check_commands(sheet):
+        sheet.problems.refuse()
+    check_speed(sheet)
+    mounted = mounting(sheet) if not sheet.problems else None
+    same = check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
+    if same and spec.frame == "robot":
+        check_measured(at_tool(sheet, mounted))
+        check_turned(sheet)
     sheet.problems.refuse()
-    registration = _register(sheet, digit_mm) if spec.frame == "register" else None
+    registration = register_sheet(sheet, mounted, digit_mm) if spec.frame == "register" else None
     if registration:
         moved = vector_columns("measured", registration.apply(measured(sheet.frame)))
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
-        check_measured(sheet)
+        check_measured(at_tool(sheet, mounted))
         sheet.problems.refuse()
         residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
         notes += [
-            f"measured positions registered to the commanded ones at {registration.points} points: {residual}; "
-            "the part of the robot's errors that looks like a rigid motion is gone"
+            f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
+            "rigid motion that is left is fitted with the calibration"
         ]
-    table, more = _table(sheet, digit_mm)
-    return Ingested(table, (*notes, *more), registration)
+    table, more = _table(sheet, mounted, registration, digit_mm)
+    return Ingested(table, (*notes, *more, *(mounted.notes if mounted else ())), registration)
 
 
 def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
@@ -121,11 +129,28 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
     frame = convert(spec, mechanism, found, cells, rows, problems)
-    if not set(REQUIRED) <= set(frame) or len(set(names)) < len(names):
+    drives = mechanism.parts.columns
+    if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(names)) < len(names):
         problems.refuse()
+    if not set(COMMAND) <= set(frame):
+        problems.refuse()
+        frame = frame.assign(**vector_columns("command", _sent_to(frame, mechanism, problems)))
+        which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
+        notes.append(f"no commanded positions: computed from {which}")
     frame, more = number_runs(frame)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
+
+
+def _sent_to(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> np.ndarray:
+    """Positions (n, 3) of the nominal robot at the file's actuator values, NaN where one is noted."""
+    drives = mechanism.parts.columns
+    position = mechanism.forward(frame[[*drives]].to_numpy(dtype=float))
+    for i in np.flatnonzero(np.isnan(position).any(axis=1)):
+        value = ", ".join(f"{one:.6g}" for one in frame[[*drives]].iloc[i])
+        allowed = "values at which the nominal robot closes near its home pose, or commanded positions beside them"
+        problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)
+    return position
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:
@@ -144,65 +169,27 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
     return notes
 
 
-def _register(sheet: Sheet, digit_mm: float) -> Registration:
-    """Registration from the chosen points, without those that a first registration shows to be outliers."""
-    frame = sheet.frame
-    seen, target = measured(frame), command(frame)
-    pairs = list(zip(frame["run"], frame["point"], strict=True))
-    wanted = {tuple(pair) for pair in sheet.spec.registration_points}
-    for run, point in sorted(wanted - set(pairs), key=str):
-        value = f"registration point (run {run}, point {point}), which the file lacks"
-        sheet.note("registration", None, value, f"points of the file: runs 1 to {frame['run'].max():g}")
-    sheet.problems.refuse()
-    chosen = np.array([not wanted or pair in wanted for pair in pairs])
-    try:
-        first = register(seen[chosen], target[chosen])
-        chosen &= ~_outliers(frame.assign(**vector_columns("measured", first.apply(seen))), digit_mm)
-        result = register(seen[chosen], target[chosen])
-    except FitError as error:
-        value, _, allowed = str(error).partition("; allowed: ")
-        sheet.refuse_now(None, f"registration points: {value}", allowed)
-    if mirrored := _off_as_mirrored(seen, target):
-        value = (
-            f"positions in a left-handed frame ({mirrored:.6g} mm rms off when registered, a fifth of that if mirrored)"
-        )
-        sheet.refuse_now(MEASURED, value, "a right-handed frame: turn the sign of one axis round")
-    if result.rms_mm > (limit := frame_limit(sheet.mechanism)):
-        value = f"a residual of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
-        sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
-    return result
-
-
-def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
-    """Residual in mm rms of measured positions (n, 3) that fit far better with an axis turned round, else 0."""
-    try:
-        straight, mirrored = (register(seen * [1.0, 1.0, sign], target).rms_mm for sign in (1.0, -1.0))
-    except FitError:
-        return 0.0
-    return straight if straight > 1.0 and mirrored < 0.2 * straight else 0.0
-
-
-def _outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
-    """Rows (n,) that a broken beam spoilt, positions being in the robot frame; digit_mm: last digit of the file."""
-    target, run = command(frame), frame["run"].to_numpy()
-    deviation = measured(frame) - target
-    marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
-    return marked & ~reproduced(marked, deviation, target, run)
-
-
-def _table(sheet: Sheet, digit_mm: float) -> tuple[pd.DataFrame, list[str]]:
+def _table(
+    sheet: Sheet, mounted: Mounting | None, registration: Registration | None, digit_mm: float
+) -> tuple[pd.DataFrame, list[str]]:
     """Frame in the form of the schema of measurements, and notes on what is strange and on outliers."""
-    frame, drives = sheet.frame, sheet.drives
-    if not set(drives) <= set(frame):
-        values = sheet.mechanism.inverse(command(frame), elbow=sheet.spec.elbow)
-        frame = frame.assign(**dict(zip(drives, values.T, strict=True)))
-    notes, outlier = doubts(frame, sheet.mechanism), _outliers(frame, digit_mm)
-    frame = frame.assign(status=np.where(outlier, "outlier", "ok"))
+    frame, drives = at_tool(sheet, mounted).frame, sheet.drives
+    values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
+    notes, outlier = doubts(frame, sheet.mechanism), outliers(frame, digit_mm)
+    told = dict(zip(drives, values.T, strict=True))
+    if turned or mounted or sheet.mechanism.orients:
+        told |= turn_columns("command", sheet.poses.turn)
+    if turned and registration and not mounted:
+        told |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
+    if mounted:
+        told |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
+    frame = sheet.frame.assign(**told, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         places = frame.loc[outlier, ["run", "point"]].to_numpy()
         where = ", ".join(f"run {run:g} point {point:g}" for run, point in places[:10])
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status")).reset_index(drop=True)
+    extra = [name for name in (*TURNS["command"], *TURNS["measured"], "target", *TARGET) if name in frame]
+    frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rrru.campaign.driven_path import follows_path
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED
 
 _LEAST_POINTS = 3
@@ -16,16 +17,23 @@ def number_runs(frame):
     a `point`, where the commanded path turns back on itself or starts again. Without a `point` they are counted within
     the run.
     """
-    frame, notes, numbered = frame.copy(), [], "point" in frame
+    frame, notes = frame.copy(), []
+    if "target" in frame and "point" in frame:
+        # several reflectors may be read at one point
+        frame = frame.drop(columns="point")
+        notes.append("points numbered anew, a row each: several reflectors may be read at one")
+    numbered = "point" in frame
     if "run" not in frame:
         change = (frame["trajectory"] != frame["trajectory"].shift()).to_numpy()
         again = (
             (frame["point"].diff() < 0).to_numpy() if numbered else _turns_back(frame[[*COMMAND]].to_numpy(), change)
         )
-        frame["run"] = (change | again).cumsum().astype(float)
         where = "the point's number falls" if numbered else "the commanded path turns back or starts again"
-        runs = int(frame["run"].max())
-        notes.append(f"no column run: a new run wherever the trajectory's name changes or {where}, {runs} runs")
+        where = f"the trajectory's name changes or {where}"
+        if not numbered and not follows_path(frame[[*COMMAND]].to_numpy(), frame["trajectory"].to_numpy()):
+            again, where = False, "the trajectory's name changes, as the points follow no path"
+        frame["run"] = (change | again).cumsum().astype(float)
+        notes.append(f"no column run: a new run wherever {where}, {int(frame['run'].max())} runs")
     if not numbered:
         frame["point"] = frame.groupby("run").cumcount().astype(float) + 1.0
         notes.append("no column point: counted within the run")

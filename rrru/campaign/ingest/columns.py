@@ -7,9 +7,13 @@ from decimal import Decimal
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED, drive_name
+from rrru.campaign.ingest.orientations import check_orientations
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, QUATERNIONS, TURNS, drive_name
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
+_GROUPS = (*TURNS.values(), *QUATERNIONS.values())
+_MORE = ("target", *(name for group in _GROUPS for name in group))
+_TEXT = ("trajectory", "target")
 _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
 MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
 RAD = {"rad": 1.0, "deg": np.pi / 180.0}
@@ -31,7 +35,7 @@ _LIMITS = {
 
 def known_columns(mechanism):
     """Our names of all columns that a robot's file may have."""
-    return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES)
+    return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_MORE)
 
 
 def resolve(spec, names, mechanism, problems):
@@ -46,14 +50,21 @@ def resolve(spec, names, mechanism, problems):
     wanted = {ours: spec.columns.get(ours, ours) for ours in known_columns(mechanism)}
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
     extra = [name for name in names if name not in found.values()]
+    # drive values tell where the robot was sent as well
+    sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():
-        if ours not in found and (ours in REQUIRED or ours in spec.columns):
+        if ours not in found and ((ours in REQUIRED and not (sent and ours in COMMAND)) or ours in spec.columns):
             allowed = f"a column {theirs}{_advice(ours, _nearest(theirs, extra))}; the file has {', '.join(names)}"
             problems.add("missing column", column=theirs, value="no such column", allowed=allowed)
     given = ", ".join(found[name] for name in drives if name in found)
     if 0 < sum(name in found for name in drives) < len(drives):
         allowed = f"all of {', '.join(drives)}, or none"
         problems.add("missing column", column=given, value=f"some {drive_name(mechanism)}", allowed=allowed)
+    for group in _GROUPS:
+        given = ", ".join(found[name] for name in group if name in found)
+        if 0 < sum(name in found for name in group) < len(group):
+            allowed = f"all of {', '.join(group)}, or none"
+            problems.add("missing column", column=given, value="a part of an orientation", allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
         for name in dict.fromkeys(extra):
@@ -75,20 +86,33 @@ def convert(spec, mechanism, found, cells, rows, problems):
     for row in np.asarray(rows)[missed]:
         allowed = "three numbers: drop the row of a point that was not measured"
         problems.add("missed point", row=row, column=", ".join(measured), value="blank", allowed=allowed)
-    filled = {ours for ours, theirs in found.items() if ours in REQUIRED or not all(map(_blank, cells[theirs]))}
+    needed = [*REQUIRED, "target"]
+    filled = {ours for ours, theirs in found.items() if ours in needed or not all(map(_blank, cells[theirs]))}
     drives = {drive.column: drive.unit for drive in mechanism.parts.drives}
     filled |= set(drives) if filled & set(drives) else set()
     factor = dict.fromkeys((*COMMAND, *MEASURED), MM[spec.unit])
     factor |= {name: MM[spec.unit] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
     frame = pd.DataFrame(index=pd.Index(rows))
+    blank = _blank_groups(found, cells, len(rows))
     for ours, theirs in found.items():
-        if ours == "trajectory":
-            frame[ours] = pd.Series(_names(cells[theirs], rows, theirs, problems), index=frame.index, dtype=object)
+        if ours in _TEXT:
+            names = _names(ours, cells[theirs], rows, theirs, problems)
+            frame[ours] = pd.Series(names, index=frame.index, dtype=object)
         elif ours in filled:
-            numbers = _numbers(cells[theirs], rows, theirs, missed & (ours in MEASURED), problems)
-            frame[ours] = factor.get(ours, 1.0) * numbers
+            skipped = missed & (ours in MEASURED) | blank.get(ours, False)
+            frame[ours] = factor.get(ours, 1.0) * _numbers(cells[theirs], rows, theirs, skipped, problems)
     _check_limits(frame, found, problems)
-    return frame
+    return check_orientations(frame, found, problems)
+
+
+def _blank_groups(found, cells, count):
+    """By column of an orientation the rows (n,) that have none: all its cells are blank."""
+    result = {}
+    for group in _GROUPS:
+        if set(group) <= set(found):
+            empty = [all(_blank(cells[found[name]][i]) for name in group) for i in range(count)]
+            result |= dict.fromkeys(group, np.array(empty))
+    return result
 
 
 def _check_limits(frame, found, problems):
@@ -126,12 +150,13 @@ def _fault(cell):
     return None if number and abs(float(cell)) < _LARGEST else "a finite number"
 
 
-def _names(cells, rows, theirs, problems):
-    """Names of the trajectories as text, "" where a cell is noted."""
+def _names(ours, cells, rows, theirs, problems):
+    """Names of trajectories or reflectors as text, "" where a cell is noted."""
     names = ["" if _blank(cell) else str(cell).strip() for cell in cells]
     for row, cell, name in zip(rows, cells, names, strict=True):
         if not name or not isinstance(cell, (str, int)):
-            problems.add("trajectory", row=row, column=theirs, value=_shown(cell), allowed="the trajectory's name")
+            whose = "trajectory" if ours == "trajectory" else "reflector"
+            problems.add(ours, row=row, column=theirs, value=_shown(cell), allowed=f"the {whose}'s name")
     return names
 
 

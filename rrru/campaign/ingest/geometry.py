@@ -54,15 +54,16 @@ def _check_poses(known, command, sheet):
     return True
 
 
-def check_sizes(sheet):
+def check_sizes(sheet, offset_mm=0.0):
     """Note measured positions in another unit than the commanded ones; whether both have the same.
 
-    Their spreads are compared, which are the same in every frame.
+    Their spreads are compared, which are the same in every frame. offset_mm (n, 3): of what is measured from the tool.
     """
-    known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
-    if not len(known):
+    known = (sheet.frame[[*COMMAND, *MEASURED]].notna()).all(axis=1).to_numpy()
+    if not known.any():
         return False
-    command, measured = _spread(rows.command(known)), _spread(rows.measured(known))
+    command = _spread((rows.command(sheet.frame) + offset_mm)[known])
+    measured = _spread(rows.measured(sheet.frame)[known])
     if command == 0.0 or 0.5 <= measured / command <= 2.0:
         return True
     ratio, seems = measured / command, ""

@@ -5,13 +5,18 @@ from typing import Any
 
 import pandas as pd
 
+from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.problems import Problems
 from rrru.robots.robot import Robot
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
+# orientations by what they belong to: rotation vectors, and quaternions that stand for them
+TURNS = {name: tuple(f"{name}_r{axis}_rad" for axis in AXES) for name in ("command", "measured")}
+QUATERNIONS = {name: tuple(f"{name}_q{part}" for part in "xyzw") for name in TURNS}
 _DRIVE_NAMES = {frozenset({"rad"}): "drive angles", frozenset({"mm"}): "slider positions"}
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
+TARGET = tuple(f"target_{axis}_mm" for axis in AXES)
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,21 @@ class Sheet:
     def drives(self):
         """Names of the columns of actuator values."""
         return tuple(self.mechanism.parts.columns)
+
+    @property
+    def poses(self):
+        """Nominal poses (n) at the actuator values, or where these are not stated at the commanded positions."""
+        command = self.frame[[*COMMAND]].to_numpy(dtype=float)
+        return self.mechanism.solve(self.actuators(command), command)
+
+    def actuators(self, command):
+        """Actuator values (n, K): those of the file, else those that the commanded poses need."""
+        if set(self.drives) <= set(self.frame):
+            return self.frame[[*self.drives]].to_numpy(dtype=float)
+        turned = {}
+        if self.mechanism.orients and set(TURNS["command"]) <= set(self.frame):
+            turned["turn"] = rows.turns(self.frame, "command")
+        return self.mechanism.inverse(command, elbow=self.spec.elbow, **turned)
 
     @property
     def drive_name(self):

@@ -1,0 +1,71 @@
+"""Measured positions of a file in the robot's frame, and which of them a broken beam spoilt. Lengths in mm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign.ingest.checks import path_length
+from rrru.campaign.ingest.geometry import frame_limit
+from rrru.campaign.ingest.mounting import Mounting
+from rrru.campaign.ingest.outliers import flag_outliers, reproduced
+from rrru.campaign.ingest.registration import Registration, register
+from rrru.campaign.ingest.sheet import MEASURED, Sheet
+from rrru.campaign.measurements import command, measured, series, vector_columns
+from rrru.errors import FitError
+
+
+def at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:
+    """The sheet with the positions of reflectors carried to the tool; its frame is the robot's."""
+    if mounted is None:
+        return sheet
+    moved = vector_columns("measured", measured(sheet.frame) - mounted.offset_mm)
+    return replace(sheet, frame=sheet.frame.assign(**moved))
+
+
+def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> Registration:
+    """Registration from the chosen points, without those that a first registration shows to be outliers."""
+    frame = sheet.frame
+    offset = mounted.offset_mm if mounted else 0.0
+    seen, target = measured(frame), command(frame) + offset
+    pairs = list(zip(frame["run"], frame["point"], strict=True))
+    wanted = {tuple(pair) for pair in sheet.spec.registration_points}
+    for run, point in sorted(wanted - set(pairs), key=str):
+        value = f"registration point (run {run}, point {point}), which the file lacks"
+        sheet.note("registration", None, value, f"points of the file: runs 1 to {frame['run'].max():g}")
+    sheet.problems.refuse()
+    chosen = np.array([not wanted or pair in wanted for pair in pairs])
+    try:
+        first = register(seen[chosen], target[chosen])
+        moved = frame.assign(**vector_columns("measured", first.apply(seen) - offset))
+        chosen &= ~outliers(moved, digit_mm)
+        result = register(seen[chosen], target[chosen])
+    except FitError as error:
+        value, _, allowed = str(error).partition("; allowed: ")
+        sheet.refuse_now(None, f"registration points: {value}", allowed)
+    if mirrored := _off_as_mirrored(seen, target):
+        value = (
+            f"positions in a left-handed frame ({mirrored:.6g} mm rms off when registered, a fifth of that if mirrored)"
+        )
+        sheet.refuse_now(MEASURED, value, "a right-handed frame: turn the sign of one axis round")
+    if result.rms_mm > (limit := frame_limit(sheet.mechanism)):
+        value = f"a residual of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
+        sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
+    return result
+
+
+def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
+    """Residual in mm rms of measured positions (n, 3) that fit far better with an axis turned round, else 0."""
+    try:
+        straight, mirrored = (register(seen * [1.0, 1.0, sign], target).rms_mm for sign in (1.0, -1.0))
+    except FitError:
+        return 0.0
+    return straight if straight > 1.0 and mirrored < 0.2 * straight else 0.0
+
+
+def outliers(frame: pd.DataFrame, digit_mm: float) -> np.ndarray:
+    """Rows (n,) that a broken beam spoilt, positions being in the robot frame; digit_mm: last digit of the file."""
+    target, run = command(frame), series(frame)
+    deviation = measured(frame) - target
+    marked = flag_outliers(deviation, run, noise_mm=digit_mm, place=path_length(target))
+    return marked & ~reproduced(marked, deviation, target, run)

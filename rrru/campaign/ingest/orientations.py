@@ -1,0 +1,49 @@
+"""Orientations in a file: rotation vectors, or quaternions that are turned into them. Angles in rad."""
+
+import numpy as np
+
+from rrru.campaign.ingest.sheet import QUATERNIONS, TURNS
+
+# a unit quaternion printed with three decimals; no rotation vector is longer than a turn
+_UNIT, _LONGEST_RAD = 2e-3, 2.0 * np.pi + 1e-6
+
+
+def check_orientations(frame, found, problems):
+    """The frame with rotation vectors for its quaternions; what is no orientation is noted and NaN."""
+    for name, columns in TURNS.items():
+        quaternion = QUATERNIONS[name]
+        if set(quaternion) <= set(frame):
+            if set(columns) <= set(frame):
+                problems.add(
+                    "orientation",
+                    column=", ".join(found[one] for one in (*columns, *quaternion)),
+                    value="an orientation twice",
+                    allowed="a rotation vector or a quaternion",
+                )
+                continue
+            frame = _from_quaternions(frame, columns, quaternion, found, problems)
+        elif set(columns) <= set(frame):
+            size = np.linalg.norm(frame[[*columns]], axis=1)
+            for i in np.flatnonzero(size > _LONGEST_RAD):
+                _note(problems, frame, i, [found[one] for one in columns], f"{size[i]:.6g} rad", "at most one turn")
+    return frame
+
+
+def _from_quaternions(frame, columns, quaternion, found, problems):
+    """The frame with rotation vectors in place of quaternions."""
+    from scipy.spatial.transform import Rotation
+
+    parts = frame[[*quaternion]].to_numpy(dtype=float)
+    size, vectors = np.linalg.norm(parts, axis=1), np.full((len(parts), 3), np.nan)
+    for i in np.flatnonzero(np.abs(size - 1.0) > _UNIT):
+        given = [found[one] for one in quaternion]
+        _note(problems, frame, i, given, f"a quaternion of length {size[i]:.6g}", "length 1")
+    good = np.abs(size - 1.0) <= _UNIT
+    if good.any():
+        vectors[good] = Rotation.from_quat(parts[good]).as_rotvec()
+    return frame.drop(columns=[*quaternion]).assign(**dict(zip(columns, vectors.T, strict=True)))
+
+
+def _note(problems, frame, i, columns, value, allowed):
+    """Note what is wrong with the orientation of row i."""
+    problems.add("orientation", row=frame.index[i], column=", ".join(columns), value=value, allowed=allowed)

@@ -1,0 +1,239 @@
+"""Files of poses and of several reflectors, with joints alone, in an instrument's own frame; refusals."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.errors import IngestError
+from rrru.fit.campaign_fit import select
+from rrru.fit.campaign_noise import campaign_noise
+from rrru.fit.least_squares import least_squares
+from rrru.gap.diagnose import MeasuredRobot, diagnose
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.geometric_numbers import direction
+from rrru.robots.readings import Readings
+from rrru.robots.rrru3 import Rrru3
+from tests.places import ROOT
+from tests.schemas import check_measurements
+
+_SPOTS = {"a": np.array([60.0, 10.0, 90.0]), "b": np.array([-50.0, 40.0, 120.0]), "c": np.array([0.0, -70.0, 60.0])}
+# from the robot's frame to the instrument's, and from the platform to what is read as its orientation
+_FRAME, _SHIFT = Rotation.from_rotvec([0.3, -0.5, 2.0]), np.array([1500.0, -300.0, 700.0])
+_TURN = Rotation.from_rotvec([0.2, 1.0, -0.4])
+_NOISE_MM, _NOISE_RAD = 0.02, 1e-4
+_POINTS = ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
+_QUATERNION = [f"measured_q{part}" for part in "xyzw"]
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """The example arm with the full set of parameters."""
+    return make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="full")
+
+
+@pytest.fixture(scope="module")
+def driven(arm):
+    """Actuator values (150, 6) of poses in no order."""
+    generator = np.random.default_rng(4)
+    return arm.legs.home_drives + 0.8 * generator.uniform(-1.0, 1.0, (150, 6))
+
+
+def _truth(arm):
+    """Deviations of a few numbers by name."""
+    names = ("daxis2", "daxis3", "axis3_z", "axis4_rz", "axis5_rx")
+    units = {one.name: one.unit for one in arm.candidates}
+    return {name: 5e-4 * k if units[name] == "rad" else 0.3 for k, name in enumerate(names, 1)}
+
+
+def _file(arm, driven, truth=None, registered=True, noise=1.0, twists=0.0):
+    """What a tracker writes of poses: joints and readings of reflector a, by quaternions; twists: what else is off."""
+    generator = np.random.default_rng(6)
+    own = arm.twists_of(truth or {}) + twists
+    poses, count = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1)), own), len(driven)
+    frame, shift, turn = (_FRAME, _SHIFT, _TURN) if registered else (Rotation.identity(), 0.0, Rotation.identity())
+    point = frame.apply(poses.point(_SPOTS["a"])) + shift + noise * _NOISE_MM * generator.normal(size=(count, 3))
+    shaken = Rotation.from_rotvec(noise * _NOISE_RAD * generator.normal(size=(count, 3)))
+    read = (shaken * frame * Rotation.from_matrix(poses.turn) * turn).as_quat()
+    joints = dict(zip(arm.parts.columns, driven.T, strict=True))
+    told = dict(zip([*_POINTS, *_QUATERNION], [*point.T, *read.T], strict=True))
+    target = {} if registered else {"target": "a"}
+    return pd.DataFrame({"trajectory": "poses", **target, **joints, **told})
+
+
+def _taken(folder, table, robot, **options):
+    path = folder / "mine.csv"
+    table.to_csv(path, index=False)
+    return ingest(IngestSpec(str(path), **options), robot)
+
+
+def _as_read(robot, found, registered=True, known=()):
+    """The robot whose parameters hold what the readings leave open."""
+    table = found.measurements
+    robot = robot.reading(rows.reads(table, known, registered))
+    readings = rows.readings(table, robot.angle_arm_mm)
+    return robot.seen_at(rows.actuators(table, robot), rows.command(table), readings)
+
+
+def test_poses_of_joints_alone_are_brought_into_the_robots_frame(arm, driven, tmp_path):
+    """Without noise and deviations everything is found exactly: frame, reflector, orientation, commands."""
+    found = _taken(tmp_path, _file(arm, driven, noise=0.0), arm, frame="register")
+    table = check_measurements(arm, found.measurements)
+    poses = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1)))
+    np.testing.assert_allclose(rows.measured(table), poses.point(_SPOTS["a"]), atol=1e-6)
+    np.testing.assert_allclose(rows.turns(table, "measured"), poses.turn, atol=1e-9)
+    np.testing.assert_allclose(rows.turns(table, "command"), poses.turn, atol=1e-9)
+    np.testing.assert_allclose(rows.command(table), poses.point(np.asarray(arm.tool_mm)), atol=1e-9)
+    np.testing.assert_allclose(rows.vectors(table, "target"), np.tile(_SPOTS["a"], (len(table), 1)), atol=1e-6)
+    assert table["run"].eq(1).all() and any("follow no path" in note for note in found.notes)
+
+
+def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path):
+    """A fit of everything that poses tell: noise estimated, and the robot's own numbers by their errors."""
+    truth = _truth(arm)
+    found = _taken(tmp_path, _file(arm, driven, truth), arm, frame="register")
+    robot = _as_read(arm, found)
+    assert len(robot.parameters) == 30  # 4 R + 6, Mooring, Roth and Driels 1991
+    noise = campaign_noise(robot, found.measurements, (None, None))
+    assert noise.mm == pytest.approx(_NOISE_MM, rel=0.2) and noise.rad == pytest.approx(_NOISE_RAD, rel=0.2)
+    residuals = select(found.measurements, robot, ["*"], True, noise.arm_mm)
+    fit = least_squares(residuals, _NOISE_MM)
+    assert fit.rms_mm == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.15)
+    assert fit.turn_rms_rad == pytest.approx(np.sqrt(3.0) * _NOISE_RAD, rel=0.15)
+    # what no gauge changes: distances between the reflector's places in fresh poses
+    fresh = arm.legs.home_drives + 0.5 * np.random.default_rng(8).uniform(-1.0, 1.0, (40, 6))
+    guess, place = np.tile(arm.legs.home_mm, (40, 1)), rows.vectors(found.measurements, "target")[:40]
+    true = arm.solve(fresh, guess, arm.twists_of(truth)).point(_SPOTS["a"])
+    readings, twists = Readings(guess, np.full(40, "reflector tool"), place), robot.twists(fit.deviations)
+    model = robot.measured(robot.solve(fresh, guess, twists), twists, readings)
+    off = np.abs(_distances(true) - _distances(model))
+    assert off.max() < 3.0 * _NOISE_MM and off.mean() < _NOISE_MM
+
+
+def _distances(points):
+    """Distances (n, n) between points (n, 3)."""
+    return np.linalg.norm(points[:, None] - points[None], axis=-1)
+
+
+def test_play_is_named_from_poses_in_no_order(arm, driven, tmp_path):
+    motion = _motion(arm, driven)
+    from rrru.effects.library import library
+
+    twists = library(arm)["backlash"].contribute(motion, np.full(6, 8e-4)).twists
+    found = _taken(tmp_path, _file(arm, driven, _truth(arm), twists=twists), arm, frame="register")
+    robot = _as_read(arm, found)
+    verdict = diagnose(found.measurements, MeasuredRobot(robot)).verdict
+    assert verdict["effects"] == "backlash" and verdict["share_closed"] > 0.8
+    assert "frame_misregistration not tested" in verdict["notes"] and verdict["points"] == len(driven) - 1
+
+
+def _motion(arm, driven):
+    """The motion of an arm that stops at each pose."""
+    from rrru.effects.motion import Course, make_motion
+    from rrru.robots.dynamics import Masses
+
+    poses, count = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1))), len(driven)
+    place, nothing = poses.point(np.asarray(arm.tool_mm)), np.full((count, 3), np.nan)
+    course = Course(place, driven, driven, np.arange(count), np.full(count, np.nan), nothing, nothing, np.zeros(count))
+    return make_motion(arm, Masses(0.0, 0.0, 0.0), course)
+
+
+@pytest.mark.parametrize("registered", [True, False])
+@pytest.mark.parametrize("known", [(), ("a", "b")])
+def test_reflectors_are_found_where_nobody_states_them(arm, driven, tmp_path, registered, known):
+    poses = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1)))
+    frame, shift = (_FRAME, _SHIFT) if registered else (Rotation.identity(), 0.0)
+    seen = np.stack([frame.apply(poses.point(place)) + shift for place in _SPOTS.values()], axis=1).reshape(-1, 3)
+    joints = pd.DataFrame(dict(zip(arm.parts.columns, driven.T, strict=True)))
+    table = joints.loc[joints.index.repeat(3)].reset_index(drop=True)
+    table = table.assign(trajectory="poses", target=[*_SPOTS] * len(driven), **dict(zip(_POINTS, seen.T, strict=True)))
+    options = {"frame": "register"} if registered else {}
+    found = _taken(tmp_path, table, arm, targets={name: tuple(_SPOTS[name]) for name in known}, **options)
+    places = found.measurements.groupby("target")[["target_x_mm", "target_y_mm", "target_z_mm"]].agg(["min", "max"])
+    for name, place in _SPOTS.items():
+        np.testing.assert_allclose(places.loc[name].to_numpy().reshape(3, 2), np.stack([place] * 2, axis=1), atol=1e-5)
+    robot = _as_read(arm, found, registered, known)
+    assert robot.reads.fitted == tuple(f"reflector {name}" for name in _SPOTS if name not in known)
+    fitted = {name for name in robot.parameters.names if name.startswith("reflector")}
+    assert not any(f"reflector_{name}_" in one for name in known for one in fitted)
+
+
+def test_a_rotation_vector_says_the_same_as_a_quaternion(arm, driven, tmp_path):
+    table = _file(arm, driven, registered=False)
+    vector = Rotation.from_quat(table[_QUATERNION].to_numpy()).as_rotvec()
+    other = table.drop(columns=_QUATERNION).assign(**{f"measured_r{x}_rad": vector[:, k] for k, x in enumerate("xyz")})
+    one, two = (_taken(tmp_path, each, arm, targets={}).measurements for each in (table, other))
+    pd.testing.assert_frame_equal(one, two, rtol=0.0, atol=1e-9)
+
+
+def test_joints_alone_do_for_a_parallel_robot(tmp_path):
+    robot = Rrru3()
+    point = np.random.default_rng(1).uniform((-300.0, -300.0, 500.0), (300.0, 300.0, 800.0), (30, 3))
+    theta = robot.inverse(point)
+    joints = dict(zip(robot.parts.columns, theta.T, strict=True))
+    table = pd.DataFrame({"trajectory": "a", **joints, **rows.vector_columns("measured", point + 0.1)})
+    found = _taken(tmp_path, table, robot)
+    np.testing.assert_allclose(rows.command(found.measurements), point, atol=1e-6)
+    assert any("no commanded positions" in note for note in found.notes)
+
+
+def test_an_orientation_that_was_not_measured_is_left_blank(arm, driven, tmp_path):
+    table = _file(arm, driven, registered=False)
+    table.loc[3:9, _QUATERNION] = np.nan
+    found = _taken(tmp_path, table, arm)
+    blank = found.measurements["measured_rx_rad"].isna().to_numpy()
+    np.testing.assert_array_equal(np.flatnonzero(blank), np.arange(3, 10))
+    assert found.measurements["measured_x_mm"].notna().all()
+
+
+def _longer(table):
+    return table.assign(measured_qx=table["measured_qx"] + 0.5)
+
+
+def _twice(table):
+    return table.assign(**{f"measured_r{axis}_rad": 0.1 for axis in "xyz"})
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "text"),
+    [
+        (_longer, {}, "a quaternion of length"),
+        (_twice, {}, "an orientation twice"),
+        (lambda table: table.drop(columns="measured_qw"), {}, "a part of an orientation"),
+        (lambda table: table.assign(target=""), {}, "the reflector's name"),
+        (
+            lambda table: table.assign(target="a"),
+            {"targets": {"z": (0.0, 0.0, 0.0)}},
+            "targets: z",
+        ),
+        (lambda table: table.drop(columns="axis3_rad"), {}, "some drive angles"),
+        (lambda table: table.assign(axis3_rad="wide"), {}, "a finite number"),
+        (lambda table: table, {}, "frame: register"),
+    ],
+)
+def test_what_is_no_pose_is_refused(arm, driven, tmp_path, change, options, text):
+    with pytest.raises(IngestError, match=text):
+        _taken(tmp_path, change(_file(arm, driven)), arm, **options)
+
+
+def test_joints_that_no_robot_can_take_are_refused(tmp_path):
+    robot = Rrru3()
+    point = np.random.default_rng(1).uniform((-300.0, -300.0, 500.0), (300.0, 300.0, 800.0), (30, 3))
+    joints = dict(zip(robot.parts.columns, robot.inverse(point).T, strict=True))
+    joints["theta1_rad"][7] += 1.6
+    table = pd.DataFrame({"trajectory": "a", **joints, **rows.vector_columns("measured", point)})
+    with pytest.raises(IngestError, match=r"row 8.*closes near its home pose"):
+        _taken(tmp_path, table, robot)
+
+
+def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
+    """A reflector's parameter moves that reflector and nothing else."""
+    from rrru.robots.geometric_numbers import Reads
+
+    robot = arm.reading(Reads(("reflector a", "reflector b"), ("reflector b",)))
+    own = [one for one in robot.candidates if one.name.startswith("reflector")]
+    assert [one.name for one in own] == ["reflector_b_x", "reflector_b_y", "reflector_b_z"]
+    twist = direction(robot.legs, own[1])
+    assert twist[robot.legs.site_numbers["reflector b"]].tolist() == [0, 1, 0, 0, 0, 0] and np.count_nonzero(twist) == 1
