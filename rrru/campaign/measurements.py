@@ -91,7 +91,8 @@ def series(measurements: pd.DataFrame) -> np.ndarray:
 
 
 def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
-    """The table with the measured positions of reflectors carried to the tool, as the nominal robot holds it."""
+    """The table with positions of the tool alone: those of reflectors carried to it, as the nominal robot holds them."""
+    measurements = measurements.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"], errors="ignore")
     if "target" not in measurements:
         return measurements
     poses, place = robot.solve(actuators(measurements, robot), command(measurements)), vectors(measurements, "target")

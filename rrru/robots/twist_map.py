@@ -105,7 +105,8 @@ class TwistMap:
         """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
         if site == WORLD:
             point = self._in_world(self.point_mm[:, :, None])
-            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ self._own(self.closure.legs.site_numbers[WORLD], _EYE)
+            own = self._own(self.closure.legs.site_numbers[WORLD], _EYE)
+            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ own
             return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
         if site == TOOL:
             turn = self._in_world(self.poses.turn)

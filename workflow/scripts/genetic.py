@@ -26,9 +26,9 @@ def _runs(settings, inputs, searched):
     """Frames by table of all runs; searched: the set of parameters that they search."""
     genetic, name, nominal = settings["genetic"], settings["campaign"], settings["nominal"]
     calibration = settings["calibration"]
-    # its objective knows positions of the tool alone
+    # its objective knows positions of the tool alone, in the robot's frame
     measurements = at_tool(tables.read(inputs["measurements"]), setup.mechanism(nominal))
-    robots = [setup.measured_robot(nominal, measurements, one) for one in (searched, None)]
+    robots = [setup.measured_robot(nominal | {"registered": False}, measurements, one) for one in (searched, None)]
     runs = Runs(GeneticSettings.from_config(genetic), genetic["seeds"], settings["seed"], (name,))
     results = []
     for label, patterns in tqdm(calibration["sets"].items(), desc=f"genetic {name}", unit="set"):

@@ -21,6 +21,8 @@ from rrru.errors import FitError
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
 _TURNS, _STILL_MM = 300, 1e-9
+# orientations that differ by less are the same
+_NEVER_TURNS = 1e-6
 # ASSUME no platform is off by more than this where the file's frame is the robot's
 _MOST_TURNED_RAD = 0.2
 
@@ -56,8 +58,11 @@ def mounting(sheet):
     poses, seen = sheet.poses, rows.measured(frame)
     if not poses.closed.all():
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
-    place = _known(sheet, names)
-    rotation, place = _fitted(poses, seen, names, place, registered)
+    stated = _known(sheet, names)
+    rotation, place = _fitted(poses, seen, names, stated, registered)
+    if registered and np.isnan(stated).all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
+        # a platform that never turns does not tell them from the frame's shift: they lie about the tool
+        place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn, notes = np.eye(3), _found(sheet, names, place)
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
