@@ -22,6 +22,13 @@ def driven_path(measurements):
     return path, {name: values[stop] for name, values in told.items()}
 
 
+def drive_rates(measurements, actuators):
+    """Derivatives (n, K) by the time, first and second, of actuator values (n, K) as `rates` of each stop has them."""
+    stop = stops(measurements)
+    first = np.diff(stop, prepend=-1) > 0
+    return tuple(values[stop] for values in rates(measurements[first], actuators[first]))
+
+
 def stops(measurements):
     """Number (n,) from 0 on of the stop at which each row was measured: several reflectors may be seen at one."""
     if "target" not in measurements:
@@ -43,12 +50,23 @@ def _path_through(measurements):
     position, run = rows.command(measurements), measurements["run"].to_numpy()
     told = {name: measurements[name].to_numpy(dtype=float) for name in ("time_s", "payload_kg")}
     pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
-    known = told["time_s"] if follows_path(position, run) else np.full(len(run), np.nan)
-    derivatives = [_derivatives(position[piece], known[piece]) for piece in pieces]
-    velocity, acceleration = (np.concatenate(parts) for parts in zip(*derivatives, strict=True))
+    velocity, acceleration = rates(measurements, position)
     path, index = connect(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_STEPS)
     told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, told | {"path_index": index}
+
+
+def rates(measurements, values):
+    """First and second derivative (n, k) by the time of values (n, k) at the rows of a measurement table, run by run.
+
+    NaN where a run has no increasing times or its points follow no path.
+    """
+    run, time = measurements["run"].to_numpy(), measurements["time_s"].to_numpy(dtype=float)
+    if not follows_path(rows.command(measurements), run):
+        return np.full_like(values, np.nan), np.full_like(values, np.nan)
+    pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
+    derivatives = [_derivatives(values[piece], time[piece]) for piece in pieces]
+    return tuple(np.concatenate(parts) for parts in zip(*derivatives, strict=True))
 
 
 def follows_path(position_mm, run):
@@ -66,7 +84,7 @@ def starts_of_runs(run):
 
 
 def _derivatives(points, time):
-    """Velocity and acceleration (k, 3) along the points of one run, NaN without increasing times.
+    """First and second derivative (k, j) along the points (k, j) of one run, NaN without increasing times.
 
     An end is one of rest where the robot slows down towards it; else the recording stopped or began on the way.
     """

@@ -91,7 +91,7 @@ def series(measurements: pd.DataFrame) -> np.ndarray:
 
 
 def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
-    """The table with positions of the tool alone: those of reflectors carried to it, as the nominal robot holds them."""
+    """The table with the tool's positions alone: those of reflectors carried to it, as the nominal robot holds them."""
     measurements = measurements.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"], errors="ignore")
     if "target" not in measurements:
         return measurements

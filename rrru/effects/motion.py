@@ -12,8 +12,9 @@ from rrru.robots.dynamics import drive_rates, loads
 class Course:
     """What a robot is told to do at n points, NaN where nobody knows.
 
-    position_mm, drive, velocity_mm_s, acceleration_mm_s2: (n, 3); path_drive (N, 3): actuator values along everything
-    that is driven, with rows path_index (n,); time_s, payload_kg: (n,).
+    position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3), drive (n, K); path_drive (N, K): actuator values along
+    everything that is driven, with rows path_index (n,); time_s, payload_kg: (n,); drive_motion: first and second
+    derivatives (n, K) of the actuator values, None where the positions tell them.
     """
 
     position_mm: np.ndarray
@@ -24,6 +25,7 @@ class Course:
     velocity_mm_s: np.ndarray
     acceleration_mm_s2: np.ndarray
     payload_kg: np.ndarray
+    drive_motion: tuple | None = None
 
 
 def make_motion(robot, masses, course):
@@ -36,7 +38,7 @@ def make_motion(robot, masses, course):
         np.asarray(values, dtype=float)
         for values in (course.position_mm, course.velocity_mm_s, course.acceleration_mm_s2, course.payload_kg)
     )
-    rate, drive_acceleration = drive_rates(robot, position, velocity, acceleration)
+    rate, drive_acceleration = course.drive_motion or drive_rates(robot, position, velocity, acceleration)
     known = (np.isfinite(velocity) & np.isfinite(acceleration)).all(axis=1, keepdims=True)
     # where the platform's orientation is free, the values that were sent tell the pose
     nominal, carried = course.drive if robot.orients else robot.inverse(position), np.nan_to_num(payload)

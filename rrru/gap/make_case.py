@@ -6,7 +6,7 @@ Lengths in mm, angles in rad.
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import STEPS, driven_path, follows_path, starts_of_runs, stops
+from rrru.campaign.driven_path import STEPS, drive_rates, driven_path, follows_path, starts_of_runs, stops
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.case import Case
@@ -85,6 +85,7 @@ def _motion(measurements, mechanism, masses, actuators):
     """The motion that the effects see; at the measured points with the table's own actuator values."""
     path, told = driven_path(measurements)
     if mechanism.orients:
+        told["drive_motion"] = drive_rates(measurements, actuators)
         # positions do not tell the orientation between the points: drives are taken to move evenly
         rows_of_path = np.arange(len(path))
         path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
