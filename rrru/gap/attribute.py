@@ -14,6 +14,7 @@ from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case, State
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
+from rrru.gap.noise_model import NoiseModel, fit_noise
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
@@ -23,6 +24,8 @@ _MOST_ROUNDS, _MOST_CLEANINGS = 4, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
 _NO_COVARIANCE = np.zeros((0, 0))
+# what is told of the noise
+KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Attribution:
     calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the
     covariance (k, k) of its terms' coefficients; evidence: on the last linearisation, about that state; posterior over
     all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given", "repeats" or
-    "high_frequency"; dropped: number of points left out as outliers.
+    "fitted"; dropped: number of points left out as outliers.
     """
 
     case: Case
@@ -72,10 +75,20 @@ def with_arm(case, noise_mm=None, noise_rad=None):
     return replace(case, arm_mm=positions / turned)
 
 
-def with_noise(case, calibrated):
-    """The case with its noise estimated, and where from: from what neither calibration nor any effect can fit."""
-    noise_mm, _, source = _rough(case, calibrated)
-    return replace(case, noise_mm=noise_mm), source
+def with_noise(case, linear, stated_mm):
+    """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
+
+    "fitted", see `rrru.gap.noise_model`, or "repeats" where points that were measured again say clearly less.
+    """
+    columns = np.concatenate([linear.base, *linear.columns.values(), *linear.shape_columns.values()], axis=-1)
+    if columns.shape[-1] > len(case):
+        # too few points to fit everything: what the calibration leaves has to do
+        columns = linear.base
+    model = fit_noise(linear.data, columns, case.series, stated_mm)
+    repeated, count = noise.repeat_noise(case.measurements[case.used])
+    if count >= noise.ENOUGH_REPEATS and 0.0 < repeated < model.mean_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
+        return case.under(NoiseModel.white(repeated)), "repeats"
+    return case.under(model), "fitted"
 
 
 def _rough(case, calibrated):
@@ -89,24 +102,23 @@ def _rough(case, calibrated):
     return noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
 
 
-def attribute(case, prior, noise_from="given"):
-    """Attribution of a case; its noise is estimated first where noise_from is not "given"."""
+def attribute(case, prior, stated=KNOWN):
+    """Attribution of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
     total = case.count
     for cleaning in range(_MOST_CLEANINGS + 1):
         calibrated = calibrate(case)
-        if noise_from != "given":
+        if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
             outliers = noise.isolated(case.residual(calibrated), case.series, 0.0)
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
-            case, noise_from = with_noise(case, calibrated)
-        attribution = _rounds(case, calibrated, prior)
-        outliers = noise.isolated(case.residual(attribution.state), case.series, case.noise_mm)
+        attribution = _rounds(case, calibrated, prior, stated)
+        outliers = noise.isolated(case.residual(attribution.state), case.series, attribution.case.noise_mm)
         if cleaning == _MOST_CLEANINGS or not outliers.any():
             break
         case = case.without(outliers)
-    return replace(attribution, noise_from=noise_from, dropped=total - case.count)
+    return replace(attribution, dropped=total - case.count)
 
 
 def with_effects(attribution, effects):
@@ -128,11 +140,19 @@ def with_effects(attribution, effects):
     return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
 
 
-def _rounds(case, calibrated, prior):
+def _rounds(case, calibrated, prior, stated):
     """Search and refinement in turn until the best hypothesis repeats itself."""
-    state, covariance, last = calibrated, _NO_COVARIANCE, None
-    linear = case.linearise(state)
-    evidence = ModelEvidence(case.library, linear, case.series, case.noise_mm)
+    state, covariance, last, stated_mm = calibrated, _NO_COVARIANCE, None, case.noise_mm
+
+    def seen(case, state):
+        linear = case.linearise(state)
+        if stated == KNOWN:
+            return case, linear, "given"
+        under, source = with_noise(case, linear, stated_mm if stated == STATED else None)
+        return under, linear, source
+
+    case, linear, source = seen(case, state)
+    evidence = case.evidence(linear)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
     # linear sim or a law's shape is still to be fitted
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
@@ -152,8 +172,9 @@ def _rounds(case, calibrated, prior):
             hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
             state, covariance = refine(case, state, hypothesis, level)
-            evidence = ModelEvidence(case.library, case.linearise(state), case.series, case.noise_mm)
+            case, linear, source = seen(case, state)
+            evidence = case.evidence(linear)
         except FitError:
             # the sim cannot follow: what the last linearisation says stands
             break
-    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level)
+    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, source)

@@ -11,9 +11,11 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign import noise
+from rrru.campaign.noise import reading_series
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
+from rrru.gap.evidence import ModelEvidence
+from rrru.gap.noise_model import NoiseModel
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
 
@@ -71,7 +73,8 @@ class Case:
 
     What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
     library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can;
-    untestable: name to the reason for the other effects; arm_mm: of `rrru.robots.readings.Readings`.
+    untestable: name to the reason for the other effects; noise_mm: deviation per axis; arm_mm: of
+    `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none.
     """
 
     mechanism: object
@@ -82,6 +85,7 @@ class Case:
     untestable: dict
     noise_mm: float
     arm_mm: float = np.nan
+    noise: NoiseModel | None = None
 
     def __len__(self):
         return len(self.at)
@@ -130,7 +134,7 @@ class Case:
     @cached_property
     def series(self):
         """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
-        return noise.reading_series(self.measurements, self._readings)[self._kept]
+        return reading_series(self.measurements, self._readings)[self._kept]
 
     def by_point(self, values):
         """Values (m, 3, ..) of rows as those of the used points (n, 3 or 6, ..), zero where no orientation was read."""
@@ -140,6 +144,14 @@ class Case:
         result[:, :3] = values[self.positions]
         result[np.searchsorted(np.flatnonzero(self.used), self.at[~self.positions]), 3:] = values[~self.positions]
         return result
+
+    def under(self, noise):
+        """The case under a NoiseModel."""
+        return replace(self, noise=noise, noise_mm=noise.mean_mm)
+
+    def evidence(self, linear):
+        """The ModelEvidence on a linearisation."""
+        return ModelEvidence(self.library, linear, self.series, self.noise or NoiseModel.white(self.noise_mm))
 
     def without(self, dropped):
         """The case without the used points of the rows flagged in (m,)."""

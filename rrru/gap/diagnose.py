@@ -10,7 +10,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.errors import FitError
 from rrru.gap.advise import advise
-from rrru.gap.attribute import Attribution, attribute, with_arm, with_effects
+from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
 from rrru.gap.case import State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
@@ -36,8 +36,8 @@ class MeasuredRobot:
     """What is known of the robot that a campaign was measured on.
 
     mechanism: its nominal one; masses: `rrru.robots.dynamics.Masses`; noise_mm: of the instrument, per axis, None or 0
-    where it is to be estimated, and noise_rad: of the orientations that it reads; campaign: name of the campaign, for
-    its random stream.
+    where nobody states it, and noise_rad: of the orientations that it reads; noise_known: noise_mm is no guess within
+    30 % but right; campaign: name of the campaign, for its random stream.
     """
 
     mechanism: Robot
@@ -45,6 +45,7 @@ class MeasuredRobot:
     noise_mm: float | None = None
     campaign: str = ""
     noise_rad: float | None = None
+    noise_known: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,10 +73,10 @@ def diagnose(
     details: also the tables that no verdict needs. Raises FitError where there are too few points to calibrate on.
     """
     library = settings.library(robot.mechanism)
-    noise_mm, noise_from = (robot.noise_mm, "given") if robot.noise_mm else (1.0, "")
+    stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
-    case = make_case(measurements, nominal, robot.masses, noise_mm, library, near, arm_mm)
+    case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
     least = _POINTS_PER_PARAMETER * len(nominal.parameters)
     if len(case) < least:
         whose = f"campaign {robot.campaign}: " if robot.campaign else ""
@@ -83,7 +84,7 @@ def diagnose(
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
     generator = stream(settings.seed, "gap", robot.campaign)
-    verdict, attribution, ordered = _decide(attribute(case, settings.prior, noise_from))
+    verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated))
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
     case = attribution.case
     residual = case.residual(attribution.calibrated)

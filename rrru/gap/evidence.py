@@ -2,14 +2,15 @@
 
 Along each run the data d (one axis, k points) are
 
-    d = B b + X c + w + e,   e ~ N(0, sigma^2),   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
+    d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with the calibration's deviations b (flat prior), the effects' coefficients c, and a discrepancy w for whatever the
-library does not hold: K is diagonal in the cosine basis of the run and falls with the frequency, so that w is smooth
-along the path, plus a small part that is not (Kennedy and O'Hagan, Bayesian calibration of computer models, 2001). S is
-scaled so that `strength` is the rms of the effect's part of the gap per axis over sigma, the calibration's share taken
-out; positive coefficients have the positive half of their prior. Strengths are averaged over a grid, even in their
-logarithm; none makes a coefficient's prior wider than the largest size that its law allows.
+with noise e as `rrru.gap.noise_model` has it, of mean variance sigma^2, the calibration's deviations b (flat prior), the
+effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
+of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
+O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
+of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of their
+prior. Strengths are averaged over a grid, even in their logarithm; none makes a coefficient's prior wider than the
+largest size that its law allows.
 
 A law's shape parameters, such as a time constant, may be off the grid on which they were tried: each has a coefficient
 N(0, 1) on `Linear.shape_columns`.
@@ -26,6 +27,7 @@ from scipy.optimize import lsq_linear
 
 from rrru.campaign.noise import along_runs
 from rrru.gap import evidence_kernels as kernels
+from rrru.gap.noise_model import NoiseModel, lengths
 from rrru.gap.terms import EACH, SAME, per_leg, spread
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
@@ -76,13 +78,13 @@ class Projected:
 class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
-    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,); noise_mm per axis.
+    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel.
     """
 
     library: dict
     linear: object
     run: np.ndarray
-    noise_mm: float
+    noise: NoiseModel
 
     def __len__(self):
         return len(self.run)
@@ -118,19 +120,20 @@ class ModelEvidence:
         together = np.concatenate(blocks, axis=-1)
         cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
         cosines, shape = cosines.reshape(together.shape), spectrum(wave)
+        unit, own = self.noise.mean_mm, self.noise.variance(wave, lengths(self.run)) / self.noise.mean_mm**2
         join = block_diag(join, 1.0)
         grams, constants = [], []
         for level in LEVELS:
-            variance = 1.0 + level**2 * shape
-            white = (cosines / (self.noise_mm * np.sqrt(variance))[:, None, None]).reshape(-1, together.shape[-1])
+            variance = own + level**2 * shape[:, None]
+            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, together.shape[-1])
             basis, triangle = np.linalg.qr(white[:, :p])
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
             gram = rest.T @ rest
             grams.append(join.T @ gram @ join)
             constants.append(
-                -1.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
+                -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
             )
-        grams, whole = np.array(grams), (together[..., p:] / self.noise_mm).reshape(-1, together.shape[-1] - p)
+        grams, whole = np.array(grams), (together[..., p:] / unit).reshape(-1, together.shape[-1] - p)
         whole = join.T @ (whole.T @ whole) @ join
         return grams[:, :-1, :-1], grams[:, :-1, -1], np.array(constants), whole[:-1, :-1]
 

@@ -8,6 +8,7 @@ import numpy as np
 from rrru.campaign.noise import along_runs
 from rrru.gap.case import Case
 from rrru.gap.evidence import LEVELS, ModelEvidence, spectrum
+from rrru.gap.noise_model import lengths
 from rrru.gap.terms import signatures
 
 # where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
@@ -71,8 +72,8 @@ class HeldOut:
         columns = np.concatenate([linear.base, *signatures(evidence.library, linear, terms)], axis=-1)
         penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
         weights, transformed, data = self._weighted(columns, level)
-        gram = np.einsum("nak,nal,n->nkl", transformed, transformed, weights)
-        moment = np.einsum("nak,na,n->nk", transformed, data, weights)
+        gram = np.einsum("nak,nal,na->nkl", transformed, transformed, weights)
+        moment = np.einsum("nak,na,na->nk", transformed, data, weights)
         total, total_moment = gram.sum(axis=0), moment.sum(axis=0)
         unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
         residual, spread = np.empty_like(linear.data), np.empty((len(self.case), 3, columns.shape[-1]))
@@ -87,15 +88,16 @@ class HeldOut:
         return Prediction(residual, spread, self.case.noise_mm)
 
     def _weighted(self, columns, level):
-        """Weights (n,), columns and data in which the fit is an ordinary weighted one.
+        """Weights (n, 3), columns and data in which the fit is an ordinary weighted one.
 
         Where folds are whole runs they are along these runs' cosines.
         """
-        data, run, variance = self.evidence.linear.data, self.case.series, self.case.noise_mm**2
+        data, run, noise = self.evidence.linear.data, self.case.series, self.evidence.noise
+        size, misfit = noise.axis_mm**2 * (1.0 + noise.offset), (noise.mean_mm * LEVELS[level]) ** 2
         if not all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run)):
-            return np.full(len(run), 1.0 / (variance * (1.0 + LEVELS[level] ** 2))), columns, data
+            return np.broadcast_to(1.0 / (size + misfit), data.shape), columns, data
         together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), run)
-        weights = 1.0 / (variance * (1.0 + LEVELS[level] ** 2 * spectrum(wave)))
+        weights = 1.0 / (noise.variance(wave, lengths(run)) + misfit * spectrum(wave)[:, None])
         return weights, together[..., :-1], together[..., -1]
 
 

@@ -4,7 +4,6 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.gap.case import State
-from rrru.gap.evidence import ModelEvidence
 from rrru.gap.terms import spread
 
 _STEPS, _HALVINGS = 6, 5
@@ -29,7 +28,7 @@ def refine(case, state, hypothesis, level):
     cost, covariance = _cost(case, state), None
     for _ in range(_STEPS):
         linear = case.linearise(state, keys)
-        evidence = ModelEvidence(library, linear, case.series, case.noise_mm)
+        evidence = case.evidence(linear)
         mean, covariance = evidence.coefficients(hypothesis.terms, strengths, level)
         target = _target(linear, state, hypothesis, mean, library)
         last = cost

@@ -1,0 +1,147 @@
+"""The noise of a campaign as a quantity with an uncertainty: size, share of each axis, correlation, offsets of runs.
+
+Along each series (a run, of one reflector) the noise e of axis a is
+
+    e = n + s + o,   n the instrument's: a first-order autoregression of correlation phi,
+                     s what does not repeat: white,   o the run's offset: constant per series
+
+In the cosine basis of a series of k points it is independent to good approximation, with the variance
+
+    sigma_a^2 (1 - f_a + f_a S(w) + k rho [w = 0]),   S(w) = (1 - phi^2) / (1 - 2 phi cos(pi w / k) + phi^2), of mean 1
+
+at half-wave number w, n being the share f_a of it. Scatter may have any size. What is smooth along a run may be no
+larger than the instrument's stated noise allows (30 % above it; offsets, the noise itself), or where nobody states it
+than what the highest frequencies show: what is smooth and larger no noise explains. The numbers maximise the restricted
+likelihood: that of what is left when all that calibration and effects may fit has been projected out (Patterson and
+Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58, 1971), times their prior.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import qr
+
+from rrru.campaign.noise import along_runs
+
+_CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
+_OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
+# degrees of freedom that a stated size is worth: 30 % off, 1 sigma; that all axes being alike is worth
+_STATED, _ALIKE = 5.6, 10.0
+# the instrument's noise over what is stated of it, at most
+_MOST_STATED = 1.3
+_ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a."""
+
+    axis_mm: np.ndarray
+    correlation: float = 0.0
+    offset: float = 0.0
+    correlated: np.ndarray | float = 1.0
+
+    @classmethod
+    def white(cls, noise_mm):
+        """Uncorrelated noise of one size (mm) on all axes."""
+        return cls(np.full(3, float(noise_mm)))
+
+    @property
+    def mean_mm(self):
+        """Deviation per axis, offsets included, root mean square over the axes."""
+        return float(np.sqrt((self.axis_mm**2).mean() * (1.0 + self.offset)))
+
+    def variance(self, wave, length):
+        """Variances (m, 3) in mm^2 in the cosine basis, by half-wave number and length (m,) of the series."""
+        smooth, run = _densities(self.correlation, wave, length)
+        return self.axis_mm**2 * (1.0 + self.correlated * (smooth - 1.0) + self.offset * run)
+
+
+def lengths(series):
+    """Number of points (m,) of the series of each row."""
+    _, number, count = np.unique(series, return_inverse=True, return_counts=True)
+    return count[number]
+
+
+def fit_noise(data, columns, series, stated_mm=None):
+    """NoiseModel of data (m, 3) of which columns (m, 3, k) may fit whatever they can; series (m,).
+
+    stated_mm: deviation per axis that is stated, None where none is.
+    """
+    together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
+    length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
+    for _ in range(_ROUNDS):
+        variance = model.variance(wave, length)
+        white = (together / np.sqrt(variance)[..., None]).reshape(-1, together.shape[-1])
+        left, share = _left(white[:, -1], white[:, :-1])
+        seen = _Seen(variance * left.reshape(-1, 3) ** 2, share.reshape(-1, 3), wave, length)
+        instrument_mm = instrument_mm or seen.rough_mm
+        last, model = model, seen.most_likely(instrument_mm, stated_mm)
+        numbers = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
+        if np.allclose(*numbers, rtol=1e-2, atol=1e-2 * model.mean_mm):
+            break
+    return model
+
+
+def _densities(correlation, wave, length):
+    """Variances (m, 1) in the cosine basis of correlated noise of unit variance, and of offsets of unit variance."""
+    density = (1.0 - correlation**2) / (1.0 - 2.0 * correlation * np.cos(np.pi * wave / length) + correlation**2)
+    return density[:, None], (length * (wave == 0))[:, None]
+
+
+def _left(data, columns):
+    """What columns (n, k) leave of data (n,), and the share (n,) of each row's variance that they leave."""
+    size = np.linalg.norm(columns, axis=0)
+    basis, triangle, _ = qr(columns / np.where(size > 0.0, size, 1.0), mode="economic", pivoting=True)
+    rank = int((np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])).sum())
+    basis = basis[:, :rank]
+    return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
+
+
+class _Seen:
+    """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom."""
+
+    def __init__(self, squares, share, wave, length):
+        self.freedom = np.where(share > _LEAST_LEFT, share, 0.0)
+        self.squares = np.where(self.freedom > 0.0, squares, 0.0)
+        self.wave, self.length = wave, length
+
+    @property
+    def rough_mm(self):
+        """Deviation per axis by the upper half of the frequencies."""
+        upper = self.wave > 0.5 * self.length
+        return float(np.sqrt(self.squares[upper].sum() / max(self.freedom[upper].sum(), 1e-9)))
+
+    def most_likely(self, instrument_mm, stated_mm):
+        """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
+        correlated = np.minimum(1.0, (_MOST_STATED * instrument_mm) ** 2 / self._axes(1.0, stated_mm)[0])
+        offsets = _OFFSETS[_OFFSETS * instrument_mm**2 / correlated.mean() <= (_MOST_STATED * instrument_mm) ** 2]
+        grid = [(correlation, offset) for correlation in _CORRELATIONS for offset in offsets]
+        value = np.array([self._value(*pair, correlated, stated_mm) for pair in grid])
+        weight = np.exp(value - value.max())
+        correlation, offset = (weight / weight.sum()) @ np.array(grid)
+        axes, _ = self._axes(self._shape(correlation, offset, correlated), stated_mm)
+        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated)
+
+    def _shape(self, correlation, offset, correlated):
+        """Variances (m, 3) over those of the axes."""
+        smooth, run = _densities(correlation, self.wave, self.length)
+        return 1.0 + correlated * (smooth - 1.0) + offset * run
+
+    def _value(self, correlation, offset, correlated, stated_mm):
+        """Log posterior of a correlation and an offset at the likeliest sizes."""
+        shape = self._shape(correlation, offset, correlated)
+        own = self._axes(shape, stated_mm)[1] - 0.5 * (self.freedom * np.log(shape)).sum()
+        return own + np.log1p(-correlation) - offset
+
+    def _axes(self, shape, stated_mm):
+        """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior."""
+        sums, freedom = (self.squares / shape).sum(axis=0), self.freedom.sum(axis=0)
+        known = (_STATED, _STATED * stated_mm**2) if stated_mm else (0.0, 0.0)
+        pooled = (sums.sum() + known[1]) / (freedom.sum() + known[0])
+        axes = (sums + _ALIKE * pooled) / (freedom + _ALIKE)
+        value = -0.5 * (freedom * np.log(axes) + sums / axes).sum()
+        value -= 0.5 * _ALIKE * (np.log(axes / pooled) + pooled / axes - 1.0).sum()
+        if stated_mm:
+            value -= 0.5 * _STATED * (np.log(pooled / stated_mm**2) + stated_mm**2 / pooled - 1.0)
+        return axes, value
