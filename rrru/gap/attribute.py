@@ -14,7 +14,7 @@ from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case, State
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
-from rrru.gap.noise_model import NoiseModel, fit_noise
+from rrru.gap.noise_model import fit_noise
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
@@ -86,8 +86,10 @@ def with_noise(case, linear, stated_mm):
         columns = linear.base
     model = fit_noise(linear.data, columns, case.series, stated_mm)
     repeated, count = noise.repeat_noise(case.measurements[case.used])
+    # what is correlated tells less
+    count *= (1.0 - model.correlation**2) / (1.0 + model.correlation**2)
     if count >= noise.ENOUGH_REPEATS and 0.0 < repeated < model.mean_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
-        return case.under(NoiseModel.white(repeated)), "repeats"
+        return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
     return case.under(model), "fitted"
 
 

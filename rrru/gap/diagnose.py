@@ -1,6 +1,6 @@
 """The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,10 +11,11 @@ from rrru.campaign import measurements as rows
 from rrru.errors import FitError
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
-from rrru.gap.case import State
+from rrru.gap.case import Case, State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
+from rrru.gap.noise_model import CONTRADICTED, NoiseModel
 from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.verdict import Verdict, decide
@@ -89,7 +90,8 @@ def diagnose(
     case = attribution.case
     residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
-    row = _row(attribution, verdict, steps, worst_spot(case.motion.position_mm[case.at], residual), further)
+    worst = worst_spot(case.motion.position_mm[case.at], residual)
+    row = _row(attribution, verdict, steps, worst, further, robot.noise_mm)
     tables = {}
     if details:
         tables = details_of(attribution, steps, residual, generator, settings.draws)
@@ -97,11 +99,27 @@ def diagnose(
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
+def _notes(case: Case, stated_mm: float | None) -> Iterator[str]:
+    """What the data lack for a better answer, and whether they contradict the stated noise."""
+    if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
+        worse = "the robot does not repeat, or the instrument is worse"
+        yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"
+    if stated_mm and case.noise_mm < stated_mm / CONTRADICTED:
+        yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: the instrument is better"
+    for effect, note in case.untestable.items():
+        yield f"{effect} not tested: {note}"
+
+
 def _row(
-    attribution: Attribution, verdict: Verdict, steps: Sequence, worst_mm: np.ndarray, further: pd.DataFrame
+    attribution: Attribution,
+    verdict: Verdict,
+    steps: Sequence,
+    worst_mm: np.ndarray,
+    further: pd.DataFrame,
+    stated_mm: float | None,
 ) -> dict:
     """The row of `gap_verdicts` without the campaign."""
-    case = attribution.case
+    case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
     return {
         "effects": verdict.label,
         "probability": verdict.probability,
@@ -114,10 +132,13 @@ def _row(
         **dict(zip(CLOSED, share_closed(steps[0], steps[-1]), strict=True)),
         **dict(zip(("worst_x_mm", "worst_y_mm", "worst_z_mm"), worst_mm.tolist(), strict=True)),
         "next_runs": "; ".join(further["run"]),
+        "noise_stated_mm": stated_mm or np.nan,
+        "noise_correlation": noise.correlation,
+        "noise_runs_mm": float(np.sqrt(noise.offset * (noise.axis_mm**2).mean())),
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join(f"{effect} not tested: {note}" for effect, note in case.untestable.items()),
+        "notes": "; ".join(_notes(case, stated_mm)),
     }
 
 

@@ -4,7 +4,7 @@ Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with noise e as `rrru.gap.noise_model` has it, of mean variance sigma^2, the calibration's deviations b (flat prior), the
+with noise e as in `rrru.gap.noise_model`, of mean variance sigma^2, the calibration's deviations b (flat prior), the
 effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
 of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
 O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part

@@ -7,9 +7,9 @@ Along each series (a run, of one reflector) the noise e of axis a is
 
 In the cosine basis of a series of k points it is independent to good approximation, with the variance
 
-    sigma_a^2 (1 - f_a + f_a S(w) + k rho [w = 0]),   S(w) = (1 - phi^2) / (1 - 2 phi cos(pi w / k) + phi^2), of mean 1
+    sigma_a^2 (1 - f_a + f_a S(w) + k rho [w = 0])
 
-at half-wave number w, n being the share f_a of it. Scatter may have any size. What is smooth along a run may be no
+at half-wave number w, n being the share f_a of it and S its spectrum, of mean 1. Scatter may have any size. What is smooth along a run may be no
 larger than the instrument's stated noise allows (30 % above it; offsets, the noise itself), or where nobody states it
 than what the highest frequencies show: what is smooth and larger no noise explains. The numbers maximise the restricted
 likelihood: that of what is left when all that calibration and effects may fit has been projected out (Patterson and
@@ -17,9 +17,11 @@ Thompson, Recovery of inter-block information when block sizes are unequal, Biom
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import qr
+from scipy.fft import dct
+from scipy.linalg import qr, toeplitz
 
 from rrru.campaign.noise import along_runs
 
@@ -27,9 +29,11 @@ _CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.
 _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 # degrees of freedom that a stated size is worth: 30 % off, 1 sigma; that all axes being alike is worth
 _STATED, _ALIKE = 5.6, 10.0
-# the instrument's noise over what is stated of it, at most
-_MOST_STATED = 1.3
+# a stated noise is this factor off at most: 1 sigma of what is believed of it; beyond, it is contradicted
+CONTRADICTED = 1.3
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
+# of longer runs the spectrum is that of endless ones
+_LONG = 400
 
 
 @dataclass(frozen=True)
@@ -85,12 +89,27 @@ def fit_noise(data, columns, series, stated_mm=None):
 
 def _densities(correlation, wave, length):
     """Variances (m, 1) in the cosine basis of correlated noise of unit variance, and of offsets of unit variance."""
-    density = (1.0 - correlation**2) / (1.0 - 2.0 * correlation * np.cos(np.pi * wave / length) + correlation**2)
+    density = np.empty(len(wave))
+    for count in np.unique(length):
+        here = length == count
+        density[here] = _spectrum(correlation, int(count))[wave[here].astype(int)]
     return density[:, None], (length * (wave == 0))[:, None]
+
+
+@lru_cache(maxsize=256)
+def _spectrum(correlation, count):
+    """Variances (count,) of an autoregression of unit variance in the cosine basis, exact for runs of usual length."""
+    if count > _LONG:
+        angle = np.pi * np.arange(count) / count
+        return (1.0 - correlation**2) / (1.0 - 2.0 * correlation * np.cos(angle) + correlation**2)
+    covariance = toeplitz(correlation ** np.arange(count, dtype=float))
+    return np.diag(dct(dct(covariance, axis=0, norm="ortho"), axis=1, norm="ortho")).copy()
 
 
 def _left(data, columns):
     """What columns (n, k) leave of data (n,), and the share (n,) of each row's variance that they leave."""
+    if not columns.size:
+        return data, np.ones(len(data))
     size = np.linalg.norm(columns, axis=0)
     basis, triangle, _ = qr(columns / np.where(size > 0.0, size, 1.0), mode="economic", pivoting=True)
     rank = int((np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])).sum())
@@ -114,8 +133,8 @@ class _Seen:
 
     def most_likely(self, instrument_mm, stated_mm):
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        correlated = np.minimum(1.0, (_MOST_STATED * instrument_mm) ** 2 / self._axes(1.0, stated_mm)[0])
-        offsets = _OFFSETS[_OFFSETS * instrument_mm**2 / correlated.mean() <= (_MOST_STATED * instrument_mm) ** 2]
+        correlated = np.minimum(1.0, (CONTRADICTED * instrument_mm) ** 2 / self._axes(1.0, stated_mm)[0])
+        offsets = _OFFSETS[_OFFSETS * instrument_mm**2 / correlated.mean() <= (CONTRADICTED * instrument_mm) ** 2]
         grid = [(correlation, offset) for correlation in _CORRELATIONS for offset in offsets]
         value = np.array([self._value(*pair, correlated, stated_mm) for pair in grid])
         weight = np.exp(value - value.max())

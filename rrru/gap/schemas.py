@@ -37,8 +37,11 @@ worst_y_mm             float  where the gap is largest, y, robot frame
 worst_z_mm             float  where the gap is largest, z, robot frame
 next_runs              str    runs that would tell the causes apart best; empty where none is needed, helps or can be
     computed
-noise_from             str    given: by the configuration; repeats: pooled over repeated points; high_frequency: from
-    the residuals along the path {given, repeats, high_frequency}
+noise_stated_mm        float? noise per axis as the configuration states it; null where it does not
+noise_correlation      float  of the noise from point to point along a run, 0 to 1
+noise_runs_mm          float  offsets of the runs, 1 sigma per axis
+noise_from             str    given: by the configuration, as known; fitted: around what is stated, to what neither
+    calibration nor effects can fit; repeats: the same, as small as repeated points show it {given, repeats, fitted}
 points                 int    points diagnosed
 dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing

@@ -64,7 +64,7 @@ def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     effect = _gauge_free(name, strong(name, 4.0))
     found = _checked(diagnosed(measure((effect,)), details=True))
     verdict = found.verdict
-    assert verdict["effects"] == name and verdict["leg"] == 0 and verdict["noise_from"] == "given"
+    assert verdict["effects"] == name and verdict["leg"] == 0 and verdict["noise_from"] == "fitted"
     assert verdict["share_closed"] > 0.85 and verdict["gap_after_rms_mm"] < 0.5 * NOISE_RMS_MM < verdict["gap_rms_mm"]
     fitted = found.tables["gap_parameters"].query("effect != 'calibration'").set_index("parameter")
     truth = pd.Series(effect.effect.parameters.mapping(effect.effect.parameters.vector(effect.values)))
@@ -223,7 +223,7 @@ def test_outliers_are_dropped_and_change_nothing(lagging, noise_mm):
 @pytest.mark.parametrize("name", [None, "servo_lag", "backlash"])
 def test_an_unknown_noise_is_estimated_and_the_verdict_stays(name):
     found = diagnosed(measure((strong(name, 4.0),) if name else ()), None)
-    assert found.verdict["effects"] == (name or "none") and found.verdict["noise_from"] == "high_frequency"
+    assert found.verdict["effects"] == (name or "none") and found.verdict["noise_from"] == "fitted"
     assert found.verdict["noise_rms_mm"] == pytest.approx(NOISE_RMS_MM, rel=0.1)
 
 

@@ -18,6 +18,7 @@ from rrru.effects.protocol import Coordinates
 from rrru.gap import evidence_kernels as kernels
 from rrru.gap.case import Linear
 from rrru.gap.evidence import LEVELS, STRENGTHS, ModelEvidence, spectrum
+from rrru.gap.noise_model import NoiseModel
 from rrru.gap.terms import EACH, SAME, Term
 
 NOISE_MM = 0.05
@@ -43,7 +44,7 @@ def _evidence(seed=0, with_law=False):
     laws = {"free": 0.03 * generator.normal(size=(*shape, 2))} if with_law else {}
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape)
-    return ModelEvidence(LIBRARY, Linear(data, base, columns, laws, {}, None), RUN, NOISE_MM)
+    return ModelEvidence(LIBRARY, Linear(data, base, columns, laws, {}, None), RUN, NoiseModel.white(NOISE_MM))
 
 
 def _discrepancy():
@@ -218,7 +219,8 @@ def test_no_effect_explains_nothing_and_a_strong_one_what_it_made():
     evidence = _evidence(seed=4)
     linear = evidence.linear
     made = linear.columns["free", 0] @ np.array([2.0, -1.0])
-    strong = ModelEvidence(LIBRARY, Linear(made, linear.base, linear.columns, {}, {}, None), RUN, NOISE_MM)
+    same = Linear(made, linear.base, linear.columns, {}, {}, None)
+    strong = ModelEvidence(LIBRARY, same, RUN, NoiseModel.white(NOISE_MM))
     hypothesis = SimpleNamespace(
         terms=(Term("free"),), evidence=np.eye(len(LEVELS))[0], strengths=np.full((len(LEVELS), 1), 300.0)
     )
@@ -235,7 +237,7 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     columns[..., 1] = -0.9 * columns[..., 0] + 0.3 * columns[..., 1]
     data = columns @ np.array([1.0, -0.4])
     linear = Linear(data, 1e-9 + 0.0 * columns[..., :1] + np.eye(3)[0][:, None], {("pair", 0): columns}, {}, {}, None)
-    evidence = ModelEvidence(PULLS, linear, RUN, NOISE_MM)
+    evidence = ModelEvidence(PULLS, linear, RUN, NoiseModel.white(NOISE_MM))
     mean, _ = evidence.coefficients((Term("pair"),), [100.0], 0)
     problem = evidence.projected((Term("pair"),))
     gram, moment = problem.gram, problem.moment

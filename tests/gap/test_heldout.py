@@ -15,7 +15,7 @@ from rrru.errors import ConfigError
 from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap import shrink
 from rrru.gap.attribute import calibrate, with_noise
-from rrru.gap.evidence import LEVELS, ModelEvidence
+from rrru.gap.evidence import LEVELS
 from rrru.gap.heldout import HeldOut, Prediction, resampled_rows
 from rrru.gap.terms import Term
 from tests.gap.campaigns import (
@@ -41,7 +41,7 @@ def _setting(passes, effects=()):
     case = case_of(
         measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")}
     )
-    return HeldOut(case, ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm))
+    return HeldOut(case, case.evidence(case.linearise(calibrate(case))))
 
 
 @pytest.fixture(scope="module")
@@ -167,9 +167,10 @@ def test_shares_of_made_up_steps():
 @pytest.mark.parametrize("name", [None, "thermal_growth", "leg_asymmetry", "servo_lag"])
 def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
     case = case_of(measure((strong(name, 6.0),) if name else ()))
-    estimated, source = with_noise(case, calibrate(case))
+    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
     upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
-    assert source == "high_frequency" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
+    assert source == "fitted"
+    assert np.sqrt((estimated.noise.axis_mm**2).mean()) == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
 
 
 def test_a_campaigns_own_noise_is_told_by_the_same_rule():
@@ -189,7 +190,7 @@ def test_repeats_give_the_noise_where_they_are_clearly_quieter():
     for k, axis in enumerate("xyz"):
         frame[f"measured_{axis}_mm"] += np.tile(jagged[:, k], 6)
     case = case_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
-    estimated, source = with_noise(case, calibrate(case))
+    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
     assert source == "repeats" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=0.2)
 
 

@@ -13,7 +13,7 @@ from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
-from rrru.gap.evidence import LEVELS, ModelEvidence
+from rrru.gap.evidence import LEVELS
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
@@ -45,7 +45,7 @@ def _library(*names):
 @pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
 def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
     case = case_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
-    evidence = ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+    evidence = case.evidence(case.linearise(calibrate(case)))
     found = search(evidence)
     choices = {name: variants(EFFECTS[name]) for name in FEW}
     for size in range(3):
@@ -60,7 +60,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 
 def test_every_effect_alone_is_always_weighed():
     case = case_of(measure())
-    evidence = ModelEvidence(case.library, case.linearise(calibrate(case)), case.run, case.noise_mm)
+    evidence = case.evidence(case.linearise(calibrate(case)))
     single = {h.terms[0] for h in search(evidence, most=1) if h.terms}
     assert single >= {term for effect in EFFECTS.values() for term in variants(effect)}
 
@@ -129,7 +129,7 @@ def twins():
     payload only.
     """
     case, calibrated = _twins()
-    evidence = ModelEvidence(case.library, case.linearise(calibrated), case.run, case.noise_mm)
+    evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), Prior())
     found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})

@@ -52,7 +52,8 @@ def test_a_3_ptts_cause_is_named(effects, named):
     found = _diagnosed(Ptt3(), -250.0, GEOMETRY, effects)
     assert set(found.verdict["effects"].split("+")) == named
     if effects:
-        assert found.verdict["probability"] > 0.8 and found.verdict["share_closed"] > 0.85
+        # a payload's compliance and offsets of the runs look alike where every run has a payload of its own
+        assert found.verdict["probability"] > 0.8 and found.verdict["share_closed"] > 0.8
     for name, frame in found.tables.items():
         check(name, frame if name == "gap_points" else frame.assign(campaign="test"))
 

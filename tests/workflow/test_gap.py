@@ -91,7 +91,7 @@ def measured(tmp_path_factory):
 
 def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not_test(measured):
     verdict = pd.read_parquet(measured / "bare/gap_verdicts.parquet").iloc[0]
-    assert verdict["effects"] == "backlash" and verdict["noise_from"] in ("repeats", "high_frequency")
+    assert verdict["effects"] == "backlash" and verdict["noise_from"] in ("repeats", "fitted")
     assert "thermal_growth not tested" in verdict["notes"] and "servo_lag not tested" in verdict["notes"]
     assert abs(verdict["noise_rms_mm"] / (0.02 * 3.0**0.5) - 1.0) < 0.1
 
