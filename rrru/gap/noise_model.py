@@ -9,11 +9,12 @@ In the cosine basis of a series of k points it is independent to good approximat
 
     sigma_a^2 (1 - f_a + f_a S(w) + k rho [w = 0])
 
-at half-wave number w, n being the share f_a of it and S its spectrum, of mean 1. Scatter may have any size. What is smooth along a run may be no
-larger than the instrument's stated noise allows (30 % above it; offsets, the noise itself), or where nobody states it
-than what the highest frequencies show: what is smooth and larger no noise explains. The numbers maximise the restricted
-likelihood: that of what is left when all that calibration and effects may fit has been projected out (Patterson and
-Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika 58, 1971), times their prior.
+at half-wave number w, n being the share f_a of it and S its spectrum, of mean 1. Scatter may have any size. What is
+smooth along a run may be no larger than the instrument's stated noise allows (30 % above it; offsets, the noise
+itself), or where nobody states it than what the highest frequencies show: what is smooth and larger no noise explains.
+The numbers maximise the restricted likelihood: that of what is left when all that calibration and effects may fit has
+been projected out (Patterson and Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika
+58, 1971), times their prior.
 """
 
 from dataclasses import dataclass
