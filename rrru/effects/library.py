@@ -38,8 +38,8 @@ def _module(name):
 
 
 NAMES = _names()
-# an effect of so many numbers that it stands for most others is tried where it is asked for
-BY_DEFAULT = tuple(name for name in NAMES if name != "joint_axis_error")
+# effects that hold others as special cases: what they are told apart by is how few numbers do
+HOLDS = {"joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement")}
 
 
 def library(robot):

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from rrru.errors import ConfigError
-from rrru.figures import choose, gap_map, style
+from rrru.figures import choose, gap_budget, gap_map, style
 
 _BEFORE = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
 _AFTER = {"color": style.BLUE, "marker": "s"}
@@ -18,7 +18,8 @@ _NOTHING = {"none": "nothing to add", "unexplained": "nothing in the library to 
 # characters in a line of the headline, its height, and the height of a row of bars
 _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
 # width that the maps get, and the most that a page is high
-_MAP_MM, _MOST_MM = 74.0, 238.0
+_MAP_MM, _MOST_MM = 74.0, 252.0
+_BUDGET_MM = 15.0
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
@@ -28,19 +29,22 @@ _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
 
 @style.printed
 def gap(tables, options):
-    """The gap between the calibrated sim and the measurement. (a) Where: measured minus calibrated sim at the
-    points from above and from the side, magnified as stated. (b) Why: probability of every effect, those of the
-    verdict in colour. (c) How far it shrinks: gap on runs that were not fitted on, under the calibrated and the
-    corrected sim, with the share closed. (d) Residual of every point.
+    """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
+    each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; parts that
+    imitate each other do not add up to 1. (a) Where: measured minus calibrated sim at the points from above and from
+    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour. (c) How far it
+    shrinks: gap on runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d)
+    Residual of every point.
     """
     campaign, frames = options["campaign"], {}
-    for name in ("gap_verdicts", "gap_attribute", "gap_shrink"):
+    for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
         frames[name] = choose.of_campaign(tables, name, campaign, "gap")
     verdict, causes, shrink = frames["gap_verdicts"].iloc[0], _ordered(frames["gap_attribute"]), frames["gap_shrink"]
     points, headline = _sized(tables["gap_points"], campaign), _headline(verdict)
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
+    gap_budget.draw(panels["budget"], frames["gap_budget"])
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
     arrows, beyond = gap_map.draw(panels, used, worst, options["z_down"])
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
@@ -66,12 +70,13 @@ def _page(lines, causes, trajectories, used):
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
     views = [_MAP_MM * gap_map.height_ratio(used, name) for name in gap_map.VIEWS]
     # what stands around the panels takes part in the figure's height, not in their ratios
-    heights = [_LINE_MM * lines, max(sum(rows) + 30.0, sum(views) + 36.0), 46.0]
+    heights = [_LINE_MM * lines, _BUDGET_MM, max(sum(rows) + 30.0, sum(views) + 36.0), 46.0]
     figure = style.new(style.DOUBLE_MM, min(sum(heights) + 4.0, _MOST_MM))
-    outer = figure.add_gridspec(3, 1, height_ratios=heights)
-    middle = outer[1].subgridspec(1, 2, width_ratios=[1.0, 1.0])
+    outer = figure.add_gridspec(4, 1, height_ratios=heights)
+    middle = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
     left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(middle, (views, rows), strict=True))
-    names, places = ("headline", *gap_map.VIEWS, "causes", "shrink", "along"), (outer[0], *left, *right, outer[2])
+    names = ("headline", "budget", *gap_map.VIEWS, "causes", "shrink", "along")
+    places = (outer[0], outer[1], *left, *right, outer[3])
     panels = {name: figure.add_subplot(place) for name, place in zip(names, places, strict=True)}
     panels["top view"].sharex(panels["side view"])
     return figure, panels

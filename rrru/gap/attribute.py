@@ -23,6 +23,8 @@ from rrru.gap.unknown import UNKNOWN
 _MOST_ROUNDS, _MOST_CLEANINGS = 4, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
+# more columns than this share of the numbers read leave too little to tell the noise by
+_MOST_FITTED = 0.5
 _NO_COVARIANCE = np.zeros((0, 0))
 # what is told of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
@@ -81,7 +83,7 @@ def with_noise(case, linear, stated_mm):
     "fitted", see `rrru.gap.noise_model`, or "repeats" where points that were measured again say clearly less.
     """
     columns = np.concatenate([linear.base, *linear.columns.values(), *linear.shape_columns.values()], axis=-1)
-    if columns.shape[-1] > len(case):
+    if columns.shape[-1] > _MOST_FITTED * linear.data.size:
         # too few points to fit everything: what the calibration leaves has to do
         columns = linear.base
     model = fit_noise(linear.data, columns, case.series, stated_mm)

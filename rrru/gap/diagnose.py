@@ -11,6 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.errors import FitError
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
+from rrru.gap.budget import budget
 from rrru.gap.case import Case, State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
@@ -95,6 +96,7 @@ def diagnose(
     tables = {}
     if details:
         tables = details_of(attribution, steps, residual, generator, settings.draws)
+        tables["gap_budget"] = budget(attribution, robot.noise_mm or None, generator, settings.draws)
         tables["gap_next_runs"] = further.assign(rank=np.arange(1, len(further) + 1))
     return Diagnosis(row, tables, attribution.state, attribution)
 

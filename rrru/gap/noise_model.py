@@ -32,6 +32,8 @@ _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 _STATED, _ALIKE = 5.6, 10.0
 # a stated noise is this factor off at most: 1 sigma of what is believed of it; beyond, it is contradicted
 CONTRADICTED = 1.3
+# offsets of a smaller share of the noise's variance are none
+_NO_OFFSET, _INTERVAL = 0.05, (0.025, 0.975)
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
 # of longer runs the spectrum is that of endless ones
 _LONG = 400
@@ -39,12 +41,17 @@ _LONG = 400
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a."""
+    """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a.
+
+    offset_interval: 95 % of the offset; offset_probability: that it is more than a twentieth of the noise's variance.
+    """
 
     axis_mm: np.ndarray
     correlation: float = 0.0
     offset: float = 0.0
     correlated: np.ndarray | float = 1.0
+    offset_interval: tuple = (0.0, 0.0)
+    offset_probability: float = 0.0
 
     @classmethod
     def white(cls, noise_mm):
@@ -141,7 +148,10 @@ class _Seen:
         weight = np.exp(value - value.max())
         correlation, offset = (weight / weight.sum()) @ np.array(grid)
         axes, _ = self._axes(self._shape(correlation, offset, correlated), stated_mm)
-        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated)
+        each = (weight / weight.sum()).reshape(len(_CORRELATIONS), len(offsets)).sum(axis=0)
+        low, high = (offsets[np.searchsorted(each.cumsum(), share).clip(max=len(offsets) - 1)] for share in _INTERVAL)
+        real = float(each[offsets > _NO_OFFSET].sum())
+        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated, (low, high), real)
 
     def _shape(self, correlation, offset, correlated):
         """Variances (m, 3) over those of the axes."""

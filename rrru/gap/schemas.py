@@ -46,6 +46,22 @@ points                 int    points diagnosed
 dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing
 
+## gap_budget | tables/gap_budget.parquet | campaign part
+What the gap's mean square is made of. Shares add up to 1; calibration is no part of what is measured on fitted points
+and is added to their gap.
+--
+campaign
+part                   str    effect, or kind; of a covariance both effects
+kind                   str    effect; scatter: what does not repeat, noise above the stated; runs: offsets between runs;
+    unexplained: systematic and predicted by nothing; covariance: of two effects that imitate each other; sampling:
+    what the noise happens to leave; calibration: uncertainty of its numbers {effect, scatter, runs, unexplained,
+    covariance, sampling, calibration}
+rms_mm                 float  root of its mean square, negative where that is
+share                  float  of the gap's mean square
+share_low              float  lower end, 95 %, from the posterior
+share_high             float  upper end, 95 %, from the posterior
+probability            float? that the part is real; null where that is no question, or where no noise is stated
+
 ## gap_locate | tables/gap_locate.parquet | campaign factor level
 Where the gap lies: its variance split over the levels of each factor.
 --

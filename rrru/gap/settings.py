@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from rrru.effects.library import BY_DEFAULT, find
+from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import MECHANISMS
 
@@ -26,7 +26,7 @@ class GapSettings:
     such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
-    effects: tuple = BY_DEFAULT
+    effects: tuple = NAMES
     known: dict = field(default_factory=dict)
     prior: Prior = field(default_factory=Prior)
     draws: int = 200
@@ -41,8 +41,9 @@ class GapSettings:
         return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
 
     def without(self, name):
-        """The settings with one effect taken out of the library."""
-        return replace(self, effects=tuple(effect for effect in self.effects if effect != name))
+        """The settings with one effect taken out of the library, and those that hold it as a special case."""
+        out = {name, *(general for general, held in HOLDS.items() if name in held)}
+        return replace(self, effects=tuple(effect for effect in self.effects if effect not in out))
 
     def library(self, robot):
         """Effects by name that a robot may have, what is known of them fixed.

@@ -32,10 +32,25 @@ def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats", "notes": ""}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
+    numbers |= {"noise_stated_mm": 0.02, "noise_correlation": 0.1, "noise_runs_mm": 0.005}
     numbers |= {"worst_x_mm": -512.3, "worst_y_mm": 37.5, "worst_z_mm": 600.0, "points": 144, "dropped_points": 2}
     return check(
         "gap_verdicts", pd.DataFrame([{"campaign": campaign, "effects": effects} | texts | numbers | _SHARES | changes])
     )
+
+
+def gap_budget(campaign):
+    """`gap_budget` of two effects that imitate each other a little, scatter and something unexplained."""
+    shares = {"link_flexure": 0.6, "backlash": 0.2, "scatter": 0.1, "runs": 0.0, "unexplained": 0.05}
+    kinds = {name: name if name in ("scatter", "runs", "unexplained") else "effect" for name in shares}
+    shares["link_flexure and backlash"], kinds["link_flexure and backlash"] = 0.04, "covariance"
+    shares |= {"sampling": 0.005, "calibration": 0.005}
+    rows = [
+        {"part": name, "kind": kinds.get(name, name), "rms_mm": np.sqrt(share) * 0.37, "share": share}
+        for name, share in shares.items()
+    ]
+    frame = pd.DataFrame(rows).assign(campaign=campaign, probability=0.97)
+    return check("gap_budget", frame.assign(share_low=0.8 * frame["share"], share_high=1.3 * frame["share"]))
 
 
 def gap_attribute(
@@ -109,6 +124,7 @@ def gap_tables(campaign, ground):
     """Every table that the figure of a gap reads."""
     return {
         "gap_verdicts": gap_verdicts(campaign),
+        "gap_budget": gap_budget(campaign),
         "gap_attribute": gap_attribute(campaign),
         "gap_shrink": gap_shrink(campaign, ground["trajectory"].unique()),
         "gap_points": gap_points(ground),

@@ -108,8 +108,10 @@ def test_signatures_are_secants_of_the_exact_sim(case, name):
             step = np.zeros(len(effect.coordinates))
             step[k] = typical
             slope = (_exact(case, State(STATE_ERRORS, {(name, shape): step})) - still) / typical
-            off = np.abs(linear.columns[name, shape][..., k] - slope).max()
-            assert off < 0.01 * np.abs(slope).max(), (shape, k)
+            off = np.abs(linear.columns[name, shape][..., k] - slope).max() * typical
+            # some axes of a joint do nothing to first order
+            least = 1e-4 if name == "joint_axis_error" else 0.0
+            assert off < max(0.01 * np.abs(slope).max() * typical, least), (shape, k)
 
 
 def test_the_calibrations_columns_are_derivatives_of_the_sim(case):

@@ -5,7 +5,7 @@ Effects as the library's are, used by the plant alone; sizes and places are assu
 
 import numpy as np
 
-from rrru.effects.library import BY_DEFAULT, library
+from rrru.effects.library import HOLDS, library
 from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
@@ -94,6 +94,7 @@ OUTSIDE = {
         _make(_pulley_ripple, _RIPPLES, 3e-4),
     )
 }
-# of the library and from outside, whatever may act in a robot of the check, all of which are 3-RRRUs
-EFFECTS = {name: effect for name, effect in library(Rrru3()).items() if name in BY_DEFAULT}
+# of the library and from outside, whatever may act in a robot of the check, all of which are 3-RRRUs; what holds others
+# is a background, no cause
+EFFECTS = {name: effect for name, effect in library(Rrru3()).items() if name not in HOLDS}
 CAUSES = EFFECTS | OUTSIDE
