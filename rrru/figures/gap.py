@@ -18,8 +18,8 @@ _NOTHING = {"none": "nothing to add", "unexplained": "nothing in the library to 
 # characters in a line of the headline, its height, and the height of a row of bars
 _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
 # width that the maps get, and the most that a page is high
-_MAP_MM, _MOST_MM = 74.0, 252.0
-_BUDGET_MM = 15.0
+_MAP_MM, _MOST_MM = 74.0, 238.0
+_BUDGET_MM = 16.0
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers

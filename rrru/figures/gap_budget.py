@@ -5,7 +5,7 @@ from rrru.figures import style
 _COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
 _EFFECTS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
 # parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
-_LEAST, _NAMED, _LETTER = 0.01, 0.025, 0.0115
+_LEAST, _NAMED, _LETTER = 0.01, 0.03, 0.0125
 
 
 def draw(axes, rows):
@@ -27,12 +27,13 @@ def draw(axes, rows):
         middle = start + 0.5 * part["share"]
         if part["share"] > _LETTER * len(text):
             ink = "white" if colour == style.BLUE else "black"
-            axes.text(middle, 0.1, text, ha="center", va="center", fontsize=6.5, color=ink)
+            axes.text(middle, 0.1, text, ha="center", va="center", fontsize=7.0, color=ink, in_layout=False)
         elif part["share"] > _NAMED:
-            place = {"ha": "center", "va": "top" if below else "bottom", "fontsize": 6.0}
+            place = {"ha": "center", "va": "top" if below else "bottom", "fontsize": 7.0, "in_layout": False}
             axes.text(middle, -0.36 if below else 0.34, text, **place)
             below = not below
         start += part["share"]
-    axes.set(xlim=(0.0, max(start, 1.0)), ylim=(-0.75, 0.75), yticks=[], xlabel="share of the gap's mean square")
+    axes.set(xlim=(0.0, max(start, 1.0)), ylim=(-0.75, 0.75), yticks=[])
+    axes.set(xlabel="share of the gap's mean square", ylabel="budget")
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)

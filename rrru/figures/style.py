@@ -176,6 +176,11 @@ def save(figure, pdf, png, caption=""):
             if engine := figure.get_layout_engine():
                 engine.execute(figure)
                 figure.set_layout_engine(None)
+                # its solver's last digits differ from the first figure of a process to the next
+                for axes in figure.axes:
+                    for which in ("original", "active"):
+                        place = axes.get_position(original=which == "original").bounds
+                        axes.set_position(np.round(place, 9), which=which)
             for kind, (path, metadata) in formats.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 # straight to the canvas: savefig would draw everything a second time to arrange it

@@ -26,6 +26,7 @@ from tests.studies.ptt3 import synthetic_ptt
 
 # labels of axes that count or name things, or carry a number without a unit
 WITHOUT_UNIT = (
+    *("share of the gap's mean square", "budget"),
     *("point", "generation", "crossover fraction $P_c$", "migration fraction $P_m$", "calibrated on", "applied to"),
     *("direction, best seen first", "error parameter", "singularity measure: 0 at a singularity, 1 at best"),
     *(

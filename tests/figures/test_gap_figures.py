@@ -65,7 +65,7 @@ def test_both_views_hold_every_point_and_share_x(frames):
 
 
 def test_the_budget_stands_first_and_its_parts_lie_end_to_end(frames):
-    """Effects by share, then what does not repeat and the unknown; what they share and the noise's luck are no parts."""
+    """Effects by share, then what does not repeat and the unknown; what they share is no part, nor what noise left."""
     axes = draw("gap", frames).axes[1]
     bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
     np.testing.assert_allclose([width for _, width in bars], [0.6, 0.2, 0.1, 0.05], atol=1e-12)
