@@ -10,7 +10,9 @@ GAP_TABLES = [
     "gap_parameters",
     "gap_next_runs",
 ]
-GAP_FIGURE = {"gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"])}
+GAP_FIGURE = {
+    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"])
+}
 
 
 # one job per campaign, its figure included: starting another would take longer than drawing it. It sees the
