@@ -187,7 +187,7 @@ class Case:
         return rows.measured(self.measurements) - model
 
     def residual(self, state):
-        """What is read minus the sim corrected by a state, (m, 3)."""
+        """`left` of the used points (m, 3)."""
         return self.left(state)[self._kept]
 
     def linearise(self, state, keys=None):

@@ -5,8 +5,9 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
+from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.noise_model import NoiseModel, fit_noise, lengths
-from tests.gap.campaigns import NOISE_MM, diagnosed, measure, strong
+from tests.gap.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
 
 _RUNS, _POINTS = 12, 26
 _SERIES = np.repeat(np.arange(_RUNS), _POINTS)
@@ -96,3 +97,10 @@ def test_noise_that_is_not_as_stated_is_no_cause(name, effect):
     assert verdict["effects"] == (effect or "none")
     contradicted = name in ("axes", "scatter")
     assert ("does not repeat" in verdict["notes"]) == contradicted
+
+
+def test_a_noise_that_is_known_is_not_fitted():
+    known = MeasuredRobot(ROBOT, MASSES, NOISE_MM, noise_known=True)
+    verdict = diagnose(measure((strong("drive_compliance", 4.0),)), known).verdict
+    assert verdict["effects"] == "drive_compliance" and verdict["noise_from"] == "given"
+    assert verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM) and verdict["noise_correlation"] == 0.0

@@ -16,7 +16,8 @@ def main(settings, inputs, outputs):
     """Write the verdict and everything behind it, and draw it."""
     measurements, masses = tables.read(inputs["measurements"]), Masses(**settings["masses"])
     nominal = setup.measured_robot(settings["robot"], measurements)
-    robot = MeasuredRobot(nominal, masses, settings["noise_mm"], settings["campaign"], settings["noise_rad"])
+    noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
+    robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)
     points = result.tables.pop("gap_points")

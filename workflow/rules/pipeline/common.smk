@@ -105,6 +105,7 @@ def diagnosed(wildcards):
         "masses": parts.masses(config, section),
         "noise_mm": section.get("noise_mm") or None,
         "noise_rad": section.get("noise_rad"),
+        "noise_known": section.get("noise_known", False),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
         "figures": GAP_FIGURE,
         "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},
