@@ -43,6 +43,13 @@ seen                   bool   false where the points do not determine it; its va
 at_bound               bool   true where the fit ended at a bound
 true_value             float? the virtual robot's; null where nobody knows
 
+## gauge | tables/gauge.parquet | campaign number
+Numbers of a robot of one's own that the campaign's poses do not tell apart from its parameters; none for built-in ones.
+--
+campaign
+number                 str    name of a number of the robot that is no parameter
+stands_for             str    combination of parameters that does what one unit of it does; nothing: it is not seen
+
 ## correlations | tables/correlations.parquet | campaign calibration parameter_a parameter_b
 Correlation of the least-squares estimates.
 --

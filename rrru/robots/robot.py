@@ -71,6 +71,11 @@ class Robot(ABC):
         return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
 
     @property
+    def gauge(self):
+        """By number that is no parameter in words what stands for it; none of a fixed set."""
+        return {}
+
+    @property
     def offered(self):
         """Which components (sites, 6) of constant twists its parameters are chosen from; none of a fixed set."""
         return np.zeros((len(self.legs.sites), 6), dtype=bool)

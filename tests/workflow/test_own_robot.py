@@ -74,7 +74,7 @@ def _run(folder, reads="", **parts):
     targets = [f"results/campaigns/own/{name}.parquet" for name in _TABLES]
     code, output = run(folder, *targets, "results/figures/own/cross.png", overlays=("mine.yaml",))
     assert code == 0, output
-    names = (*_TABLES, "measurements")
+    names = (*_TABLES, "measurements", "gauge")
     return {name: pd.read_parquet(folder / f"results/campaigns/own/{name}.parquet") for name in names}
 
 
@@ -95,6 +95,10 @@ def test_a_robot_of_a_users_module_goes_the_whole_way(tmp_path):
     verdict = result["gap_verdicts"].iloc[0]
     assert verdict["effects"] == "backlash" and verdict["share_closed"] > 0.8
     assert verdict["where"] == "leg 1 motor to leg 3 motor"
+    # a leg is lifted alike at each of its joints, whose axes are parallel
+    gauge = result["gauge"].set_index("number")["stands_for"]
+    assert gauge["leg_1_elbow_z"] == gauge["leg_1_wrist_z"] == "1 leg_1_motor_z"
+    assert not set(gauge.index) & set(result["parameters"]["parameter"])
     assert {"motor1_rad", "motor2_rad", "motor3_rad"} <= set(result["measurements"])
     summary = result["error_summary"].query(
         "trajectory == 'all' and calibration in ('none', 'lines') and method in ('none', 'least_squares')"

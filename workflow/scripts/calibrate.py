@@ -1,5 +1,7 @@
 """Calibrations of one campaign on every set of trajectories."""
 
+import pandas as pd
+
 from rrru.fit import campaign_fit
 from rrru.fit.campaign_noise import Noise
 from rrru.fit.schemas import TABLES
@@ -9,7 +11,7 @@ from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the campaign's calibrations, parameters, correlations and observability."""
+    """Write the campaign's calibrations, parameters and their gauge, correlations and observability."""
     nominal, info = settings["nominal"], tables.read(inputs["campaigns"]).iloc[0]
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
@@ -17,7 +19,9 @@ def main(settings, inputs, outputs):
     noise = Noise(info["noise_mm"], info["noise_rad"], info["noise_from"])
     fits = campaign_fit.fit_sets(measurements, robot, calibration, noise.mm, noise.arm_mm)
     truth = setup.true_deviations(robot, settings["truth"])
-    tables.write_all(TABLES, campaign_fit.tables(settings["campaign"], fits, truth), outputs)
+    gauge = pd.DataFrame(list(robot.gauge.items()), columns=["number", "stands_for"])
+    frames = {"gauge": gauge.assign(campaign=settings["campaign"])}
+    tables.write_all(TABLES, frames | campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 # settings of the genetic algorithm itself
 GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key != "seeds"]
-CALIBRATION_TABLES = ["calibrations", "parameters", "correlations", "observability"]
+CALIBRATION_TABLES = ["calibrations", "parameters", "gauge", "correlations", "observability"]
 GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
 # tables of the whole study that are the campaigns' parts, one below the other
 CAMPAIGN_TABLES = ["campaigns", "singularity", *CALIBRATION_TABLES, *GENETIC_TABLES, "errors", "error_summary"]
