@@ -31,6 +31,7 @@ MEASURED = [f"measured_{axis}_mm" for axis in "xyz"]
 DETAILS = {
     "gap_locate",
     "gap_identifiability",
+    "gap_budget",
     "gap_attribute",
     "gap_sets",
     "gap_shrink",
