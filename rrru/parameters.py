@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +51,7 @@ class ParameterSet:
     def __getitem__(self, name: str) -> Parameter:
         return self.parameters[self.index(name)]
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """Names in the order of the vector."""
         return tuple(p.name for p in self.parameters)
@@ -82,9 +83,13 @@ class ParameterSet:
 
     def index(self, name: str) -> int:
         """Position of a name in the vector; raises ConfigError for an unknown name."""
-        if name not in self.names:
+        if name not in self._places:
             raise ConfigError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
-        return self.names.index(name)
+        return self._places[name]
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {name: place for place, name in enumerate(self.names)}
 
     def vector(self, values: Mapping[str, float] | None = None) -> np.ndarray:
         """Vector, shape (p,), from a mapping of names to values; absent names are nominal."""

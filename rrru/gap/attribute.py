@@ -12,7 +12,7 @@ from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case, State
-from rrru.gap.evidence import ModelEvidence
+from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.noise_model import fit_noise
 from rrru.gap.posterior import Posterior, posterior
@@ -134,7 +134,8 @@ def with_effects(attribution, effects):
         before = attribution.hypothesis
         chosen = [k for k, term in enumerate(before.terms) if term.effect in effects]
         terms = tuple(before.terms[k] for k in chosen)
-        known = Hypothesis(terms, attribution.evidence.score(terms), before.strengths[:, chosen]), attribution.level
+        found, _ = attribution.evidence.independent(terms, range(len(LEVELS)))
+        known = Hypothesis(terms, found, before.strengths[:, chosen]), attribution.level
     hypothesis, level = known
     state, covariance = attribution.calibrated, _NO_COVARIANCE
     if hypothesis.terms:

@@ -32,6 +32,8 @@ from rrru.gap.terms import EACH, SAME, per_leg, spread
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+# times that each of many strengths is found about the others
+_SWEEPS = 2
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
 _HALF_WAVES, _WHITE = 3.0, 0.01
 # a term of which the calibration leaves a smaller share of the mean square is not seen
@@ -184,11 +186,24 @@ class ModelEvidence:
         gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
         return self.none[levels, None] + kernels.log_evidence(gram, moment, scale, problem.positive), combinations
 
-    def score(self, terms, strengths=None, levels=slice(None)):
-        """Log evidence (levels,) of a set of terms, averaged over their strengths."""
-        if not terms:
-            return self.none[levels]
-        return averaged(self.over_strengths(terms, strengths, levels)[0], len(terms))
+    def independent(self, terms, levels):
+        """Log evidence (l,) of many terms at levels (indices), and their best strengths (l, terms).
+
+        Averaged over each strength about the others' best, as if they were independent of each other.
+        """
+        evidence, best = np.empty(len(levels)), np.ones((len(levels), len(terms)))
+        for row, level in enumerate(levels):
+            for _ in range(_SWEEPS):
+                losses = np.zeros(len(terms))
+                for k, term in enumerate(terms):
+                    # what is tried comes last: the others' part stands
+                    others = *terms[:k], *terms[k + 1 :]
+                    grids = *([strength] for strength in np.delete(best[row], k)), STRENGTHS
+                    value, _ = self.over_strengths((*others, term), grids, [level])
+                    best[row, k], highest = STRENGTHS[value[0].argmax()], value.max()
+                    losses[k] = averaged(value, 1)[0] - highest
+            evidence[row] = highest + losses.sum()
+        return evidence, best
 
     def scales(self, terms, strengths):
         """Prior standard deviations (k,) of the terms' coefficients at given strengths."""

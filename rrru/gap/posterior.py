@@ -116,7 +116,7 @@ class _LogPrior:
     def terms(self, terms):
         """Of a set of terms, alike for all sets of one size."""
         known = [term for term in terms if term.effect not in UNKNOWN]
-        total = np.log(self._prior.counts[len(known)]) - np.log(comb(len(self._effects), len(known)))
+        total = self._prior.log_count(len(known)) - np.log(comb(len(self._effects), len(known)))
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
             total -= self._effects[term.effect]

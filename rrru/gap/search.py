@@ -1,4 +1,9 @@
-"""The search over sets of effects: which hypotheses carry the posterior probability."""
+"""The search over sets of effects: which hypotheses carry the posterior probability.
+
+Sets of up to three effects are averaged over all combinations of their strengths. Larger ones grow from the best by one
+term at a time, and then each of their terms is taken out and another one tried in its place; their average is that of
+strengths that are independent of each other.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +19,9 @@ from rrru.gap.unknown import UNKNOWN
 _WORTH = 12.0
 _HOPELESS = 30.0
 _BEST_SETS = 4
+# sets of so many effects are tried with all combinations of strengths
+_SMALL = 3
+_REPLACEMENTS, _POLISHED = 3, 8
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,7 @@ class Hypothesis:
         return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
 
 
-def search(evidence, most=3):
+def search(evidence, most=8):
     """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones."""
     library = evidence.library
     choices = {name: variants(effect) for name, effect in library.items()}
@@ -42,7 +50,7 @@ def search(evidence, most=3):
     for terms in ((), *((term,) for name in library for term in choices[name])):
         tried.add(terms)
     layer = tried.best_of_size(1)
-    for size in range(2, min(most, len(library)) + 1):
+    for size in range(2, min(_SMALL, most, len(library)) + 1):
         near = tried.near_levels()
         if size == 2:
             for first, second in combinations([name for name in library if name not in UNKNOWN], 2):
@@ -50,7 +58,7 @@ def search(evidence, most=3):
         for start in layer:
             grids = _narrow(start, near)
             for name in library:
-                if name not in start.effects and not (name in UNKNOWN and start.effects & set(UNKNOWN)):
+                if name not in start.effects:
                     for term in choices[name]:
                         tried.add((*start.terms, term), grids, near)
         if size == 2:
@@ -62,7 +70,27 @@ def search(evidence, most=3):
         smaller = max(h.evidence.max() for h in tried.hypotheses.values() if len(h.terms) < size)
         if not layer or layer[0].evidence.max() < smaller - _WORTH:
             break
+    else:
+        _grow(tried, choices, layer, min(most, len(library)))
     return list(tried.hypotheses.values())
+
+
+def _grow(tried, choices, layer, most):
+    """Try sets of more effects as long as they gain, and the best one with each of its effects out or replaced."""
+    best = layer[:1]
+    for size in range(_SMALL + 1, most + 1):
+        layer = tried.grown(layer, choices, size)
+        if not layer or best and layer[0].evidence.max() < best[0].evidence.max():
+            break
+        best = layer[:1]
+    for _ in range(_REPLACEMENTS):
+        start = best[0]
+        if len(start.terms) <= _SMALL:
+            break
+        fewer = [tried.polished(tuple(t for t in start.terms if t != term)) for term in start.terms]
+        best = tried.grown(fewer, choices, len(start.terms))
+        if not best or best[0].terms == start.terms:
+            break
 
 
 class _Tried:
@@ -102,6 +130,36 @@ class _Tried:
         full[levels] = averaged(value, len(terms))
         best[levels] = grid[value.argmax(axis=1)]
         return Hypothesis(terms, full, best)
+
+    def grown(self, layer, choices, size):
+        """The best hypotheses of a size after those of a layer have been tried with every term more."""
+        near, gains = self.near_levels(), []
+        for start in layer:
+            for name, terms in choices.items():
+                if name not in start.effects:
+                    gains += [(self._gain(start, term), (*start.terms, term)) for term in terms]
+        gains.sort(key=lambda pair: -pair[0])
+        for _, terms in gains[:_POLISHED]:
+            self.polished(terms, near)
+        return self.best_of_size(size)
+
+    def _gain(self, start, term):
+        """Log evidence of a hypothesis with a term more at the start's best level and strengths there."""
+        level = int(start.evidence.argmax())
+        grids = *([strength] for strength in start.strengths[level]), STRENGTHS
+        own, _ = self.evidence.over_strengths(start.terms, grids[:-1], [level])
+        value, _ = self.evidence.over_strengths((*start.terms, term), grids, [level])
+        return float(start.evidence[level] - own[0, 0] + averaged(value, 1)[0])
+
+    def polished(self, terms, levels=None):
+        """The hypothesis of a set of terms, tried if it has not been, by strengths that are independent."""
+        key = frozenset(terms)
+        if key not in self.hypotheses:
+            full, best = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+            levels = self.near_levels() if levels is None else levels
+            full[levels], best[levels] = self.evidence.independent(terms, levels)
+            self.hypotheses[key] = Hypothesis(tuple(terms), full, best)
+        return self.hypotheses[key]
 
     def near_levels(self):
         """Indices of the discrepancy levels next to the best hypothesis' own, and none at all."""

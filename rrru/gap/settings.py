@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import MECHANISMS
@@ -11,13 +13,19 @@ from rrru.robots.catalogue import MECHANISMS
 class Prior:
     """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
 
-    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    Each effect more is as much rarer as the third is after the second. tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
     inaccuracy.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
     unexplained: float = 0.1
     tolerance: float = 0.04
+
+    def log_count(self, count):
+        """Logarithm of the probability of so many effects."""
+        *_, last, most = self.counts
+        listed = self.counts[min(count, len(self.counts) - 1)]
+        return float(np.log(listed) + max(count + 1 - len(self.counts), 0) * np.log(most / last))
 
 
 @dataclass(frozen=True)

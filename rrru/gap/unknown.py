@@ -13,7 +13,7 @@ from numpy.polynomial import chebyshev
 from rrru.effects.protocol import Coordinates
 from rrru.robots.legs import WORLD
 
-_DRIVE_ORDERS, _TIME_ORDERS = (2, 3, 4, 5, 6), (1, 2, 3)
+_DRIVE_ORDERS, _TIME_ORDERS = (1, 2, 3, 4, 5, 6), (1, 2, 3)
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ def _of_place(motion):
 
 
 def _of_load(motion):
-    """The payload (n, 4) alone and with the commanded position."""
+    """The payload (n, 10) alone and with functions of the place."""
     load = motion.payload_kg / max(np.nanmax(motion.payload_kg), 1e-9)
-    return load[:, None] * np.concatenate([np.ones((len(load), 1)), _unit(motion.position_mm)], axis=1)
+    return load[:, None] * _of_place(motion)
 
 
 UNKNOWN = {
@@ -90,7 +90,7 @@ UNKNOWN = {
             (),
         ),
         Unknown("unknown_place", "the place", _of_place, 10, ()),
-        Unknown("unknown_load", "the payload", _of_load, 4, ("payload_kg",)),
+        Unknown("unknown_load", "the payload", _of_load, 10, ("payload_kg",)),
     )
 }
 # what an error of a drive may typically be, and so the function of its value

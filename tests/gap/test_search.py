@@ -13,7 +13,7 @@ from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
-from rrru.gap.evidence import LEVELS
+from rrru.gap.evidence import LEVELS, averaged
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
@@ -42,6 +42,11 @@ def _library(*names):
     return {name: EFFECTS[name] for name in names}
 
 
+def _score(evidence, terms):
+    """Log evidence (levels,) averaged over all combinations of strengths."""
+    return averaged(evidence.over_strengths(terms)[0], len(terms)) if terms else evidence.none
+
+
 @pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
 def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
     case = case_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
@@ -50,12 +55,33 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
     choices = {name: variants(EFFECTS[name]) for name in FEW}
     for size in range(3):
         every = [terms for names in combinations(FEW, size) for terms in product(*(choices[name] for name in names))]
-        best = max(evidence.score(terms).max() for terms in every)
+        best = max(_score(evidence, terms).max() for terms in every)
         reached = max(h.evidence.max() for h in found if len(h.terms) == size)
         # grids of strengths are cut short about the best ones
         assert reached <= best + 1e-9 and reached >= best - 0.7
     assert len({frozenset(h.terms) for h in found}) == len(found)
     assert all(len(h.effects) == len(h.terms) for h in found)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
+    case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    terms = tuple(Term(name) for name in FEW[-count:])
+    levels = np.array([0, 2, 4])
+    one_by_one, best = evidence.independent(terms, levels)
+    together, grid = evidence.over_strengths(terms, None, levels)
+    np.testing.assert_allclose(one_by_one, averaged(together, count), atol=0.7)
+    assert (best == grid[together.argmax(axis=1)]).mean() > 0.8
+
+
+def test_five_effects_at_once_are_all_found():
+    names = ("leg_asymmetry", "servo_lag", "backlash", "thermal_growth", "encoder_eccentricity")
+    case = case_of(measure(tuple(strong(name, 8.0) for name in names)), EFFECTS)
+    found = attribute(case, Prior())
+    assert found.hypothesis.effects == set(names)
+    assert min(found.posterior.marginal(name) for name in names) > 0.99
+    assert sum(p for (effects, flag), p in found.posterior.sets().items() if not flag and effects == set(names)) > 0.5
 
 
 def test_every_effect_alone_is_always_weighed():

@@ -14,7 +14,7 @@ def main(settings, inputs, outputs):
     """Write answers and measurements of a chunk, one robot below the other."""
     conditions = Conditions.from_config(settings)
     robots = [draw(Member(*member), conditions) for member in settings["members"]]
-    driven = [robot.campaign(conditions).run()[0].assign(robot=robot.name, kind=robot.kind) for robot in robots]
+    driven = [robot.measured(conditions).assign(robot=robot.name, kind=robot.kind) for robot in robots]
     frames = {
         "withheld_answers": pd.DataFrame([robot.answer(conditions) for robot in robots]),
         "withheld_measurements": pd.concat(driven, ignore_index=True),

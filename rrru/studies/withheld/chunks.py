@@ -3,25 +3,36 @@
 from typing import NamedTuple
 
 from rrru.errors import ConfigError
+from rrru.studies.withheld.noise import NOISES
 
 
 class Member(NamedTuple):
-    """One robot: check (label or effect), the effect that the diagnosis has to do without (empty for none), number."""
+    """One robot: check (label, effect, noise, many or background), what it is about, number.
+
+    about: the effect that the diagnosis has to do without, the noise, or nothing.
+    """
 
     check: str
-    effect: str
+    about: str
     number: int
 
     @property
     def name(self):
         """The robot's name in every table."""
-        return "_".join(filter(None, (self.check, self.effect, f"{self.number:04d}")))
+        return "_".join(filter(None, (self.check, self.about, f"{self.number:04d}")))
+
+    @property
+    def taken_out(self):
+        """The effect that the diagnosis has to do without, empty for none."""
+        return self.about if self.check == "effect" else ""
 
 
 def chunks(section):
     """Members of every chunk by the chunk's name, from the configuration's `withheld` section."""
     members = [Member("label", "", k) for k in range(section["robots"])]
     members += [Member("effect", e, k) for e in section["effects"] for k in range(section["per_effect"])]
+    members += [Member("noise", noise, k) for noise in NOISES for k in range(section["per_noise"])]
+    members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
     size = section["chunk"]
     return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
 

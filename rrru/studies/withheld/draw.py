@@ -5,7 +5,7 @@ It is drawn and the effect's coordinates are scaled to it by simulating the robo
 then two simulations.
 """
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 
@@ -13,11 +13,16 @@ from rrru.campaign.trajectories import from_config
 from rrru.errors import UnreachableError
 from rrru.robots import singularity
 from rrru.seeds import stream
+from rrru.studies.withheld.noise import NOISES, NoiseLaw
 from rrru.studies.withheld.outside import CAUSES, EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import PASSES, Acting, Robot, true_gap_mm
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
-WEAKEST, STRONGEST, CLEAR = 0.1, 10.0, 2.0
+WEAKEST, STRONGEST, CLEAR, SEEN = 0.1, 10.0, 2.0, 1.5
+# of many causes at once: strengths, and scatter over the noise
+MANY, MOST_SCATTER = (0.3, 30.0), 5.0
+# axes of joints as they are built, 1 sigma
+_AXES_SD = {"mm": 0.01, "rad": 5e-5}
 _ANGLE_SD_RAD, _LENGTH_SD_MM = 0.002, 0.5
 _SAFE = 0.1
 _DRAWS = 20
@@ -25,9 +30,8 @@ _DRAWS = 20
 
 def draw(member, conditions):
     """The robot of a member of the check, see `rrru.studies.withheld.chunks`."""
-    if member.check == "effect":
-        return _draw_single(member, conditions)
-    return _draw_labelled(member, conditions)
+    kinds = {"effect": _draw_single, "noise": _draw_noisy, "many": _draw_many, "background": _draw_background}
+    return kinds.get(member.check, _draw_labelled)(member, conditions)
 
 
 def fresh(robot, conditions):
@@ -45,11 +49,15 @@ def _draw_labelled(member, conditions):
         return robot
     causes = list(OUTSIDE if truth == "outside" else EFFECTS)
     names = generator.choice(causes, 2 if truth == "two" else 1, replace=False).tolist()
-    span = (WEAKEST, STRONGEST)
+    return _with_causes(robot, names, (WEAKEST, STRONGEST), generator, conditions)
+
+
+def _with_causes(robot, names, span, generator, conditions):
+    """A robot with causes of strengths drawn from a span."""
     for _ in range(_DRAWS):
-        acting = tuple(draw_acting(robot, name, truth == "one", span, generator, conditions) for name in names)
+        acting = tuple(draw_acting(robot, name, len(names) == 1, span, generator, conditions) for name in names)
         drawn = replace(robot, acting=acting)
-        # two causes may lose a pose together that neither loses alone
+        # several causes may lose a pose together that none loses alone
         if true_gap_mm(drawn, conditions) is not None:
             return drawn
     raise UnreachableError(f"{robot.name}: {' and '.join(names)} lose a pose in {_DRAWS} draws")
@@ -57,10 +65,54 @@ def _draw_labelled(member, conditions):
 
 def _draw_single(member, conditions):
     """A robot with one effect alone, strong enough to be seen."""
-    generator = stream(conditions.seed, "withheld", member.effect, member.number)
+    generator = stream(conditions.seed, "withheld", member.about, member.number)
     robot = bare(member.name, generator, conditions.mechanism)
-    acting = draw_acting(robot, member.effect, True, (CLEAR, STRONGEST), generator, conditions)
+    acting = draw_acting(robot, member.about, True, (CLEAR, STRONGEST), generator, conditions)
     return replace(robot, acting=(acting,))
+
+
+def _draw_noisy(member, conditions):
+    """A robot whose noise is not what is stated, every other one with one effect."""
+    generator = stream(conditions.seed, "withheld", member.check, member.about, member.number)
+    robot = replace(bare(member.name, generator, conditions.mechanism), noise=_changed(NOISES[member.about]))
+    if member.number % 2 == 0:
+        return robot
+    return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
+
+
+def _draw_many(member, conditions):
+    """A robot with axis errors, scatter and three to six effects, every other one with a cause from outside besides."""
+    generator = stream(conditions.seed, "withheld", member.check, member.number)
+    robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
+    names = generator.choice(list(EFFECTS), int(generator.integers(3, 7)), replace=False).tolist()
+    if member.number % 2:
+        names.append(str(generator.choice(list(OUTSIDE))))
+    noise = {"scatter": float(generator.uniform(0.0, MOST_SCATTER))}
+    return _with_causes(replace(robot, noise=noise), names, MANY, generator, conditions)
+
+
+def _draw_background(member, conditions):
+    """A robot with axis errors, every other one with one effect besides."""
+    generator = stream(conditions.seed, "withheld", member.check, member.number)
+    robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
+    if member.number % 2 == 0:
+        return robot
+    return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
+
+
+def with_background(robot, generator, conditions):
+    """The robot with ordinary errors of the axes of all its joints."""
+    law = CAUSES["joint_axis_error"]
+    size = [_AXES_SD[unit] for unit in law.parameters.units]
+    acting = Acting(law.name, {}, tuple((size * generator.standard_normal(len(size))).tolist()), 0, 0.0)
+    gap = true_gap_mm(replace(robot, background=(acting,)), conditions)
+    return replace(robot, background=(replace(acting, strength=float(gap / conditions.noise_rms_mm)),))
+
+
+def _changed(law):
+    """The fields of a NoiseLaw that are not as stated."""
+    changed = {key: value for key, value in asdict(law).items() if value != getattr(NoiseLaw(), key)}
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in changed.items()}
 
 
 def bare(name, generator, mechanism):
@@ -148,6 +200,7 @@ def _draw_value(tried, generator):
 
 def _to_strength(robot, acting, conditions):
     """The cause scaled to its strength, or None where that breaks its bounds or loses a pose."""
+    robot = replace(robot, background=())
     gap, asked = _first_order_gap_mm(robot, acting, conditions), acting.strength * conditions.noise_rms_mm
     for _ in range(3):
         if gap is None or not gap > 0.0:

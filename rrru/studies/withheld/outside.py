@@ -94,7 +94,8 @@ OUTSIDE = {
         _make(_pulley_ripple, _RIPPLES, 3e-4),
     )
 }
+_LIBRARY = library(Rrru3())
 # of the library and from outside, whatever may act in a robot of the check, all of which are 3-RRRUs; what holds others
-# is a background, no cause
-EFFECTS = {name: effect for name, effect in library(Rrru3()).items() if name not in HOLDS}
-CAUSES = EFFECTS | OUTSIDE
+# is a background, no cause that is drawn
+EFFECTS = {name: effect for name, effect in _LIBRARY.items() if name not in HOLDS}
+CAUSES = _LIBRARY | OUTSIDE

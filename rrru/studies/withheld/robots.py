@@ -1,7 +1,7 @@
 """Virtual robots of the check on withheld effects: what acts in each, and its campaign. Lengths mm, angles rad."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
+from rrru.studies.withheld.noise import NoiseLaw, with_noise
 from rrru.studies.withheld.outside import CAUSES, OUTSIDE
 from rrru.studies.withheld.verdicts import PREFIX
 
@@ -93,6 +94,11 @@ class Acting:
         """Parameter values (p,)."""
         return self.law.coordinates.to_values(np.array(self.coordinates), self.shape)
 
+    @classmethod
+    def from_mapping(cls, section):
+        """The cause of its fields, as JSON holds them."""
+        return cls(**(section | {"coordinates": tuple(section["coordinates"])}))
+
     def scaled(self, factor):
         """The same cause, so many times as large."""
         return replace(self, coordinates=tuple((factor * np.array(self.coordinates)).tolist()))
@@ -100,13 +106,24 @@ class Acting:
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot of the check: kind of campaign, trajectories as in the configuration, deviations (7,), what acts."""
+    """A robot of the check: kind of campaign, trajectories as in the configuration, deviations (7,), what acts.
+
+    background: what acts besides as in every robot, no cause that is asked for; noise: fields of the NoiseLaw that are
+    not as stated.
+    """
 
     name: str
     kind: str
     trajectories: dict
     deviations: tuple
     acting: tuple = ()
+    background: tuple = ()
+    noise: dict = field(default_factory=dict)
+
+    @property
+    def causes(self):
+        """All that acts, the background last."""
+        return self.acting + self.background
 
     def plan(self, conditions):
         """What it is told to do."""
@@ -114,7 +131,7 @@ class Robot:
 
     def campaign(self, conditions):
         """The virtual robot and its plan, or None where a parameter of what acts breaks its bounds."""
-        if not all(acting.law.parameters.hold(acting.values) for acting in self.acting):
+        if not all(one.law.parameters.hold(one.values) for one in self.causes):
             return None
         deviations = conditions.mechanism.parameters.mapping(self.deviations)
         # of r - R, which alone is identifiable, r has the whole
@@ -122,10 +139,18 @@ class Robot:
         robot = VirtualRobot(
             conditions.mechanism,
             deviations,
-            effects=tuple(ActiveEffect(one.law, one.law.parameters.mapping(one.values)) for one in self.acting),
+            effects=tuple(ActiveEffect(one.law, one.law.parameters.mapping(one.values)) for one in self.causes),
             masses=conditions.masses,
         )
         return WithheldCampaign(robot, self.plan(conditions), conditions.noise_mm, conditions.seed, self.name)
+
+    def measured(self, conditions):
+        """The measurement table that the diagnosis is given."""
+        campaign = self.campaign(conditions)
+        if not self.noise:
+            return campaign.run()[0]
+        law = NoiseLaw(**self.noise)
+        return with_noise(noise_free(self, conditions), law, conditions.noise_mm, campaign.generator())
 
     @property
     def truth(self):
@@ -140,7 +165,7 @@ class Robot:
             "kind": self.kind,
             "truth": self.truth,
             "truth_leg": max((acting.leg for acting in self.acting), default=0),
-            "strength": true_gap_mm(self, conditions) / conditions.noise_rms_mm if self.acting else 0.0,
+            "strength": true_gap_mm(self, conditions) / conditions.noise_rms_mm if self.causes else 0.0,
             "weakest": min((acting.strength for acting in self.acting), default=0.0),
             "drawn": json.dumps(asdict(self), sort_keys=True),
         }
@@ -149,8 +174,8 @@ class Robot:
     def from_json(cls, text):
         """The robot of the column `drawn` of its answer."""
         section = json.loads(text)
-        acting = tuple(Acting(**(one | {"coordinates": tuple(one["coordinates"])})) for one in section.pop("acting"))
-        return cls(**(section | {"deviations": tuple(section["deviations"]), "acting": acting}))
+        causes = {key: tuple(map(Acting.from_mapping, section[key])) for key in ("acting", "background")}
+        return cls(**(section | causes | {"deviations": tuple(section["deviations"])}))
 
 
 def noise_free(robot, conditions):

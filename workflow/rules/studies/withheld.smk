@@ -40,7 +40,7 @@ rule withheld_diagnose:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
-            "taken_out": {member.name: member.effect for member in WITHHELD[wildcards.chunk]},
+            "taken_out": {member.name: member.taken_out for member in WITHHELD[wildcards.chunk]},
             **WITHHELD_ROBOT,
             **reads("gap"),
         },
