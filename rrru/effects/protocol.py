@@ -86,13 +86,29 @@ class Motion:
 
 
 @dataclass(frozen=True)
+class Search:
+    """A parameter of a law's shape that may have any value: waves per turn of a drive, up to the highest order.
+
+    name: of the parameter; value: order to the parameter's value; order: the other way.
+    """
+
+    name: str
+    highest: float
+    value: Callable[[float], float]
+    order: Callable[[float], float]
+
+
+@dataclass(frozen=True)
 class Coordinates:
     """How the diagnosis fits a law: c coordinates in which its contribution is linear, or nearly so.
 
     typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest
     sizes that the law allows; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all;
     positive (c,): whether it cannot be negative; shapes: values of the parameters that are no coordinates, each a
-    variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,).
+    variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,); weights: prior
+    probabilities of the shapes, None where all are alike; searched: what is searched beside the listed shapes, of which
+    the first so many are stated; doubt: share that a shape's parameter may be off by, 1 sigma, of what is searched the
+    order itself.
     """
 
     typical: np.ndarray
@@ -101,6 +117,10 @@ class Coordinates:
     to_values: Callable[[np.ndarray, Mapping[str, float]], np.ndarray]
     shapes: tuple[Mapping[str, float], ...] = ({},)
     most: np.ndarray | float = np.inf
+    weights: tuple[float, ...] | None = None
+    searched: Search | None = None
+    stated: int = 0
+    doubt: float = 0.3
 
     def __len__(self) -> int:
         return len(self.typical)

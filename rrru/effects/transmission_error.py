@@ -12,22 +12,29 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
 A screw of lead h leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
-of motion. The ratio is a number of the drive's data sheet and is not fitted: with N = 50 the error repeats every 7.2
-degrees of the arm, and a campaign must sample more densely than every 3.6 degrees to see it as what it is.
+of motion. The ratio is a number of the drive's data sheet; where nobody states it, it is searched beside that of the
+data sheet, see `rrru.gap.orders`. With N = 50 the error repeats every 7.2 degrees of the arm, and a campaign must
+sample more densely than every 3.6 degrees to see it as what it is.
 
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50
 is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Effect
+from rrru.effects.protocol import Effect, Search
 from rrru.parameters import Parameter, ParameterSet
 
 _RATIO = Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default")
 _LEAD = Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default")
 _GEAR, _SCREW = "assumed: up to some arc minutes", "screw out of true, assumed: up to some hundredths of a millimetre"
+
+# waves per turn of the arm, and radians of the wave per millimetre of the slide
+_RATIOS = Search("ratio", 200.0, float, float)
+_LEADS = Search("lead", 2.0 * np.pi / _LEAD.low, lambda order: 2.0 * np.pi / order, lambda lead: 2.0 * np.pi / lead)
 
 
 def for_robot(robot):
@@ -38,9 +45,9 @@ def for_robot(robot):
     known, typical, law = (_RATIO, 3e-4, _turned) if units == {"rad"} else (_LEAD, 0.01, _slid)
     sizes = harmonic_parameters(count, _GEAR) if units == {"rad"} else harmonic_parameters(count, _SCREW, "mm", 1.0)
     parameters = ParameterSet((*sizes, known))
-    return Effect(
-        "transmission_error", parameters, harmonic_coordinates(parameters, typical, ({known.name: known.nominal},)), law
-    )
+    search = _RATIOS if units == {"rad"} else _LEADS
+    coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
+    return Effect("transmission_error", parameters, replace(coordinates, searched=search), law)
 
 
 def _turned(motion, values):

@@ -38,8 +38,11 @@ def advise(attribution, verdict, masses, most=3):
         return nothing
     case, result = attribution.case, []
     planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
-    for names in rivals[:_MOST_RIVALS]:
-        other = attribution.posterior.best_of(names)
+    others = ((names, attribution.posterior.best_of(names)) for names in rivals[:_MOST_RIVALS])
+    for names, other in others:
+        if other is None:
+            # it is one only beside something small that is unknown
+            continue
         # the answer with more effects makes the data: the smaller one could not make the larger one's
         truth, imitator = (favoured, other) if len(favoured[0].terms) >= len(other[0].terms) else (other, favoured)
         now, gains = _worth(attribution, truth, imitator, planned)

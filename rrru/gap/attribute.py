@@ -15,12 +15,13 @@ from rrru.gap.case import Case, State
 from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.noise_model import fit_noise
+from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.unknown import UNKNOWN
 
-_MOST_ROUNDS, _MOST_CLEANINGS = 4, 3
+_MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
 # more columns than this share of the numbers read leave too little to tell the noise by
@@ -118,7 +119,8 @@ def attribute(case, prior, stated=KNOWN):
                 case = case.without(outliers)
                 calibrated = calibrate(case)
         attribution = _rounds(case, calibrated, prior, stated)
-        outliers = noise.isolated(case.residual(attribution.state), case.series, attribution.case.noise_mm)
+        found = attribution.case
+        outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm)
         if cleaning == _MOST_CLEANINGS or not outliers.any():
             break
         case = case.without(outliers)
@@ -149,8 +151,11 @@ def _rounds(case, calibrated, prior, stated):
     """Search and refinement in turn until the best hypothesis repeats itself."""
     state, covariance, last, stated_mm = calibrated, _NO_COVARIANCE, None, case.noise_mm
 
-    def seen(case, state):
+    def seen(case, state, terms=()):
         linear = case.linearise(state)
+        case, added = with_orders(case, linear, terms)
+        if added:
+            linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
         if stated == KNOWN:
             return case, linear, "given"
         under, source = with_noise(case, linear, stated_mm if stated == STATED else None)
@@ -171,13 +176,13 @@ def _rounds(case, calibrated, prior, stated):
         unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
         if last == frozenset(hypothesis.terms) or (small and not shaped and unknown):
             break
-        first, last = last is None, frozenset(hypothesis.terms)
-        if first and shaped and unknown:
+        last = frozenset(hypothesis.terms)
+        if shaped and unknown:
             # a law off the grid of its shapes gets its chance before an unknown function takes what it leaves
             hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
             state, covariance = refine(case, state, hypothesis, level)
-            case, linear, source = seen(case, state)
+            case, linear, source = seen(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:
             # the sim cannot follow: what the last linearisation says stands

@@ -19,9 +19,6 @@ from rrru.gap.noise_model import NoiseModel
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
 
-# a parameter of a law's shape may be off by this share
-_SHAPE_STEP = 0.3
-
 
 @dataclass(frozen=True)
 class State:
@@ -228,9 +225,7 @@ class Case:
         own = state.contribution(self.library, key, self.motion)
         columns, steps = [], []
         for name, value in shape.items():
-            stepped = value * (1.0 + _SHAPE_STEP)
-            if stepped > effect.parameters[name].high:
-                stepped = value * (1.0 - _SHAPE_STEP)
+            stepped = _stepped(effect, name, value)
             if stepped != value:
                 other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
                 columns.append(at.move((other - own).twists)[self._kept])
@@ -249,3 +244,13 @@ class Case:
             change = state.contribution(self.library, key, self.motion, one)
             result[..., k] = at.move(change.twists)[self._kept] / step[k]
         return result
+
+
+def _stepped(effect, name, value):
+    """A value of a shape's parameter as far off as it may be, 1 sigma."""
+    search = effect.coordinates.searched
+    if search is not None:
+        return search.value(search.order(value) + effect.coordinates.doubt)
+    doubt = effect.coordinates.doubt
+    stepped = value * (1.0 + doubt)
+    return stepped if stepped <= effect.parameters[name].high else value * (1.0 - doubt)

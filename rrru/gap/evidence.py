@@ -212,14 +212,16 @@ class ModelEvidence:
         problem = self.projected(terms, [0])
         return problem.scale(np.asarray(strengths)[None])[0, problem.owner < len(terms)]
 
-    def explained(self, hypothesis):
-        """Rms per axis, over sigma, of what a hypothesis explains at its best, the calibration's share taken out."""
-        if not hypothesis.terms:
+    def explained(self, hypothesis, effects):
+        """Rms per axis, over sigma, of what some effects of a hypothesis explain at its best, calibration taken out."""
+        if hypothesis.effects.isdisjoint(effects):
             return 0.0
         level = int(hypothesis.evidence.argmax())
         mean, _ = self.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
-        gram = self.projected(hypothesis.terms, [0]).gram[0]
-        return float(np.sqrt(max(mean @ gram @ mean, 0.0) / (3.0 * len(self))))
+        problem = self.projected(hypothesis.terms, [0])
+        chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
+        mean = np.where(chosen[problem.owner], mean, 0.0)
+        return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self))))
 
     def coefficients(self, terms, strengths, level):
         """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).

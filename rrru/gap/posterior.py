@@ -66,7 +66,7 @@ class Posterior:
 
         Unless `unexplained` is asked for, one without unknown functions.
         """
-        hidden = set(UNKNOWN) if unexplained else set()
+        hidden = set() if unexplained is None else set(UNKNOWN)
         rows = [k for k, h in enumerate(self.hypotheses) if h.effects - hidden == effects]
         if not rows:
             return None
@@ -96,9 +96,8 @@ def posterior(evidence, hypotheses, prior):
     log_weight = log_weight[worth]
     unexplained = np.zeros(log_weight.shape, dtype=bool)
     for row, hypothesis in enumerate(kept):
-        # an unknown function is unexplained whatever else is
-        known = hypothesis.effects.isdisjoint(UNKNOWN)
-        unexplained[row] = prior.tolerance * evidence.explained(hypothesis) < LEVELS if known else True
+        tolerated = prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
+        unexplained[row] = tolerated < np.maximum(LEVELS, evidence.explained(hypothesis, set(UNKNOWN)))
         log_weight[row] += log_prior.levels(unexplained[row])
     return Posterior(kept, np.exp(log_weight - log_sum_exp(log_weight.ravel())), unexplained)
 
@@ -111,7 +110,9 @@ class _LogPrior:
         self._functions = sum(name in UNKNOWN for name in library)
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
-            self._effects[name] = np.log(len(kinds)) + np.log(len(library[name].coordinates.shapes))
+            coordinates = library[name].coordinates
+            weights = coordinates.weights or np.full(len(coordinates.shapes), 1.0 / len(coordinates.shapes))
+            self._effects[name] = np.log(weights) - np.log(len(kinds))
 
     def terms(self, terms):
         """Of a set of terms, alike for all sets of one size."""
@@ -119,7 +120,7 @@ class _LogPrior:
         total = self._prior.log_count(len(known)) - np.log(comb(len(self._effects), len(known)))
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
-            total -= self._effects[term.effect]
+            total += self._effects[term.effect][term.shape]
             if term.legs not in (EACH, SAME):
                 total -= np.log(3.0)
         return total

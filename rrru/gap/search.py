@@ -80,7 +80,7 @@ def _grow(tried, choices, layer, most):
     best = layer[:1]
     for size in range(_SMALL + 1, most + 1):
         layer = tried.grown(layer, choices, size)
-        if not layer or best and layer[0].evidence.max() < best[0].evidence.max():
+        if not layer or layer[0].evidence.max() < best[0].evidence.max():
             break
         best = layer[:1]
     for _ in range(_REPLACEMENTS):

@@ -13,8 +13,8 @@ from rrru.robots.catalogue import MECHANISMS
 class Prior:
     """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
 
-    Each effect more is as much rarer as the third is after the second. tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
-    inaccuracy.
+    Each effect more is as much rarer as the third is after the second. tolerance: share of what a set explains up to
+    which a remaining discrepancy still counts as the laws' own inaccuracy.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
@@ -78,7 +78,10 @@ def _with_known(effect, values):
         allowed = ", ".join(coordinates.shapes[0]) or "none"
         raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
     fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
-    return replace(effect, coordinates=replace(coordinates, shapes=tuple(map(dict, fixed))))
+    shapes = tuple(map(dict, fixed))
+    # where all is known nothing is fitted further
+    doubt = 0.0 if set(values) == set(shapes[0]) else coordinates.doubt
+    return replace(effect, coordinates=replace(coordinates, shapes=shapes, searched=None, doubt=doubt))
 
 
 def check(config):

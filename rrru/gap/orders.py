@@ -1,0 +1,93 @@
+"""Waves per turn of the drives that a campaign shows: the search for the ratio of a gear that nobody has stated.
+
+For an order N the residual is fitted by the sine and cosine of N times every drive's value, calibration and known
+effects beside them. What that takes off the sum of squares, over orders, is a periodogram (Lomb, Least-squares
+frequency analysis of unequally spaced data, Astrophysics and Space Science 39, 1976). Drives that swing through s rad
+tell orders apart that differ by 2 pi / s, and none below that.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from rrru.gap.terms import spread
+from rrru.gap.unknown import UNKNOWN
+
+# orders per resolved one, and the largest number of orders found that are kept
+_DENSITY, _PEAKS, _MOST = 6, 2, 8
+# what is found again lies within this share of the resolution
+_SAME = 0.03
+# an order that was found is off by this share of the resolution, 1 sigma
+_DOUBT = 0.1
+# of what may be any order, this share is believed to be the stated one
+_STATED = 0.5
+
+
+def resolution(drive):
+    """Difference of the orders that drives (n, K) in rad tell apart."""
+    return 2.0 * np.pi / float(np.ptp(drive, axis=0).max())
+
+
+def periodogram(data, drive_effect, drive, beside, orders):
+    """What waves of each order (g,) take off the sum of squares of data (m, 3), by order (g,).
+
+    drive_effect (m, 3, K): derivative by the drives' values; drive (m, K): these in rad; beside (m, 3, b): what is
+    fitted with them.
+    """
+    basis, _ = np.linalg.qr(beside.reshape(data.size, -1))
+    left = data.ravel() - basis @ (basis.T @ data.ravel())
+    gains = np.empty(len(orders))
+    for row, order in enumerate(orders):
+        waves = [drive_effect * part(order * drive)[:, None] for part in (np.sin, np.cos)]
+        columns = np.concatenate(waves, axis=-1).reshape(data.size, -1)
+        columns = columns - basis @ (basis.T @ columns)
+        fitted, *_ = np.linalg.lstsq(columns, left, rcond=1e-9)
+        gains[row] = left @ (columns @ fitted)
+    return gains
+
+
+def with_orders(case, linear, terms):
+    """The case whose searched effects have the orders that stand out as more shapes, and keys of these (effect, shape).
+
+    linear: about the state that terms of a hypothesis, fitted beside the waves, have led to.
+    """
+    library, added = dict(case.library), []
+    for name, effect in case.library.items():
+        if effect.coordinates.searched is not None:
+            # an unknown function would take what is looked for
+            others = [term for term in terms if term.effect != name and term.effect not in UNKNOWN]
+            library[name] = _found(case, linear, effect, others)
+            had = range(len(effect.coordinates.shapes), len(library[name].coordinates.shapes))
+            added += [(name, shape) for shape in had]
+    return replace(case, library=library), added
+
+
+def _found(case, linear, effect, others):
+    """An effect with the orders that stand out added to its shapes."""
+    coordinates, drive = effect.coordinates, case.motion.drive[case.at]
+    search, step = coordinates.searched, resolution(case.motion.drive[case.used])
+    known = [linear.columns[t.effect, t.shape] @ spread(case.library[t.effect].coordinates, t.legs) for t in others]
+    beside = np.concatenate([linear.base, *known], axis=-1)
+    orders = np.arange(step, search.highest, step / _DENSITY)
+    if len(orders) < 3 or beside.shape[-1] > linear.data.size // 2:
+        return effect
+    gains = periodogram(linear.data, linear.drive, drive, beside, orders)
+    peaks, _ = find_peaks(gains)
+    shapes = list(coordinates.shapes)
+    for peak in peaks[np.argsort(-gains[peaks])][:_PEAKS]:
+        order = _vertex(orders, gains, peak)
+        had = [search.order(shape[search.name]) for shape in shapes]
+        if min(abs(order - one) for one in had) > _SAME * step and len(shapes) < _MOST:
+            shapes.append(shapes[0] | {search.name: search.value(order)})
+    stated, resolved = coordinates.stated or len(coordinates.shapes), len(orders) / _DENSITY
+    weights = [_STATED / stated] * stated + [(1.0 - _STATED) / resolved] * (len(shapes) - stated)
+    found = replace(coordinates, shapes=tuple(shapes), weights=tuple(weights), stated=stated, doubt=_DOUBT * step)
+    return replace(effect, coordinates=found)
+
+
+def _vertex(orders, gains, peak):
+    """The order at the top of the parabola through a peak and its neighbours."""
+    before, at, after = gains[peak - 1 : peak + 2]
+    bend = before - 2.0 * at + after
+    return float(orders[peak] + (0.5 * (before - after) / bend if bend else 0.0) * (orders[1] - orders[0]))
