@@ -53,6 +53,7 @@ class Delta(Tripod):
 
     LINK = 2
     TRACKED = "tied"
+    RICHEST = "legs"
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm", "platform_mm", "spacing_mm")
     DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
     PARAMETER_NAMES: ClassVar = {

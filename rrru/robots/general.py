@@ -52,7 +52,7 @@ class GeneralRobot(Robot):
     among: tuple[str, ...] = ()
     reads: Reads = field(default_factory=Reads)
 
-    TRACKED = "full"
+    TRACKED = RICHEST = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
 
     def __post_init__(self):

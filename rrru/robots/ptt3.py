@@ -60,6 +60,7 @@ class Ptt3(Tripod):
 
     LINK = 1
     TRACKED = "tied"
+    RICHEST = "rails"
     DIMENSIONS = ("L_mm", "R_mm", "r_mm")
     DEVIATIONS = _SLIDERS | _LINKS | _RAILS | {"dL": Deviation(1), "da": Deviation(2)}
     PARAMETER_NAMES: ClassVar = {

@@ -23,8 +23,8 @@ class Robot(ABC):
 
     name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.robots.legs.Legs`;
     parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
-    parameters that measured positions identify; angle_arm_mm: the length that makes angles comparable with lengths; up
-    (3,): away from the ground.
+    parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
+    angle_arm_mm: the length that makes angles comparable with lengths; up (3,): away from the ground.
     """
 
     name: str
@@ -34,6 +34,7 @@ class Robot(ABC):
     directions: np.ndarray
     angle_arm_mm: float
     TRACKED: str
+    RICHEST: str
     SEARCHED: str
     up = (0.0, 0.0, 1.0)
     tool_mm = (0.0, 0.0, 0.0)
@@ -45,6 +46,11 @@ class Robot(ABC):
     @abstractmethod
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
+
+    @property
+    def z_down(self):
+        """Whether z of its frame points to the ground."""
+        return bool(self.up[2] < 0.0)
 
     @cached_property
     def model(self):

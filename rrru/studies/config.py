@@ -131,8 +131,3 @@ def trajectory_names(section):
     from rrru.campaign import trajectories
 
     return [trajectory.name for trajectory in trajectories.from_config(section)]
-
-
-def z_down(section):
-    """Whether the frame of a campaign's robot has its z pointing down."""
-    return section["robot"] == "rrru3"
