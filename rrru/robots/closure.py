@@ -108,15 +108,15 @@ def walk(legs, leg, actuators, passive, twists):
         places.append(place)
         axes.append(None if joint.kind == "fixed" else turn @ joint.axis)
         if joint.kind == "R":
-            turn = turn @ turn_about(joint.axis, _value(legs, joint, actuators, passive))
+            turn = turn @ turn_about(joint.axis, value_of(legs, joint, actuators, passive))
         elif joint.kind == "P":
-            place = place + _value(legs, joint, actuators, passive)[:, None] * axes[-1]
+            place = place + value_of(legs, joint, actuators, passive)[:, None] * axes[-1]
     return Walk(tuple(turns), tuple(places), tuple(axes), turn @ leg.end_turn, place)
 
 
-def _value(legs, joint, actuators, passive):
-    """Values (n,) of a joint that moves."""
-    return passive[:, legs.passive_numbers[joint.name]] if joint.passive else actuators[:, joint.drive]
+def value_of(legs, joint, actuators, passive):
+    """Values (n,) of a joint that moves, at actuator values (n, K) and passive values (n, k)."""
+    return passive[:, legs.passive_numbers[joint.name]] if joint.passive else legs.driven(actuators)[:, joint.drive]
 
 
 def bar_ends(legs, leg, way, poses, actuators, twists):
@@ -124,7 +124,7 @@ def bar_ends(legs, leg, way, poses, actuators, twists):
     bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
     point = leg.bar.platform_mm - twists.values[:, end_site, :3]
     far = poses.position_mm + np.einsum("nij,nj->ni", poses.turn, np.broadcast_to(point, way.place.shape))
-    driven = 0.0 if leg.bar.drive is None else actuators[:, leg.bar.drive]
+    driven = 0.0 if leg.bar.drive is None else legs.driven(actuators)[:, leg.bar.drive]
     return way.place, far, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven
 
 
@@ -147,6 +147,15 @@ def line_wrench(near, far):
     line = far - near
     line = line / np.linalg.norm(line, axis=1, keepdims=True)
     return np.concatenate([line, np.cross(near, line)], axis=1)
+
+
+def frame_along(lines):
+    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
+    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
+    helper = np.eye(3)[np.abs(x).argmin(axis=1)]
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=2)
 
 
 def wrenches_beside(screws, rank):
@@ -226,7 +235,7 @@ class Closure:
         NaN where Newton does not end.
         """
         all_met = self.rows[-1].stop == 6
-        return Poses(*closed(self._tables, actuators, start, Twists(self.legs, twists), all_met))
+        return Poses(*closed(self._tables, self.legs.driven(actuators), start, Twists(self.legs, twists), all_met))
 
 
 def _inverse(matrices):

@@ -184,14 +184,18 @@ class Robot(ABC):
         return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
 
     def own_load(self, masses, actuators, rate, acceleration, poses):
-        """Loads (n, K) on the drives, in N mm or N, of what moves with them but for the platform; none here."""
-        return np.zeros(np.shape(actuators))
+        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here."""
+        return 0.0
 
     def drive_errors(self, twists):
-        """Changes (n, K) of the actuator values in twists (n, sites, 6)."""
+        """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
         numbers = self.legs.site_numbers
-        along = [twists[:, numbers[d.site]] @ (d.twist / (d.twist @ d.twist)) for d in self.parts.drives]
-        return np.stack(along, axis=1)
+        units = np.zeros((len(self.parts.drives), len(numbers), 6))
+        for unit, drive in zip(units, self.parts.drives, strict=True):
+            for site, twist in drive.twists.items():
+                unit[numbers[site]] = twist
+        flat = units.reshape(len(units), -1)
+        return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
     def require_reachable(self, position_mm, deviations=None):
         """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Twists, bar_ends, screw
+from rrru.robots.closure import Twists, bar_ends, frame_along, screw
 from rrru.robots.legs import TOOL, WORLD
 
 _EYE = np.eye(3)
@@ -82,7 +82,7 @@ class TwistMap:
         if leg.bar:
             near, far, _ = bar_ends(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
             bar, end = (numbers[name] for name in leg.bar_sites)
-            result |= {bar: (_frame_along(far - near), near), end: (self.poses.turn, far)}
+            result |= {bar: (frame_along(far - near), near), end: (self.poses.turn, far)}
         return result
 
     def _own(self, number, turn):
@@ -144,11 +144,16 @@ class TwistMap:
                 result[..., used] += self.effect(name) @ one[:, used]
         return result
 
-    @cached_property
+    @property
     def drive_counts(self):
         """Constraints (n, rows, K) that the actuator values change."""
+        return self.closure.legs.per_actuator(self.driven_counts)
+
+    @cached_property
+    def driven_counts(self):
+        """Constraints (n, rows, D) that the driven values change."""
         legs = self.closure.legs
-        result = np.zeros((len(self), self.closure.rows[-1].stop, legs.drive_count))
+        result = np.zeros((len(self), self.closure.rows[-1].stop, len(legs.driven_kinds)))
         for leg, way, one, rows in self._legs:
             for joint, axis, place in zip(leg.joints, way.axes, way.places, strict=True):
                 if joint.drive is not None:
@@ -237,12 +242,3 @@ def _in_site(wrenches, turn, place, own):
     """Wrenches (n, r, 6) at the origin as they count shift and rotation (n, r, 6) of a frame."""
     about = _about(wrenches, place)
     return np.concatenate([about[:, :, :3] @ turn, about[:, :, 3:] @ own], axis=2)
-
-
-def _frame_along(lines):
-    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
-    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
-    helper = _EYE[np.abs(x).argmin(axis=1)]
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y, np.cross(x, y)], axis=2)

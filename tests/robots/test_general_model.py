@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots import singularity
 from rrru.robots.cable import cable
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.closure import Poses
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, loads
@@ -18,6 +19,7 @@ from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 from rrru.robots.serial import serial
+from tests.robots import humanoid
 
 _COUNT = 100
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))
@@ -57,6 +59,7 @@ GENERAL = {
         [0.2, 0.9, -1.3, 0.5, 0.8, 0.1],
         tool_mm=(20.0, 10.0, 70.0),
     ),
+    "coupled": make_mechanism("coupled", humanoid.section()),
     "planar_cable": cable(
         [[-600.0, -500.0, 0.0], [600.0, -500.0, 0.0], [50.0, 700.0, 0.0]],
         [[50.0, -60.0, 0.0], [50.0, 60.0, 0.0], [-80.0, 5.0, 0.0]],
@@ -176,7 +179,7 @@ def test_the_drives_response_is_the_closures_slope(setting):
 def test_a_drives_own_twist_acts_as_its_value_does(setting):
     at = setting.robot.map(setting.actuators, setting.poses)
     for k, drive in enumerate(setting.robot.parts.drives):
-        moved = at.response(drive.site) @ drive.twist
+        moved = sum(at.response(site) @ twist for site, twist in drive.twists.items())
         size = np.abs(moved).max()
         np.testing.assert_allclose(moved, at.drive_response[:, :, k], rtol=0.0, atol=1e-9 * size)
 
