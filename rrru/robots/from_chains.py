@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.robots.closure import Twists, rank_of, screw, walk
 from rrru.robots.from_seams import Move, placed
 from rrru.robots.legs import TOOL, WORLD, Bar, Joint, Leg, Z, turn_about
 from rrru.robots.lumps import PLATFORM
+from rrru.robots.walk import Twists, walk
+from rrru.robots.wrenches import groups_of, rank_of, screw
 
 # axes meet in a point and a slide goes along a line to within this, in mm and rad
 _MEET_MM, _ALONG = 1e-6, 1e-9
@@ -103,15 +104,16 @@ class Chains:
             if len({id(joint) for _, joint in legs}) > 1:
                 text = f"joint {name} is in {by}, behind different joints; allowed: legs that part once and meet at the"
                 raise self.assembly.error(f"{text} platform")
-            if len(legs) > 1 and legs[0][1].passive:
-                raise self.assembly.error(f"passive joint {name} is shared by {by}; allowed: a driven one")
 
 
 def with_bars(legs):
     """The legs of Legs, those that end in bars as such, at the home pose."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
     ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
-    return tuple(_with_bar(leg, way, legs.driven(actuators)[0]) for leg, way in zip(legs.legs, ways, strict=True))
+    alone = {group[0] for group in groups_of(legs) if len(group) == 1}
+    return tuple(
+        _with_bar(leg, ways[k], legs.driven(actuators)[0]) if k in alone else leg for k, leg in enumerate(legs.legs)
+    )
 
 
 def _with_bar(leg, way, drives):

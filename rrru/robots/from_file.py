@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import from_urdf as urdf_files
-from rrru.robots.closure import Closure, Poses, Twists, bar_ends, walk
+from rrru.robots.closure import Closure
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.free_motion import free_motions
 from rrru.robots.from_chains import Chains, with_bars
@@ -25,6 +25,7 @@ from rrru.robots.from_mjcf import MM, Assembly
 from rrru.robots.from_seams import undone
 from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Drive, Legs, Parts, unit_twist
+from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
 # a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
 # where more joints than needed do not fit each other; below the last it is not closed at all

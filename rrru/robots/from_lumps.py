@@ -10,12 +10,12 @@ Lengths in mm, masses in kg.
 
 import numpy as np
 
-from rrru.robots.closure import Twists, walk
 from rrru.robots.from_mjcf import MM
 from rrru.robots.from_seams import placed, turn_of, undone
 from rrru.robots.from_urdf import NO_MASS_KG
 from rrru.robots.legs import turn_about
 from rrru.robots.lumps import PLATFORM, Lump
+from rrru.robots.walk import Twists, walk
 
 
 def points_of(model, body):

@@ -3,7 +3,7 @@
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
-by legs: the two bars of a Delta's arm share its drive.
+by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint.
 
 Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
 (the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
@@ -108,9 +108,6 @@ class Legs:
         if self.coupling is not None and len(self.coupling) != len(self.driven_kinds):
             rows = f"{len(self.coupling)} rows for {len(self.driven_kinds)} driven values"
             raise ConfigError(f"the coupling has {rows}; allowed: one each")
-        shared = [j.name for j in self.passive_joints if sum(j in leg.joints for leg in self.legs) > 1]
-        if shared:
-            raise ConfigError(f"passive joint {shared[0]} is shared by several legs; allowed: driven ones")
 
     @cached_property
     def joints(self):

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.robots.closure import Twists, bar_ends, value_of
 from rrru.robots.legs import turn_about
+from rrru.robots.walk import Twists, bar_ends, value_of
 
 # steps of the differences: in time, and of a driven value in rad or mm
 _STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}

@@ -11,11 +11,12 @@ import numpy as np
 
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
-from rrru.robots.closure import Closure, Poses
+from rrru.robots.closure import Closure
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
 from rrru.robots.readings import place_on_platform, turned_by
 from rrru.robots.twist_map import TwistMap
+from rrru.robots.walk import Poses
 
 
 class Robot(ABC):

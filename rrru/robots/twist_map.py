@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Twists, bar_ends, frame_along, screw
 from rrru.robots.legs import TOOL, WORLD
+from rrru.robots.walk import Twists, bar_ends
+from rrru.robots.wrenches import by_group, frame_along, screw
 
 _EYE = np.eye(3)
 
@@ -153,7 +154,7 @@ class TwistMap:
     def driven_counts(self):
         """Constraints (n, rows, D) that the driven values change."""
         legs = self.closure.legs
-        result = np.zeros((len(self), self.closure.rows[-1].stop, len(legs.driven_kinds)))
+        result = np.zeros((len(self), self.closure.row_count, len(legs.driven_kinds)))
         for leg, way, one, rows in self._legs:
             for joint, axis, place in zip(leg.joints, way.axes, way.places, strict=True):
                 if joint.drive is not None:
@@ -174,11 +175,12 @@ class TwistMap:
         return size[:, -1] / size[:, 0]
 
     def constraint_measures(self, arm_mm):
-        """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by leg.
+        """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by group.
 
         Moments count at an arm in mm. The determinant has a sign where every leg is a bar; it is positive elsewhere.
         """
-        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in self._wrenches]
+        groups = by_group(self.closure.legs, self._wrenches)
+        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in groups]
         rows = np.concatenate(legs, axis=1)
         if rows.shape[1] == 6 and all(leg.bar for leg in self.closure.legs.legs):
             return _singular_values(rows)[:, -1], np.linalg.det(rows)

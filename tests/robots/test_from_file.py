@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Poses, Twists
 from rrru.robots.delta import Delta
 from rrru.robots.from_file import from_mjcf, from_urdf
 from rrru.robots.hexapod import hexapod
 from rrru.robots.lumps import driven_loads, places
 from rrru.robots.rrru3 import Rrru3
+from rrru.robots.walk import Poses, Twists
 from tests.robots.mjcf import (
     ARM,
     CRANKED,

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from rrru.robots import singularity
 from rrru.robots.cable import cable
 from rrru.robots.catalogue import make_mechanism
-from rrru.robots.closure import Poses
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, loads
 from rrru.robots.hexapod import hexapod
@@ -19,6 +18,7 @@ from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 from rrru.robots.serial import serial
+from rrru.robots.walk import Poses
 from tests.robots import humanoid
 
 _COUNT = 100
