@@ -58,7 +58,7 @@ def of_equalities(assembly, driven):
         if joint in driven or joint in result:
             raise assembly.error(f"{name} follows {leader} and is driven besides; allowed: one of both")
         if driver not in driven:
-            raise assembly.error(f"{name} follows {leader}, which no actuator drives; allowed: a driven joint")
+            raise assembly.error(f"{name} follows {leader}; allowed: a joint of the legs that an actuator drives")
         offset, factor, *bent = model.eq_data[k, :5]
         if np.any(bent):
             raise assembly.error(f"{name} follows {leader} along a curve; allowed: polycoef of two numbers")

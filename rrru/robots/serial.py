@@ -16,12 +16,14 @@ from scipy.spatial.transform import Rotation
 from rrru.errors import ConfigError
 from rrru.robots.drive_step import end_of
 from rrru.robots.general import GeneralRobot
-from rrru.robots.legs import Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
+from rrru.robots.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
 from rrru.robots.lumps import Lump
 
 # keys of a row: of a joint, of a fixed frame
 JOINT = ("a", "alpha", "d", "theta", "sliding", "name", "drives", "mass_kg", "com_mm")
 FRAME = ("xyz_mm", "rpy_rad", "mass_kg", "com_mm")
+# sites that every arm has
+_TAKEN = (WORLD, TOOL, "base", "flange")
 
 
 def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), name="arm", **options):
@@ -115,11 +117,13 @@ def _links(rows, modified, robot):
 
 def _coupling(joints, robot):
     """Columns (D,) of the coupling by drive, in the order of the joints that have a drive of their own."""
-    names = [link.name for link in joints]
+    names = [*_TAKEN, *(link.name for link in joints)]
     if len(set(names)) < len(names):
         most = max(names, key=names.count)
-        raise ConfigError(f"{robot}: two joints are called {most!r}; allowed: names of their own")
+        raise ConfigError(f"{robot}: two joints or frames are called {most!r}; allowed: names of their own")
     drives = [link.name for link in joints if link.name in link.drives]
+    if not drives:
+        raise ConfigError(f"{robot}: no row has a drive of its own; allowed: one or more")
     for link in joints:
         for drive, factor in link.drives.items():
             if drive not in drives:

@@ -189,7 +189,9 @@ _JOINT = {"a": 100.0}
         ),
         ([_JOINT | {"drives": {"q2": 1.0}}, _JOINT | {"drives": {"q1": 1.0}}], "joint q1 follows 'q2'; allowed"),
         ([_JOINT, _JOINT | {"drives": {"q1": 0.0}}], "joint q2 follows q1 times 0.0; allowed: not 0"),
-        ([_JOINT, _JOINT | {"name": "q1"}], "two joints are called 'q1'"),
+        ([_JOINT, _JOINT | {"name": "q1"}], "two joints or frames are called 'q1'"),
+        ([_JOINT, _JOINT | {"name": "flange"}], "two joints or frames are called 'flange'"),
+        ([{"xyz_mm": [0.0, 0.0, 1.0]}], "no row has a drive of its own"),
         ([_JOINT, _JOINT | {"gear": 3}], "row 2 has 'gear'; allowed: a, alpha"),
         ([_JOINT, {"xyz_mm": [0, 0, 1], "a": 3}], "row 2 has 'a'; allowed: xyz_mm"),
     ],
@@ -305,7 +307,7 @@ def test_loads_of_a_coupled_drive_are_mujoco_s(tmp_path):
     [
         ('<joint joint1="elbow"/>', ("base", "out"), "joint elbow is held by equality 1"),
         ('<joint joint1="elbow" joint2="base"/>', ("base", "elbow", "out"), "joint elbow follows base and is driven"),
-        ('<joint joint1="elbow" joint2="out"/>', ("base",), "joint elbow follows out, which no actuator drives"),
+        ('<joint joint1="elbow" joint2="out"/>', ("base",), "joint elbow follows out; allowed: a joint of the legs"),
         (
             COUPLED.replace("-1", "-1 0.3"),
             ("base",),
