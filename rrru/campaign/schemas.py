@@ -69,6 +69,7 @@ One row per campaign: where it came from and what state it is in.
 --
 campaign
 robot                  str    mechanism
+z_down                 bool   true where z of the robot's frame points to the ground
 source                 str    virtual robot or file
 points                 int    commanded points
 runs                   int    passes

@@ -58,5 +58,6 @@ def _played(motion, values):
 
 def for_robot(robot):
     """The law for all drives."""
-    parameters = ParameterSet(drive_parameters(robot, _SOURCE, ("width", _HIGHEST)))
-    return Effect("backlash", parameters, plain_coordinates(parameters, of_drives(robot, _TYPICAL)), _played)
+    drives = robot.parts.drives
+    parameters = ParameterSet(drive_parameters(drives, _SOURCE, ("width", _HIGHEST)))
+    return Effect("backlash", parameters, plain_coordinates(parameters, of_drives(drives, _TYPICAL)), _played)

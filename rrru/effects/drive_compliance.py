@@ -19,6 +19,8 @@ Assumptions: linear spring (harmonic drives stiffen with torque by a factor of a
 motion (that is `backlash`), wind-up small enough that loads are those at the commanded pose, no vibration (a motion
 slow against the drive's resonance).
 
+A joint that a rod or belt makes follow drives gives way to the loads about itself, beside what its drives do.
+
 A carriage on a screw or belt gives way likewise: b_i errs by k_i F_i with the force F_i of all loads along its rail.
 
 Source: Tsai, Robot Analysis, 1999, chapter 10 (loads); Spong, Modeling and control of elastic joint robots, ASME
@@ -38,12 +40,15 @@ _TYPICAL = {"rad": 2e-8, "mm": 1e-3}
 
 
 def for_robot(robot):
-    """The law for all drives."""
-    parameters = ParameterSet(drive_parameters(robot, _SOURCE, ("compliance", _HIGHEST)))
-    coordinates = plain_coordinates(parameters, of_drives(robot, _TYPICAL))
+    """The law for all drives, and after them all joints that follow some."""
+    springs = (*robot.parts.drives, *robot.parts.followers)
+    parameters = ParameterSet(drive_parameters(springs, _SOURCE, ("compliance", _HIGHEST)))
+    coordinates = plain_coordinates(parameters, of_drives(springs, _TYPICAL))
     return Effect("drive_compliance", parameters, coordinates, _wind_up, ("drive_load",))
 
 
 def _wind_up(motion, values):
-    """Changes of the actuator values under compliances (K,), rad/(N mm) or mm/N."""
-    return motion.at_drives(values * motion.drive_load)
+    """Changes of the values of drives and followers under compliances (K + f,), rad/(N mm) or mm/N."""
+    count = motion.drive_load.shape[1]
+    followed = motion.at_followers(values[count:] * motion.follower_load)
+    return motion.at_drives(values[:count] * motion.drive_load) + followed

@@ -24,10 +24,11 @@ _BOUNDS, _TYPICAL = {"mm": 5.0, "rad": 0.03}, {"mm": 0.1, "rad": 5e-4}
 
 
 def for_robot(robot):
-    """The law for all joints that move, None for a robot of bars alone."""
-    placed = [(joint.name, twist) for joint in robot.legs.joints if joint.kind != "fixed" for twist in _across(joint)]
-    if not placed:
+    """The law for all joints that move, None for a robot of bars alone or on rails: what these have is `rail_tilt`."""
+    moving = [joint for joint in robot.legs.joints if joint.kind != "fixed"]
+    if not moving or (robot.parts.feet and all(joint.kind == "P" for joint in moving)):
         return None
+    placed = [(joint.name, twist) for joint in moving for twist in _across(joint)]
     parameters = ParameterSet(tuple(_parameter(site, twist) for site, twist in placed))
 
     def seated(motion, values):

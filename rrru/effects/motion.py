@@ -58,4 +58,5 @@ def make_motion(robot, masses, course):
         force_n=load.member_n,
         held_force_n=load.held_n,
         drive_load=load.drive,
+        follower_load=load.followers,
     )

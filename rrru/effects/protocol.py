@@ -37,7 +37,8 @@ class Motion:
     the values along everything that is driven, path_index (n,): rows of the sampled points in it; time_s (n,): since
     the campaign's start; payload_kg (n,); force_n (n, members): force with which each member pushes the platform,
     compression positive, and held_force_n the same if friction holds the legs' inner joints; drive_load (n, K): torque
-    in N mm or force in N of the loads on each drive, positive in the drive's sense.
+    in N mm or force in N of the loads on each drive, positive in the drive's sense; follower_load (n, f): on each joint
+    that follows drives, likewise.
     """
 
     robot: Any
@@ -52,13 +53,26 @@ class Motion:
     force_n: np.ndarray
     held_force_n: np.ndarray
     drive_load: np.ndarray
+    follower_load: np.ndarray
 
     def __len__(self) -> int:
         return len(self.drive)
 
     def at_drives(self, changes: np.ndarray) -> Contribution:
         """Contribution of changes (n, K) of the actuator values, in their units."""
-        return self.at({drive.site: np.multiply.outer(changes[:, k], drive.twist) for k, drive in self._drives})
+        return self._at_values(self.robot.parts.drives, changes)
+
+    def at_followers(self, changes: np.ndarray) -> Contribution:
+        """Contribution of changes (n, f) of the joints that follow drives, in their units."""
+        return self._at_values(self.robot.parts.followers, changes)
+
+    def _at_values(self, drives: Iterable[Any], changes: np.ndarray) -> Contribution:
+        """Contribution of changes (n, k) of the values of Drives."""
+        twists: dict[str, Any] = {}
+        for k, drive in enumerate(drives):
+            for site, twist in drive.twists.items():
+                twists[site] = twists.get(site, 0.0) + np.multiply.outer(changes[:, k], twist)
+        return self.at(twists)
 
     def along(self, groups: Iterable[tuple[str, ...]], shifts_mm: np.ndarray) -> Contribution:
         """Contribution of shifts (n or 1, groups) in mm along the x of every site of each group."""
@@ -78,11 +92,6 @@ class Motion:
         for site, one in twists.items():
             result[:, numbers[site]] += one
         return Contribution(result)
-
-    @property
-    def _drives(self) -> Iterable[tuple[int, Any]]:
-        """Numbers of the actuator values and the robot's Drives."""
-        return enumerate(self.robot.parts.drives)
 
 
 @dataclass(frozen=True)
@@ -137,18 +146,18 @@ def leg_parameters(source: str, *kinds: tuple[str, str, float, float], count: in
     )
 
 
-def drive_parameters(robot: Any, source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
-    """Parameters of each drive of a robot; kinds: (name, {drive's unit: (unit, low, high)}), source by drive's unit."""
+def drive_parameters(drives: Iterable[Any], source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
+    """Parameters of each Drive; kinds: (name, {drive's unit: (unit, low, high)}), source by drive's unit."""
     return tuple(
         Parameter(f"{name}{number}", *_bounds(by_unit[drive.unit]), source[drive.unit], number)
-        for number, drive in enumerate(robot.parts.drives, 1)
+        for number, drive in enumerate(drives, 1)
         for name, by_unit in kinds
     )
 
 
-def of_drives(robot: Any, by_unit: Mapping[str, float]) -> np.ndarray:
-    """One number (K,) of each drive of a robot by the drive's unit."""
-    return np.array([by_unit[drive.unit] for drive in robot.parts.drives])
+def of_drives(drives: Iterable[Any], by_unit: Mapping[str, float]) -> np.ndarray:
+    """One number (K,) of each Drive by the drive's unit."""
+    return np.array([by_unit[drive.unit] for drive in drives])
 
 
 def _bounds(allowed: tuple[str, float, float]) -> tuple[str, float, float, float]:

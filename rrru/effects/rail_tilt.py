@@ -10,7 +10,7 @@ vertical, lean an upright one to the side. The carriage at the distance b_k from
 which grows along the rail: what tells it from the zero error of a slider. It enters as a twist at the legs'
 feet, nine numbers of which six do something, and is linear in them.
 
-Assumptions: straight rail, true at its zero mark; joints that lean with their rail, so that the platform turns;
+Assumptions: straight rail, true at its zero mark; joints on the carriage that lean with it, so that the platform turns;
 constant over the campaign.
 
 Source: geometry; squareness and parallelism of guides as in Slocum, Precision Machine Design, 1992. Typical size

@@ -8,9 +8,9 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.fit.least_squares import last_kept
-from rrru.robots.closure import Poses
 from rrru.robots.readings import Readings, lacking
 from rrru.robots.robot import Robot
+from rrru.robots.walk import Poses
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,15 @@ from rrru.errors import ConfigError
 from rrru.objects import load_object
 from rrru.robots.delta import Delta
 from rrru.robots.free_motion import free_motions
+from rrru.robots.from_dh import from_dh
 from rrru.robots.general import GeneralRobot
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.robot import Robot
 from rrru.robots.rrru3 import Rrru3
 
 MECHANISMS: dict[str, Any] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
-# keys of an entry that describes a robot of the user's own
-_OWN = ("urdf", "mjcf", "module")
+# keys of which one is in an entry that describes a robot of the user's own
+_OWN = ("urdf", "mjcf", "dh", "module")
 
 
 def tracked_set(name: str) -> str:
@@ -38,7 +39,9 @@ def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Rob
     if any(key in section for key in _OWN):
         return _own(name, dict(section), options)
     if name not in MECHANISMS:
-        raise ConfigError(f"unknown robot {name!r}; known: {', '.join(MECHANISMS)}, or one with urdf, mjcf or module")
+        raise ConfigError(
+            f"unknown robot {name!r}; known: {', '.join(MECHANISMS)}, or one with urdf, mjcf, dh or module"
+        )
     kind = MECHANISMS[name]
     section = {
         key.replace("_deg", "_rad"): float(np.radians(value)) if key.endswith("_deg") else value
@@ -52,7 +55,7 @@ def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Rob
 
 
 def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robot:
-    """A robot of the user's own from a URDF or MJCF file or a Python module."""
+    """A robot of the user's own from a URDF or MJCF file, DH rows or a Python module."""
     tool: dict[str, Any] = {"tool_mm": tuple(section.pop("tool_mm"))} if "tool_mm" in section else {}
     if "module" in section:
         robot = load_object(f"robot {name}", section["module"])()
@@ -61,6 +64,8 @@ def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robo
         if free := free_motions(robot.legs, robot.up):
             raise ConfigError(f"robot {name}: its platform is free to {'; '.join(free)}; allowed: legs that hold it")
         return replace(robot, name=name, **tool, **options)
+    if "dh" in section:
+        return from_dh(section.pop("dh"), **section, name=name, **tool, **options)
     from rrru.robots import from_file
 
     read, key = (from_file.from_urdf, "urdf") if "urdf" in section else (from_file.from_mjcf, "mjcf")

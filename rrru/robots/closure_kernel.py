@@ -111,16 +111,16 @@ def _draw_together(slots, frames, motions, drives, twists, active, links):
 
 
 @_part
-def _chain(links, screws, values, platform, frame, basis, lack):
-    """A chain walked to its end: its joints' screws (k, 6) in space and the small twist from the platform to there."""
+def _chain(links, screws, values, numbers, platform, frame, basis, lack):
+    """A chain walked to its end: its joints' screws (q, 6) in space and the small twist from the platform to there."""
     _begin(frame)
-    for j in range(len(values)):
+    for j in range(len(numbers)):
         _append(frame, links[j])
-        v, w = _displace(frame, screws[j], values[j])
+        v, w = _displace(frame, screws[j], values[numbers[j]])
         moment = _cross(_triple(frame[3]), w)
         for c in range(3):
             basis[j, c], basis[j, 3 + c] = screws[j, 6] * (moment[c] + v[c]) / ARM_MM, screws[j, 6] * w[c]
-    _append(frame, links[len(values)])
+    _append(frame, links[len(numbers)])
     x = y = z = 0.0
     for i in range(3):
         turn = _cross(_triple(platform[i]), _triple(frame[i]))
@@ -132,18 +132,17 @@ def _chain(links, screws, values, platform, frame, basis, lack):
 
 
 @_part
-def _count_chain(equations, basis, lack, first, last):
+def _count_chain(equations, k, basis, lack, numbers):
     """A chain's square added to the equations."""
-    k = len(basis)
     for c in range(6):
         equations[k + c, k + c] += 1.0
         equations[k + c, k + 6] += lack[c]
-    for j in range(first, last):
+    for j in range(len(numbers)):
         for c in range(6):
-            equations[j, k + c] = -basis[j, c]
-        for i in range(j, last):
-            equations[j, i] = _dot(basis[j], basis[i])
-        equations[j, k + 6] = -_dot(basis[j], lack)
+            equations[numbers[j], k + c] -= basis[j, c]
+        for i in range(j, len(numbers)):
+            equations[numbers[j], numbers[i]] += _dot(basis[j], basis[i])
+        equations[numbers[j], k + 6] -= _dot(basis[j], lack)
 
 
 @_part
@@ -209,10 +208,10 @@ def _advance(platform, values, turning, step):
 
 
 @_inside
-def _newton(ends, bars, screws, turning, drives, twists, links, state, work):
+def _newton(ends, bars, screws, numbers, turning, drives, twists, links, state, work):
     """Newton of one point, in place; returns the size of its last step in mm."""
     (platform, values, lacks), (frame, basis, equations) = state, work
-    k, size = len(screws), np.inf
+    k, size = len(turning), np.inf
     for _ in range(MOST_STEPS):
         equations[:] = 0.0
         for leg in range(len(ends)):
@@ -222,9 +221,9 @@ def _newton(ends, bars, screws, turning, drives, twists, links, state, work):
                 change = twists[bar, 0] + (drives[drive] if drive >= 0 else 0.0)
                 lacks[leg, 0] = _count_bar(equations, k, bars[leg], links[link, 3], platform, twists[end], change)
             else:
-                own, lack = basis[first:last], lacks[leg]
-                _chain(links[link:], screws[first:last], values[first:last], platform, frame, own, lack)
-                _count_chain(equations, basis, lack, first, last)
+                own, lack, joints = basis[first:last], lacks[leg], numbers[first:last]
+                _chain(links[link:], screws[first:last], values, joints, platform, frame, own, lack)
+                _count_chain(equations, k, own, lack, joints)
         _resolve(equations)
         size = _advance(platform, values, turning, equations[:, k + 6])
         if not size >= TOLERANCE_MM:
@@ -241,10 +240,10 @@ def solve(tables, room, drives, twists, active, platform, passive, sizes, lacks)
     sizes (n,) of the last steps in mm, angles counted at the arm, and what the legs lacked before, lacks (n, legs, 6):
     a bar's length first, a chain's twist. Points without a pose are left anywhere.
     """
-    slots, frames, motions, ends, bars, screws, turning = tables
+    slots, frames, motions, ends, bars, screws, numbers, turning = tables
     links, work = room[0], room[1:]
     for n in range(len(platform)):
         own, drive = twists[n % len(twists)], drives[n]
         _draw_together(slots, frames, motions, drive, own, active, links)
         state = platform[n], passive[n], lacks[n]
-        sizes[n] = _newton(ends, bars, screws, turning, drive, own, links, state, work)
+        sizes[n] = _newton(ends, bars, screws, numbers, turning, drive, own, links, state, work)

@@ -10,20 +10,21 @@ _CLOSED_MM = 1e-7
 
 
 def tables(legs, spare):
-    """Arrays of Legs with m joints, counted once per leg that has them, and k passive ones; -1 where there is none.
+    """Arrays of Legs with m joints, q of them passive, counted once per leg that has them; -1 where there is none.
 
     slots (m + legs, 3): of every joint, and of what follows a leg's last one, the site, the drive and whether a link
     ends there; frames (m + legs, 4, 3): the placement before it, rows its axes and its place; motions (m + legs, 6):
-    the twist of its motion; ends (legs, 7): a leg's first link, first passive number, one past its last, whether a bar
-    ends it, the bar's drive and both sites; bars (legs, 4): length and platform point; screws (k, 7): the twists of the
-    passive joints' motions and 1, or 0 for those that keep their value, spare (k,); turning (k,): whether they turn.
-    Raises ConfigError for a passive joint before a bar.
+    the twist of its motion; ends (legs, 7): a leg's first link, its first of the q, one past its last, whether a bar
+    ends it, the bar's drive and both sites; bars (legs, 4): length and platform point; screws (q, 7): the twists of the
+    passive joints' motions and 1, or 0 for those that keep their value, `spare` their names; values (q,): the number of
+    the value of each; turning (k,): whether the joint of a value turns. Raises ConfigError for a passive joint before a
+    bar.
     """
-    slots, frames, motions, ends, bars, passive = [], [], [], [], [], 0
+    slots, frames, motions, ends, bars, screws, values = [], [], [], [], [], [], []
     for number, leg in enumerate(legs.legs):
-        count = sum(joint.passive for joint in leg.joints)
-        if leg.bar and count:
-            raise ConfigError(f"{leg.name}: {count} of the joints before its bar are passive; allowed: none")
+        passive = [joint for joint in leg.joints if joint.passive]
+        if leg.bar and passive:
+            raise ConfigError(f"{leg.name}: {len(passive)} of the joints before its bar are passive; allowed: none")
         for joint in leg.joints:
             drive = -1 if joint.kind == "fixed" or joint.drive is None else joint.drive
             slots.append((legs.site_numbers[joint.name], drive, joint.passive))
@@ -32,12 +33,17 @@ def tables(legs, spare):
         slots.append((-1, -1, True))
         frames.append(np.vstack([leg.end_turn.T, np.zeros(3)]))
         motions.append(np.zeros(6))
-        ends.append((passive + number, passive, passive + count, *_bar_numbers(legs, leg)))
+        first, last = len(screws), len(screws) + len(passive)
+        ends.append((first + number, first, last, *_bar_numbers(legs, leg)))
         bars.append(np.r_[leg.bar.length_mm, leg.bar.platform_mm] if leg.bar else np.zeros(4))
-        passive += count
-    screws = np.array([[*_motion(joint), not kept] for joint, kept in zip(legs.passive_joints, spare, strict=True)])
+        screws += [[*_motion(joint), joint.name not in spare] for joint in passive]
+        values += [legs.passive_numbers[joint.name] for joint in passive]
     turning = np.array([joint.kind == "R" for joint in legs.passive_joints], dtype=bool)
-    return (*(np.array(part) for part in (slots, frames, motions, ends, bars)), screws.reshape(-1, 7), turning)
+    parts = (
+        *(np.array(part) for part in (slots, frames, motions, ends, bars)),
+        np.reshape(screws, (-1, 7)).astype(float),
+    )
+    return *parts, np.array(values, dtype=np.int64), turning
 
 
 def _motion(joint):
@@ -58,8 +64,8 @@ def closed(tables, actuators, start, twists, all_met):
     twists: Twists at n points or one; all_met: whether all constraints can be met, not only by least squares. What is
     left is inf where actuator values or start are not known. Raises ValueError where shapes do not fit.
     """
-    slots, _, _, ends, _, screws, _ = tables
-    n, k, legs, most = len(actuators), len(screws), len(ends), max(slots[:, 1].max(), ends[:, 4].max())
+    slots, _, _, ends, _, screws, _, turning = tables
+    n, k, legs, most = len(actuators), len(turning), len(ends), max(slots[:, 1].max(), ends[:, 4].max())
     if len(twists.values) not in (1, n) or np.ndim(actuators) != 2 or np.shape(actuators)[1] <= most:
         raise ValueError(
             f"actuator values {np.shape(actuators)}, twists at {len(twists.values)} points; allowed: (n, {most + 1}) "
@@ -74,7 +80,7 @@ def closed(tables, actuators, start, twists, all_met):
     known = np.all([np.isfinite(one).all(axis=tuple(range(1, one.ndim))) for one in state], axis=0)
     drives, platform, passive = state
     # links, a frame, screws and equations of one point after the other
-    room = tuple(np.empty(shape) for shape in ((k + legs, 4, 3), (4, 3), (k, 6), (k + 6, k + 8)))
+    room = tuple(np.empty(shape) for shape in ((len(screws) + legs, 4, 3), (4, 3), (len(screws), 6), (k + 6, k + 8)))
     values, active = np.require(twists.values, float, ["C", "W"]), np.zeros(twists.values.shape[1], dtype=bool)
     active[list(twists.active)] = True
     left, lacks = np.empty(n), np.zeros((n, legs, 6))

@@ -26,9 +26,9 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.parameters import LEGS
 from rrru.robots.dynamics import arm_load
-from rrru.robots.legs import Bar, Joint, Leg, Legs, Parts, X, Y, Z, turn_about
+from rrru.robots.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
-from rrru.robots.tripod import Tripod
+from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
 # columns of the legs' numbers: what the drive's angle adds to, l1, l2, a
 _OWN = of_each_leg("dtheta", 0, "rad"), of_each_leg("dl1_", 1), of_each_leg("dl2_", 2), of_each_leg("da_", 3)
@@ -53,6 +53,7 @@ class Delta(Tripod):
 
     LINK = 2
     TRACKED = "tied"
+    RICHEST = "legs"
     DIMENSIONS = ("l1_mm", "l2_mm", "a_mm", "platform_mm", "spacing_mm")
     DEVIATIONS = _OWN[0] | _OWN[1] | _OWN[2] | _OWN[3] | _COMMON
     PARAMETER_NAMES: ClassVar = {
@@ -65,12 +66,11 @@ class Delta(Tripod):
         *((("drive", 4, 1.0),), (("elbow", 0, 1.0),)),
         *((("a bar", 0, 1.0), ("b bar", 0, 1.0)), (("foot", 0, 1.0),)),
     )
-    _BARS = tuple(zip(of_three_legs("a bar"), of_three_legs("b bar"), strict=True))
     parts = Parts(
         drives=three_drives("rad", 4),
         feet=of_three_legs("foot"),
-        links={"dL1_leg": of_each("elbow"), "dL3_leg": _BARS},
-        members=_BARS,
+        links={"dL1_leg": of_each("elbow"), "dL3_leg": BARS},
+        members=BARS,
     )
 
     def __post_init__(self):
@@ -102,10 +102,7 @@ class Delta(Tripod):
                 Joint(f"leg {leg} drive", "R", Y, drive=leg - 1),
                 Joint(f"leg {leg} elbow", shift_mm=self.l1_mm * X),
             )
-            for name, side in (("a", -0.5 * self.spacing_mm), ("b", 0.5 * self.spacing_mm)):
-                ball = Joint(f"leg {leg} {name} ball", shift_mm=side * Y)
-                bar = Bar(self.l2_mm, root @ (self.platform_mm * X + side * Y))
-                bars.append(Leg(f"leg {leg} {name}", (*arm, ball), bar=bar))
+            bars += pair_of_bars(leg, arm, root, (self.l2_mm, self.platform_mm, self.spacing_mm))
         return Legs(tuple(bars), np.zeros(3))
 
     @property
@@ -148,8 +145,3 @@ class Delta(Tripod):
     def own_load(self, masses, theta_rad, _rate, acceleration, _poses):
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
         return arm_load(masses, self.l1_mm, theta_rad, acceleration)
-
-    def constraint_moments(self, position_mm, theta_rad, deviations=None):
-        """Unit directions (n, 3 legs, 3) about which each leg's parallelogram keeps the platform from turning."""
-        across = np.cross(self.tangent, self.link_directions(position_mm, theta_rad, deviations))
-        return across / np.linalg.norm(across, axis=-1, keepdims=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.robots.closure import Poses, Twists, bar_ends, walk
+from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
 
 def drive_step(at, ranks, lack_mm, turning_rad):

@@ -74,12 +74,14 @@ def arm_load(masses, arm_mm, theta_rad, acceleration):
 class Loads:
     """Forces (n, members) in N of the members on the platform, compression positive, held_n if friction holds joints.
 
-    drive (n, K): load on each drive in N mm or N, positive in the drive's sense.
+    drive (n, K): load on each drive in N mm or N, positive in the drive's sense; followers (n, f): on the joints that
+    follow drives, likewise.
     """
 
     member_n: np.ndarray
     held_n: np.ndarray
     drive: np.ndarray
+    followers: np.ndarray
 
 
 def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s2, payload_kg):
@@ -93,7 +95,10 @@ def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s
     member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
     held = _held(robot, at, force) if robot.parts.held_from else member
     own = robot.own_load(masses, np.asarray(actuators, dtype=float), *drive_motion, at.poses)
-    return Loads(member, held, np.einsum("nak,na->nk", at.drive_response, force) + own)
+    driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force) + own
+    numbers = {joint.name: joint.drive for joint in robot.legs.joints}
+    followers = [numbers[one.site] for one in robot.parts.followers]
+    return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers])
 
 
 def _along_members(robot, at, load):

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.robots.closure import Twists, rank_of, screw, walk
 from rrru.robots.from_seams import Move, placed
-from rrru.robots.legs import TOOL, WORLD, Bar, Joint, Leg, Z
+from rrru.robots.legs import TOOL, WORLD, Bar, Joint, Leg, Z, turn_about
 from rrru.robots.lumps import PLATFORM
+from rrru.robots.walk import Twists, walk
+from rrru.robots.wrenches import groups_of, rank_of, screw
 
 # axes meet in a point and a slide goes along a line to within this, in mm and rad
 _MEET_MM, _ALONG = 1e-6, 1e-9
@@ -28,13 +29,16 @@ class Place:
 
 
 class Chains:
-    """The legs of an Assembly as chains of joints, `driven` those of MuJoCo's numbers, in the order of the drives.
+    """The legs of an Assembly as chains of joints.
+
+    driven: MuJoCo's numbers of joints in the order of the driven values; offsets: by joint what is added to its value.
 
     legs: the chains; assembly; parts: Places by part; sites: of the Moves, by their names.
     """
 
-    def __init__(self, assembly, driven):
+    def __init__(self, assembly, driven, offsets):
         self.assembly, self._drives = assembly, {joint: number for number, joint in enumerate(driven)}
+        self._offsets = offsets
         names = [f"leg {k}" for k in range(1, len(assembly.paths) + 1)] if len(assembly.paths) > 1 else ["arm"]
         self._taken = {WORLD, TOOL, PLATFORM, *(f"{name} {end}" for name in names for end in ("ball", "bar", "end"))}
         self._made, self.parts, self.legs = {}, {}, ()
@@ -83,6 +87,8 @@ class Chains:
             own = placement @ placed(turn=turn)
             drive = self._drives.get(move.joint)
             axis = move.axis if np.array_equal(turn, np.eye(3)) else Z
+            if offset := self._offsets.get(move.joint, 0.0):
+                own = own @ (placed(turn=turn_about(axis, offset)) if move.kind == "R" else placed(offset * axis))
             home = 0.0 if drive is not None else move.home
             self._made[key] = Joint(self.sites[move.name], move.kind, axis, own[:3, 3], own[:3, :3], drive, home)
         return self._made[key], placed(turn=turn.T)
@@ -98,20 +104,20 @@ class Chains:
             if len({id(joint) for _, joint in legs}) > 1:
                 text = f"joint {name} is in {by}, behind different joints; allowed: legs that part once and meet at the"
                 raise self.assembly.error(f"{text} platform")
-            if len(legs) > 1 and legs[0][1].passive:
-                raise self.assembly.error(f"passive joint {name} is shared by {by}; allowed: a driven one")
 
 
 def with_bars(legs):
     """The legs of Legs, those that end in bars as such, at the home pose."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
+    ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
+    alone = {group[0] for group in groups_of(legs) if len(group) == 1}
     return tuple(
-        _with_bar(leg, walk(legs, leg, actuators, passive, Twists(legs)), legs.home_drives) for leg in legs.legs
+        _with_bar(leg, ways[k], legs.driven(actuators)[0]) if k in alone else leg for k, leg in enumerate(legs.legs)
     )
 
 
 def _with_bar(leg, way, drives):
-    """A leg as one that ends in a bar, if it does; way: its Walk at the actuator values `drives`."""
+    """A leg as one that ends in a bar, if it does; way: its Walk at the driven values `drives`."""
     first = next((k for k, joint in enumerate(leg.joints) if joint.passive), None)
     tail = range(first or 0, len(leg.joints) - 1)
     slides = [k for k in tail if leg.joints[k].kind == "P"]

@@ -15,15 +15,17 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import from_urdf as urdf_files
-from rrru.robots.closure import Closure, Poses, Twists, bar_ends, walk
+from rrru.robots.closure import Closure
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.free_motion import free_motions
 from rrru.robots.from_chains import Chains, with_bars
+from rrru.robots.from_couplings import coupling, of_equalities, of_mimics
 from rrru.robots.from_lumps import lumps_of
 from rrru.robots.from_mjcf import MM, Assembly
 from rrru.robots.from_seams import undone
 from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Drive, Legs, Parts, unit_twist
+from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
 # a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
 # where more joints than needed do not fit each other; below the last it is not closed at all
@@ -37,9 +39,9 @@ _TRN = mujoco.mjtTrn
 def from_urdf(path, base=None, tip=None, home=None, **options):
     """The GeneralRobot of a URDF's chain from the link base, by default the root, to the link tip, the only last one.
 
-    All joints between them are driven. home: values by joint of the home pose in rad or mm, by default 0, or the middle
-    of a range without it; options: of GeneralRobot. The frames are the links'. Raises ConfigError for what cannot be
-    read.
+    All joints between them are driven, but for those that mimic others. home: values by driven joint of the home pose
+    in rad or mm, by default 0, or the middle of a range without it; options: of GeneralRobot. The frames are the
+    links'. Raises ConfigError for what cannot be read.
     """
     file = _existing(path)
     urdf = urdf_files.read(file)
@@ -49,24 +51,31 @@ def from_urdf(path, base=None, tip=None, home=None, **options):
     outside = model.jnt_limited.astype(bool) & ((low > 0.0) | (high < 0.0))
     qpos[address[outside]] = 0.5 * (low + high)[outside]
     for name, value in (home or {}).items():
-        if name not in known:
-            raise ConfigError(f"{file}: home has {name!r}; allowed: {', '.join(known)}")
+        if name not in known or name in urdf.mimics:
+            drives = ", ".join(one for one in known if one not in urdf.mimics)
+            raise ConfigError(f"{file}: home has {name!r}; allowed: {drives}")
         slides = model.jnt_type[known[name]] == mujoco.mjtJoint.mjJNT_SLIDE
         qpos[address[known[name]]] = value / MM if slides else value
+    for name, (driver, factor, offset) in urdf.mimics.items():
+        if driver in known:
+            qpos[address[known[name]]] = factor * qpos[address[known[driver]]] + offset
     assembly = Assembly(model, file, first, last, qpos)
     for move in assembly.moves.values():
         link = model.body(model.jnt_bodyid[move.joint]).name
         if link in urdf.odd:
             raise assembly.error(urdf.odd[link])
-    return _robot(assembly, {move.joint: [] for move in assembly.moves.values()}, options)
+    follows = of_mimics(assembly, urdf.mimics)
+    servos = {move.joint: [] for move in assembly.moves.values() if move.joint not in follows}
+    return _robot(assembly, servos, follows, options)
 
 
 def from_mjcf(path, platform, **options):
     """The GeneralRobot whose platform is a body of an MJCF, held by chains of bodies and by connects and welds.
 
-    Joints with actuators are driven. The home pose is that of the first keyframe, else of the reference configuration;
-    loops that are open there by less than a millimetre are closed. options: of GeneralRobot. The platform's frame is
-    its body's. Raises ConfigError for what cannot be read or is no robot.
+    Joints with actuators are driven, and so are those that follow them by a joint equality. The home pose is that of
+    the first keyframe, else of the reference configuration; loops that are open there by less than a millimetre are
+    closed. options: of GeneralRobot. The platform's frame is its body's. Raises ConfigError for what cannot be read or
+    is no robot.
     """
     file = _existing(path)
     try:
@@ -80,7 +89,8 @@ def from_mjcf(path, platform, **options):
         raise ConfigError(f"{file}: platform is {platform!r}; allowed: {', '.join(name for name in names if name)}")
     home = model.key_qpos[0] if model.nkey else model.qpos0
     assembly = Assembly(model, file, 0, model.body(platform).id, home)
-    return _robot(assembly, _servos(assembly), options)
+    servos = _servos(assembly)
+    return _robot(assembly, servos, of_equalities(assembly, servos), options)
 
 
 def _existing(path):
@@ -126,8 +136,8 @@ def _moved_by(model, k):
     return None
 
 
-def _robot(assembly, servos, options):
-    """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them."""
+def _robot(assembly, servos, follows, options):
+    """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, follows by joint."""
     known = {one.name for one in fields(GeneralRobot) if one.init} - {"legs", "parts", "lumps"}
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
@@ -135,11 +145,13 @@ def _robot(assembly, servos, options):
         raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
     if not servos:
         raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
-    chains, home = Chains(assembly, servos), undone(assembly.home_of(assembly.base))
+    offsets = {joint: one.offset for joint, one in follows.items()}
+    chains, home = Chains(assembly, [*servos, *follows], offsets), undone(assembly.home_of(assembly.base))
     pose = home @ assembly.home_of(assembly.platform)
-    driven = [next(m for m in assembly.moves.values() if m.joint == joint) for joint in servos]
+    every = [next(m for m in assembly.moves.values() if m.joint == joint) for joint in (*servos, *follows)]
+    driven = every[: len(servos)]
     values = np.array([move.home for move in driven])
-    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3])
+    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3], coupling=coupling(servos, follows))
     gravity = home[:3, :3] @ assembly.model.opt.gravity
     up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
     legs = _closed(assembly, replace(open_legs, legs=with_bars(open_legs)), options.get("up", up))
@@ -147,8 +159,8 @@ def _robot(assembly, servos, options):
     arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
     defaults = {"name": assembly.file.stem, "up": up} | ({"angle_arm_mm": arm} if arm else {})
     ranges = np.array([_range(assembly, move, servos[move.joint]) for move in driven])
-    drives = tuple(_drive(legs, number, move, chains.sites[move.name]) for number, move in enumerate(driven))
-    parts = Parts(drives=drives, members=tuple((leg.bar_sites[0],) for leg in bars))
+    drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(every)])
+    parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
     own = {"legs": legs, "parts": parts, "drive_range": ranges, "lumps": lumps_of(chains, open_legs, legs)}
     return GeneralRobot(**defaults | own | options)
 
@@ -167,8 +179,19 @@ def _range(assembly, move, servos):
     return unit * low, unit * high
 
 
+def _drives(legs, each):
+    """The Drives, and those of the followers, from one for each driven value that knows no other."""
+    if legs.coupling is None:
+        return tuple(each), ()
+    drives = []
+    for number, column in enumerate(legs.coupling.T):
+        others = {each[k].site: by * each[k].twist for k, by in enumerate(column) if by and k != number}
+        drives.append(replace(each[number], others=others))
+    return tuple(drives), tuple(each[len(drives) :])
+
+
 def _drive(legs, number, move, site):
-    """The Drive of a driven Move."""
+    """The Drive of a driven value's Move, without what follows it."""
     unit = _UNITS[move.kind]
     for leg in legs.legs:
         if leg.bar and leg.bar.drive == number:
@@ -199,7 +222,7 @@ def _closed(assembly, legs, up):
         replace(leg, joints=tuple(replace(j, home=homes[j.name]) if j.passive else j for j in leg.joints))
         for leg in legs.legs
     )
-    return Legs(chains, legs.home_drives, poses.position_mm[0], poses.turn[0])
+    return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
 
 
 def _gaps(legs, poses):

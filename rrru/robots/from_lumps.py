@@ -10,12 +10,12 @@ Lengths in mm, masses in kg.
 
 import numpy as np
 
-from rrru.robots.closure import Twists, walk
 from rrru.robots.from_mjcf import MM
 from rrru.robots.from_seams import placed, turn_of, undone
 from rrru.robots.from_urdf import NO_MASS_KG
 from rrru.robots.legs import turn_about
 from rrru.robots.lumps import PLATFORM, Lump
+from rrru.robots.walk import Twists, walk
 
 
 def points_of(model, body):
@@ -84,7 +84,7 @@ def _of_bar(open_legs, legs, place, mass, at):
 def _behind(legs, chain, way, number):
     """Placement behind the motion of a joint of a chain in the home pose, way: its Walk."""
     joint, turn, place = chain.joints[number], way.turns[number][0], way.places[number][0]
-    value = joint.home if joint.drive is None else legs.home_drives[joint.drive]
+    value = joint.home if joint.drive is None else legs.driven(legs.home_drives)[joint.drive]
     if joint.kind == "P":
         place = place + value * way.axes[number][0]
     return placed(place, turn @ turn_about(joint.axis, value) if joint.kind == "R" else turn)

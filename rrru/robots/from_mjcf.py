@@ -37,13 +37,10 @@ class Assembly:
         self._names = set()
         connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
         self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
-        own = {move.joint for move in self.moves.values()}
         for k, kind in kinds.items():
-            coupled = {int(model.eq_obj1id[k]), int(model.eq_obj2id[k])}
-            elsewhere = kind == _EQ.mjEQ_JOINT and not coupled & own
-            if kind not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD) and not elsewhere:
+            if kind not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD, _EQ.mjEQ_JOINT):
                 name = _EQ(kind).name.removeprefix("mjEQ_").lower()
-                raise self.error(f"equality {self._eq_name(k)} is of the kind {name}; allowed: connect, weld")
+                raise self.error(f"equality {self.eq_name(k)} is of the kind {name}; allowed: connect, weld, joint")
 
     def error(self, text):
         """The ConfigError of a text about the file."""
@@ -59,7 +56,7 @@ class Assembly:
         number = joint - int(self.model.body_jntadr[body]) + 1
         return self.model.joint(joint).name or f"{self.body_name(body)} joint {number}"
 
-    def _eq_name(self, k):
+    def eq_name(self, k):
         """Name of an equality."""
         return self.model.eq(k).name or f"equality {k + 1}"
 
@@ -141,7 +138,7 @@ class Assembly:
             if near > far:
                 near, far, near_mm, far_mm = far, near, far_mm, near_mm
             if near != far:
-                groups.setdefault((near, far), []).append((self._eq_name(k), near_mm, far_mm))
+                groups.setdefault((near, far), []).append((self.eq_name(k), near_mm, far_mm))
         return [Seam(near, far, tuple(self._connect_items(near, far, group))) for (near, far), group in groups.items()]
 
     def _connect_items(self, near, far, group):

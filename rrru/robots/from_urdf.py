@@ -20,13 +20,15 @@ _ALLOWED = ("revolute", "continuous", "prismatic", "fixed")
 class Urdf:
     """A compiled URDF.
 
-    children: links by their parent; parents: link by its child; odd: by child link what is wrong with its joint.
+    children: links by their parent; parents: link by its child; odd: by child link what is wrong with its joint;
+    mimics: by joint's name the joint that it follows, factor and offset.
     """
 
     model: mujoco.MjModel
     children: dict
     parents: dict
     odd: dict
+    mimics: dict
 
 
 def read(file):
@@ -37,7 +39,7 @@ def read(file):
         raise ConfigError(f"{file}: {error}; allowed: a URDF") from None
     if robot.tag != "robot" or any("xacro" in element.tag for element in robot.iter()):
         raise ConfigError(f"{file}: its root is {robot.tag!r}; allowed: a URDF's robot, without xacro's macros")
-    children, parents, odd = {}, {}, {}
+    children, parents, odd, mimics = {}, {}, {}, {}
     for link in robot.iter("link"):
         children.setdefault(link.get("name"), [])
         for shape in (*link.findall("visual"), *link.findall("collision")):
@@ -49,9 +51,20 @@ def read(file):
         if joint.get("type") not in _ALLOWED:
             odd[child] = f"joint {joint.get('name')} is of the type {joint.get('type')}; allowed: {', '.join(_ALLOWED)}"
         for mimic in joint.findall("mimic"):
-            odd[child] = f"joint {joint.get('name')} mimics {mimic.get('joint')}; allowed: joints with own drives"
+            mimics[joint.get("name")] = mimic.get("joint"), *_numbers(joint, mimic, file)
             joint.remove(mimic)
-    return Urdf(_compiled(ElementTree.tostring(robot, encoding="unicode"), file), children, parents, odd)
+    return Urdf(_compiled(ElementTree.tostring(robot, encoding="unicode"), file), children, parents, odd, mimics)
+
+
+def _numbers(joint, mimic, file):
+    """Factor and offset of a mimic."""
+    given = {key: mimic.get(key, default) for key, default in (("multiplier", "1"), ("offset", "0"))}
+    for key, text in given.items():
+        try:
+            yield float(text)
+        except ValueError:
+            text = f"the {key} of joint {joint.get('name')}'s mimic is {text!r}"
+            raise ConfigError(f"{file}: {text}; allowed: a number") from None
 
 
 def _compiled(text, file):

@@ -17,7 +17,7 @@ from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import Legs, Parts
-from rrru.robots.lumps import drive_loads
+from rrru.robots.lumps import driven_loads
 from rrru.robots.robot import Robot
 
 SETS = ("zero", "full")
@@ -52,7 +52,7 @@ class GeneralRobot(Robot):
     among: tuple[str, ...] = ()
     reads: Reads = field(default_factory=Reads)
 
-    TRACKED = "full"
+    TRACKED = RICHEST = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
 
     def __post_init__(self):
@@ -216,9 +216,9 @@ class GeneralRobot(Robot):
         return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
     def own_load(self, _masses, actuators, rate, acceleration, poses):
-        """Loads (n, K) on the drives, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
+        """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
         motion = actuators, rate, acceleration
-        return drive_loads(self, motion, poses, gravity(self)) if self.lumps else np.zeros(np.shape(actuators))
+        return driven_loads(self, motion, poses, gravity(self)) if self.lumps else 0.0
 
     @property
     def workspace_lines(self):
@@ -229,7 +229,7 @@ class GeneralRobot(Robot):
     def _bars_only(self):
         """Whether every drive is a bar's length."""
         bars = [leg.bar.drive for leg in self.legs.legs if leg.bar]
-        return None not in bars and len(bars) == len(self.parts.drives)
+        return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
 
     @cached_property
     def _freedoms(self):

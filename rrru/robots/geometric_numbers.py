@@ -49,7 +49,7 @@ def candidates_of(legs, parts, reads=None):
     """
     reads = reads or Reads()
     drives = [
-        Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, {drive.site: drive.twist})
+        Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, drive.twists)
         for number, drive in enumerate(parts.drives, 1)
     ]
     taken = {(drive.site, int(np.abs(drive.twist).argmax())) for drive in parts.drives}

@@ -3,14 +3,14 @@
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
-by legs: the two bars of a Delta's arm share its drive.
+by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint.
 
 Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
 (the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
 own, the last ones the platform's. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,8 +27,8 @@ class Joint:
     """One joint and the link before it.
 
     kind: "R" turns about, "P" slides along `axis` (3,), "fixed" only makes a site; shift_mm (3,) and turn (3, 3): its
-    frame in the frame behind the joint before it; drive: the number of its actuator value, counted from 0, None for a
-    passive joint; home: value of a passive joint from which searches start.
+    frame in the frame behind the joint before it; drive: the number of its driven value, see `Legs`, counted from 0,
+    None for a passive joint; home: value of a passive joint from which searches start.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Joint:
 class Bar:
     """A link of length_mm between ball joints, from the last joint's frame to the point platform_mm (3,).
 
-    drive: number of the actuator value that adds to its length, None for a link that keeps it.
+    drive: number of the driven value that adds to its length, None for a link that keeps it.
     """
 
     length_mm: float
@@ -87,7 +87,8 @@ class Legs:
     """All legs of a robot, and the sites and values that they make.
 
     home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
-    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured.
+    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured; coupling
+    (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same.
     """
 
     legs: tuple[Leg, ...]
@@ -95,6 +96,7 @@ class Legs:
     home_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
     home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
     reflectors: tuple[str, ...] = ()
+    coupling: np.ndarray | None = None
 
     def __post_init__(self):
         owner = {}
@@ -103,9 +105,9 @@ class Legs:
                 before = leg.joints[:number]
                 if owner.setdefault(joint.name, (joint, before)) != (joint, before):
                     raise ConfigError(f"joint {joint.name} of {leg.name}: another leg has it behind other joints")
-        shared = [j.name for j in self.passive_joints if sum(j in leg.joints for leg in self.legs) > 1]
-        if shared:
-            raise ConfigError(f"passive joint {shared[0]} is shared by several legs; allowed: driven ones")
+        if self.coupling is not None and len(self.coupling) != len(self.driven_kinds):
+            rows = f"{len(self.coupling)} rows for {len(self.driven_kinds)} driven values"
+            raise ConfigError(f"the coupling has {rows}; allowed: one each")
 
     @cached_property
     def joints(self):
@@ -118,10 +120,25 @@ class Legs:
         return tuple(joint for joint in self.joints if joint.passive)
 
     @cached_property
-    def drive_count(self):
-        """Number of actuator values."""
-        drives = {joint.drive for joint in self.joints} | {leg.bar.drive for leg in self.legs if leg.bar}
-        return len(drives - {None})
+    def driven_kinds(self):
+        """Kind of every driven value, "R" or "P"."""
+        kinds = {joint.drive: joint.kind for joint in self.joints} | {
+            leg.bar.drive: "P" for leg in self.legs if leg.bar
+        }
+        return tuple(kinds[drive] for drive in sorted(set(kinds) - {None}))
+
+    def driven(self, actuators):
+        """Driven values (n, D) at actuator values (n, K)."""
+        return actuators if self.coupling is None else actuators @ self.coupling.T
+
+    def per_actuator(self, columns):
+        """Columns (.., K) per actuator value from those (.., D) per driven value."""
+        return columns if self.coupling is None else columns @ self.coupling
+
+    @cached_property
+    def uncoupled(self):
+        """The legs with a drive of its own for every driven value."""
+        return replace(self, coupling=None, home_drives=self.driven(self.home_drives))
 
     @cached_property
     def sites(self):
@@ -166,13 +183,20 @@ class Legs:
 class Drive:
     """One actuator value: its column in tables, its unit ("rad", "mm"), and what it moves.
 
-    site, twist (6,): a change of the value acts as this twist per unit at this site.
+    site, twist (6,): a change of the value acts as this twist per unit at this site; others: and as these twists by
+    site, where more joints follow it.
     """
 
     column: str
     unit: str
     site: str
     twist: np.ndarray
+    others: dict = field(default_factory=dict)
+
+    @property
+    def twists(self):
+        """Twists (6,) per unit by site."""
+        return {self.site: self.twist} | self.others
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +205,8 @@ class Parts:
 
     drives: of every actuator value; feet: sites at which the legs stand on the base, x outwards and y to the side;
     links: name of a length to the sites whose x lies along it, several for a leg of several bars; members: the links
-    that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds.
+    that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds;
+    followers: joints that follow drives and have none of their own, as if they had.
     """
 
     drives: tuple[Drive, ...]
@@ -189,6 +214,7 @@ class Parts:
     links: dict = field(default_factory=dict)
     members: tuple[tuple[str, ...], ...] = ()
     held_from: tuple[str, ...] = ()
+    followers: tuple[Drive, ...] = ()
 
     @property
     def units(self):

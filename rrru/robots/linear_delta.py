@@ -8,7 +8,7 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.robots.ptt3 import Ptt3
 
-# ASSUME firmware knows only the difference of the radii; this platform radius does not act on any result
+# ASSUME firmware knows only the difference of the radii; this platform radius acts on its tilt only
 _PLATFORM_MM = 30.0
 
 

@@ -1,21 +1,21 @@
 """Loads on the drives by a robot's own masses, given as point masses in its moving frames (virtual work).
 
-Every point mass m at x loads drive k with
+Every point mass m at x loads the driven value k with
 
     tau_k = m (g - x'') . dx/dq_k
 
 The derivatives are central differences of the exactly closed legs. Lengths in mm, masses in kg, forces in N, time in s.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.robots.closure import Twists, bar_ends
 from rrru.robots.legs import turn_about
+from rrru.robots.walk import Twists, bar_ends, value_of
 
-# steps of the differences: in time, and of an actuator value by its unit
-_STEP_S, _STEP = 1e-3, {"rad": 1e-4, "mm": 1e-2}
+# steps of the differences: in time, and of a driven value in rad or mm
+_STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
 # what a lump of the platform is fixed in
 PLATFORM = "platform"
 
@@ -54,7 +54,7 @@ def _behind_joint(legs, leg, way, lump, state):
     (poses, actuators, _), number = state, [joint.name for joint in leg.joints].index(lump.joint)
     joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
     if joint.kind != "fixed":
-        known = poses.passive[:, legs.passive_numbers[joint.name]] if joint.passive else actuators[:, joint.drive]
+        known = value_of(legs, joint, actuators, poses.passive)
         if joint.kind == "R":
             turn = turn @ turn_about(joint.axis, known)
         else:
@@ -70,12 +70,14 @@ def _along_bar(legs, leg, way, lump, state):
     return (near if lump.joint == leg.bar_sites[0] else far) + lump.at_mm[0] * line
 
 
-def drive_loads(robot, motion, poses, gravity_mm_s2):
-    """Loads (n, K) on the drives, in N mm or N.
+def driven_loads(robot, motion, poses, gravity_mm_s2):
+    """Loads (n, D) on the driven values, in N mm or N.
 
     motion: values, rates and accelerations (n, K) of the drives; poses: the Poses there. NaN where a pose is not known.
     """
-    actuators, rate, acceleration = motion
+    kinds = robot.legs.driven_kinds
+    actuators, rate, acceleration = (robot.legs.driven(part) for part in motion)
+    robot = robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled)
 
     def moved(step):
         return places(robot, actuators + step, robot.model.solve(actuators + step, poses))
@@ -86,8 +88,8 @@ def drive_loads(robot, motion, poses, gravity_mm_s2):
     mass = np.array([lump.mass_kg for lump in robot.lumps])
     force = mass[:, None] * (gravity_mm_s2 - second) / 1000.0
     result = np.empty(actuators.shape)
-    for k, unit in enumerate(robot.parts.units):
-        step = _STEP[unit] * np.eye(actuators.shape[1])[k]
-        slope = (moved(step) - moved(-step)) / (2.0 * _STEP[unit])
+    for k, kind in enumerate(kinds):
+        step = _STEP[kind] * np.eye(actuators.shape[1])[k]
+        slope = (moved(step) - moved(-step)) / (2.0 * _STEP[kind])
         result[:, k] = np.einsum("nla,nla->n", slope, force)
     return result

@@ -1,7 +1,7 @@
 """3-PTT translational parallel robot (paper B) and, with upright rails, the linear delta: what its controller believes.
 
-Three carriages run on rails at the azimuths phi_i, screw-driven; a link of length L with a U joint (T) at both ends
-ties each to the platform. Robot frame: origin at the static platform's centre in the plane of the rails' zero marks, x
+Three carriages run on rails at the azimuths phi_i, screw-driven; two bars of length L side by side, on ball joints, tie
+each to the platform. Robot frame: origin at the static platform's centre in the plane of the rails' zero marks, x
 along the first rail, z UP. The rails rise outwards by the inclination gamma: 0 is paper B's robot, a right angle the
 linear delta, whose carriages run upright. With the outward direction e_i, the slider position b_i along d_i and a = R -
 r,
@@ -29,9 +29,9 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.parameters import LEGS
 from rrru.robots.dynamics import PER_NEWTON, gravity
-from rrru.robots.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
-from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
-from rrru.robots.tripod import Tripod
+from rrru.robots.legs import Joint, Legs, Parts, X, Y, Z, turn_about
+from rrru.robots.three_legs import Deviation, of_each_leg, of_three_legs, points, three_drives
+from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
 # columns of the legs' numbers: what the slider adds to, L, a = R - r; azimuth, rise and swing of the rail
 _SLIDERS, _LINKS = of_each_leg("db", 0), of_each_leg("dL", 1)
@@ -51,6 +51,7 @@ class Ptt3(Tripod):
     L_mm: float = 350.0  # ASSUME this and the next two: Table 1 is lost
     R_mm: float = 300.0
     r_mm: float = 60.0
+    spacing_mm: float = 60.0  # ASSUME distance of a link's two bars; as r_mm it acts on the platform's tilt only
     rail_inclination_rad: float = 0.0
     azimuth_rad: tuple[float, float, float] = (0.0, 2.0 * np.pi / 3.0, 4.0 * np.pi / 3.0)
     parameter_set: str = "tied"
@@ -60,7 +61,8 @@ class Ptt3(Tripod):
 
     LINK = 1
     TRACKED = "tied"
-    DIMENSIONS = ("L_mm", "R_mm", "r_mm")
+    RICHEST = "rails"
+    DIMENSIONS = ("L_mm", "R_mm", "r_mm", "spacing_mm")
     DEVIATIONS = _SLIDERS | _LINKS | _RAILS | {"dL": Deviation(1), "da": Deviation(2)}
     PARAMETER_NAMES: ClassVar = {
         "zero": (*_SLIDERS,),
@@ -71,17 +73,18 @@ class Ptt3(Tripod):
         "distances": (*_BASE, *_SLIDERS, *_LINKS),
     }
     SOURCE = "paper B, 2.2; bounds assumed"
-    # ASSUME the U joints stay upright on a rail that points elsewhere: what turns before the drive turns back behind it
+    # ASSUME the ball joints stay level and side by side on a rail that points elsewhere: what turns before the drive
+    # turns back behind it. Only a = R - r is known: an azimuth turns it about the platform's joint
     COLUMN_SITES = (
-        *((("drive", 0, 1.0),), (("wrist", 0, 1.0),), (("foot", 0, 1.0),)),
-        *((("root", 5, 1.0), ("platform", 5, -1.0)), (("foot", 4, -1.0), ("upright", 4, 1.0))),
+        *((("drive", 0, 1.0),), (("a bar", 0, 1.0), ("b bar", 0, 1.0)), (("foot", 0, 1.0),)),
+        *((("azimuth", 5, 1.0), ("bracket", 5, -1.0)), (("foot", 4, -1.0), ("upright", 4, 1.0))),
         (("rail", 5, 1.0), ("carriage", 5, -1.0)),
     )
     parts = Parts(
         drives=three_drives("mm", 0),
         feet=of_three_legs("foot"),
-        links={"dL_leg": of_each("wrist")},
-        members=of_each("wrist"),
+        links={"dL_leg": BARS},
+        members=BARS,
     )
 
     def __post_init__(self):
@@ -101,33 +104,22 @@ class Ptt3(Tripod):
 
     @cached_property
     def legs(self):
-        """The chains: a carriage on its rail, then two U joints, the outer axes of both tangential."""
-        rise, chains = turn_about(-Y, self.rail_inclination_rad), []
-        for leg, azimuth, (zero, link, *_) in zip(LEGS, self.azimuth_rad, self.nominal_legs, strict=True):
+        """Six bars, two on every carriage, side by side."""
+        rise, bars = turn_about(-Y, self.rail_inclination_rad), []
+        for leg, azimuth, (zero, link, offset, *_) in zip(LEGS, self.azimuth_rad, self.nominal_legs, strict=True):
             root = turn_about(Z, azimuth)
-            joints = (
+            carriage = (
                 Joint(f"leg {leg} root", turn=root),
-                Joint(f"leg {leg} foot", shift_mm=self.R_mm * X),
+                Joint(f"leg {leg} azimuth", shift_mm=self.r_mm * X),
+                Joint(f"leg {leg} foot", shift_mm=offset * X),
                 Joint(f"leg {leg} rail", turn=rise),
                 Joint(f"leg {leg} drive", "P", X, zero * X, drive=leg - 1),
                 Joint(f"leg {leg} carriage"),
                 Joint(f"leg {leg} upright", turn=rise.T),
-                Joint(f"leg {leg} hip", "R", -Y, home=-3.0 * np.pi / 4.0),
-                Joint(f"leg {leg} hip across", "R", Z),
-                Joint(f"leg {leg} wrist", "R", Z, link * X),
-                Joint(f"leg {leg} cross", "R", -Y, home=3.0 * np.pi / 4.0),
-                Joint(f"leg {leg} platform", shift_mm=-self.r_mm * X),
+                Joint(f"leg {leg} bracket"),
             )
-            chains.append(Leg(f"leg {leg}", joints, end_turn=root.T))
-        return Legs(tuple(chains), np.full(3, self.L_mm / 2.0))
-
-    def passive_near(self, position_mm, slider_mm):
-        """Angles (n, 12) of both U joints of every leg near positions (n, 3), of the nominal robot there."""
-        position = points(position_mm)
-        link = position[:, None, :] - self.ends(self.inverse(position), self.nominal_legs)
-        along, side = (link * self.radial).sum(axis=-1), (link * self.tangent).sum(axis=-1)
-        lean, swing = np.arctan2(link[..., 2], along), np.arcsin(side / self.nominal_legs[:, self.LINK])
-        return np.stack([lean, swing, -swing, -lean], axis=-1).reshape(-1, 12)
+            bars += pair_of_bars(leg, carriage, root, (link, self.r_mm, self.spacing_mm))
+        return Legs(tuple(bars), np.full(3, self.L_mm / 2.0))
 
     @cached_property
     def nominal_legs(self):
@@ -173,16 +165,6 @@ class Ptt3(Tripod):
         """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.robots.dynamics`."""
         along = self.rails() @ gravity(self)
         return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - acceleration) / PER_NEWTON
-
-    def constraint_moments(self, position_mm, slider_mm, deviations=None):
-        """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.
-
-        # ASSUME both U joints have their outer axes tangential: the leg then resists turning about the link's part in
-        the plane across them.
-        """
-        link = self.link_directions(position_mm, slider_mm, deviations)
-        flat = link - (link * self.tangent).sum(axis=-1, keepdims=True) * self.tangent
-        return flat / np.linalg.norm(flat, axis=-1, keepdims=True)
 
     def jacobian(self, position_mm, slider_mm, deviations=None):
         """J (n, 3, 3) of db = J dp, exact at slider positions that fit the position (eqs. 4, 10)."""

@@ -11,11 +11,12 @@ import numpy as np
 
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
-from rrru.robots.closure import Closure, Poses
+from rrru.robots.closure import Closure
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
 from rrru.robots.readings import place_on_platform, turned_by
 from rrru.robots.twist_map import TwistMap
+from rrru.robots.walk import Poses
 
 
 class Robot(ABC):
@@ -23,8 +24,8 @@ class Robot(ABC):
 
     name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.robots.legs.Legs`;
     parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
-    parameters that measured positions identify; angle_arm_mm: the length that makes angles comparable with lengths; up
-    (3,): away from the ground.
+    parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
+    angle_arm_mm: the length that makes angles comparable with lengths; up (3,): away from the ground.
     """
 
     name: str
@@ -34,6 +35,7 @@ class Robot(ABC):
     directions: np.ndarray
     angle_arm_mm: float
     TRACKED: str
+    RICHEST: str
     SEARCHED: str
     up = (0.0, 0.0, 1.0)
     tool_mm = (0.0, 0.0, 0.0)
@@ -45,6 +47,11 @@ class Robot(ABC):
     @abstractmethod
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
+
+    @property
+    def z_down(self):
+        """Whether z of its frame points to the ground."""
+        return bool(self.up[2] < 0.0)
 
     @cached_property
     def model(self):
@@ -178,14 +185,18 @@ class Robot(ABC):
         return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
 
     def own_load(self, masses, actuators, rate, acceleration, poses):
-        """Loads (n, K) on the drives, in N mm or N, of what moves with them but for the platform; none here."""
-        return np.zeros(np.shape(actuators))
+        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here."""
+        return 0.0
 
     def drive_errors(self, twists):
-        """Changes (n, K) of the actuator values in twists (n, sites, 6)."""
+        """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
         numbers = self.legs.site_numbers
-        along = [twists[:, numbers[d.site]] @ (d.twist / (d.twist @ d.twist)) for d in self.parts.drives]
-        return np.stack(along, axis=1)
+        units = np.zeros((len(self.parts.drives), len(numbers), 6))
+        for unit, drive in zip(units, self.parts.drives, strict=True):
+            for site, twist in drive.twists.items():
+                unit[numbers[site]] = twist
+        flat = units.reshape(len(units), -1)
+        return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
     def require_reachable(self, position_mm, deviations=None):
         """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""

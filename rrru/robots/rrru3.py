@@ -55,7 +55,7 @@ class Rrru3(ThreeLegs):
     length_limit_mm: float = 4.0
     name: str = field(default="rrru3", init=False)
 
-    TRACKED = "identifiable"  # by measured positions
+    TRACKED = RICHEST = "identifiable"  # by measured positions
     DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
     DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _GAUGED
     PARAMETER_NAMES: ClassVar = {

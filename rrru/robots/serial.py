@@ -1,57 +1,145 @@
-"""Serial arms from their DH tables: one leg with every joint driven.
+"""Serial arms from their DH tables: one leg with every joint driven, by a drive of its own or by those of others.
 
 Standard (Denavit and Hartenberg, J. Appl. Mech. 22, 1955) and modified (Craig, Introduction to Robotics, 1986) rows:
 
     T_i = Rz(theta) Tz(d) Tx(a) Rx(alpha)   or   T_i = Rx(alpha) Tx(a) Rz(theta) Tz(d)
 
-Lengths in mm, angles in rad.
+Belts and rods couple joints to several drives: the joints' values are C q with a constant matrix C. Lengths in mm,
+angles in rad.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots.drive_step import end_of
 from rrru.robots.general import GeneralRobot
-from rrru.robots.legs import Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
+from rrru.robots.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
+from rrru.robots.lumps import Lump
+
+# keys of a row: of a joint, of a fixed frame
+JOINT = ("a", "alpha", "d", "theta", "sliding", "name", "drives", "mass_kg", "com_mm")
+FRAME = ("xyz_mm", "rpy_rad", "mass_kg", "com_mm")
+# sites that every arm has
+_TAKEN = (WORLD, TOOL, "base", "flange")
 
 
 def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), name="arm", **options):
     """The GeneralRobot of DH rows, mappings of a, d in mm and alpha, theta in rad; absent ones are 0.
 
-    A row's joint turns by q + theta or, with sliding: true, slides by q + d. drive_range (K, 2): of the joints' values
-    q, home (K,): values of the home pose, in rad or mm. tool_mm (3,): measured point in the last frame. Columns: q1_rad
-    or q1_mm, ... Raises ConfigError for an unknown key.
+    A row's joint turns by q + theta or, with sliding: true, slides by q + d. It is called `name`, by default "q" and
+    the row's number, and has a drive of that name; with drives {name: factor} its value is the sum of these drives'
+    times the factors, its own drive's only if it is among them. A row of xyz_mm, rpy_rad is a fixed frame, as a URDF's
+    origin. mass_kg, com_mm: of the row's link, in its frame. drive_range (K, 2): of the drives' values q, home (K,):
+    those of the home pose, in rad or mm. tool_mm (3,): measured point in the last frame. Columns: q1_rad or q1_mm, ...
+    Raises ConfigError for an unknown key or drive.
     """
-    joints, turn, shift = [], np.eye(3), np.zeros(3)
-    for number, row in enumerate(rows, 1):
-        if unknown := set(row) - {"a", "alpha", "d", "theta", "sliding"}:
-            raise ConfigError(f"{name}: row {number} has {unknown.pop()!r}; allowed: a, alpha, d, theta, sliding")
-        along, across, twist = row.get("d", 0.0) * Z, row.get("a", 0.0) * X, turn_about(X, row.get("alpha", 0.0))
-        own = turn_about(Z, row.get("theta", 0.0))
-        if modified:
-            turn, shift = turn @ twist, shift + turn @ across
-        kind = "P" if row.get("sliding") else "R"
-        joints.append(Joint(f"joint {number}", kind, Z, shift, turn @ own, drive=number - 1))
-        shift, turn = along + (0.0 if modified else across), np.eye(3) if modified else twist
-    leg = Leg("arm", (Joint("base"), *joints, Joint("flange", "fixed", Z, shift, turn)))
-    home = np.asarray(home, dtype=float)
-    legs = Legs((leg,), home)
-    drives = tuple(
-        Drive(f"q{k}_{'mm' if j.kind == 'P' else 'rad'}", "mm" if j.kind == "P" else "rad", j.name, _along(j))
-        for k, j in enumerate(joints, 1)
-    )
-    end = end_of(legs, leg, home[None])
-    legs = Legs((leg,), home, end.position_mm[0], end.turn[0])
+    links = _links(rows, modified, name)
+    coupling = _coupling([link for link in links if link.name], name)
+    joints, lumps, driven = [Joint("base")], [], 0
+    shift, turn = np.zeros(3), np.eye(3)
+    for link in links:
+        seat = Joint(link.site, link.kind, Z, shift + turn @ link.shift_mm, turn @ link.turn)
+        joints.append(replace(seat, drive=driven) if link.name else seat)
+        driven += bool(link.name)
+        shift, turn = link.after
+        if link.mass_kg:
+            lumps.append(Lump(link.site, link.mass_kg, shift + turn @ np.asarray(link.com_mm)))
+    leg = Leg("arm", (*joints, Joint("flange", "fixed", Z, shift, turn)))
+    matrix = np.array(list(coupling.values())).T
+    own = None if np.array_equal(matrix, np.eye(len(matrix))) else matrix
+    legs = Legs((leg,), np.asarray(home, dtype=float), coupling=own)
+    end = end_of(legs, leg, legs.home_drives[None])
     return GeneralRobot(
         name=name,
-        legs=legs,
-        parts=Parts(drives=drives),
+        legs=replace(legs, home_mm=end.position_mm[0], home_turn=end.turn[0]),
+        parts=_parts([link for link in links if link.name], coupling),
         drive_range=np.asarray(drive_range, dtype=float),
         tool_mm=tuple(tool_mm),
+        lumps=tuple(lumps),
         **options,
     )
 
 
-def _along(joint):
-    """Twist (6,) of a unit of a joint's value."""
-    return unit_twist(5 if joint.kind == "R" else 2)
+@dataclass(frozen=True)
+class _Link:
+    """A row: its joint's frame in the frame before it, and `after` it a shift and a turn to the row's own frame.
+
+    name: of its joint, empty for a fixed frame; drives: factors by drive.
+    """
+
+    site: str
+    name: str
+    kind: str
+    shift_mm: np.ndarray
+    turn: np.ndarray
+    after: tuple
+    drives: dict
+    mass_kg: float = 0.0
+    com_mm: tuple = (0.0, 0.0, 0.0)
+
+    @property
+    def unit(self):
+        """Unit of its joint's value."""
+        return "mm" if self.kind == "P" else "rad"
+
+    @property
+    def twist(self):
+        """Twist (6,) of a unit of its joint's value."""
+        return unit_twist(2 if self.kind == "P" else 5)
+
+
+def _links(rows, modified, robot):
+    """The _Links of all rows."""
+    result = []
+    for number, row in enumerate(rows, 1):
+        allowed = FRAME if "xyz_mm" in row or "rpy_rad" in row else JOINT
+        if unknown := set(row) - set(allowed):
+            raise ConfigError(f"{robot}: row {number} has {unknown.pop()!r}; allowed: {', '.join(allowed)}")
+        body = {key: row[key] for key in ("mass_kg", "com_mm") if key in row}
+        if allowed is FRAME:
+            turn = Rotation.from_euler("xyz", row.get("rpy_rad", (0.0, 0.0, 0.0))).as_matrix()
+            shift, none = np.asarray(row.get("xyz_mm", (0.0, 0.0, 0.0)), dtype=float), (np.zeros(3), np.eye(3))
+            result.append(_Link(f"frame {number}", "", "fixed", shift, turn, none, {}, **body))
+            continue
+        along, across, twist = row.get("d", 0.0) * Z, row.get("a", 0.0) * X, turn_about(X, row.get("alpha", 0.0))
+        own, name = turn_about(Z, row.get("theta", 0.0)), row.get("name", f"q{number}")
+        places = (np.zeros(3), own, (along + across, twist))
+        if modified:
+            places = across, twist @ own, (along, np.eye(3))
+        kind = "P" if row.get("sliding") else "R"
+        site = row.get("name", f"joint {number}")
+        result.append(_Link(site, name, kind, *places, dict(row.get("drives", {name: 1.0})), **body))
+    return result
+
+
+def _coupling(joints, robot):
+    """Columns (D,) of the coupling by drive, in the order of the joints that have a drive of their own."""
+    names = [*_TAKEN, *(link.name for link in joints)]
+    if len(set(names)) < len(names):
+        most = max(names, key=names.count)
+        raise ConfigError(f"{robot}: two joints or frames are called {most!r}; allowed: names of their own")
+    drives = [link.name for link in joints if link.name in link.drives]
+    if not drives:
+        raise ConfigError(f"{robot}: no row has a drive of its own; allowed: one or more")
+    for link in joints:
+        for drive, factor in link.drives.items():
+            if drive not in drives:
+                known = "joints with drives of their own, " + ", ".join(drives)
+                raise ConfigError(f"{robot}: joint {link.name} follows {drive!r}; allowed: {known}")
+            if not np.isfinite(factor) or factor == 0.0:
+                raise ConfigError(f"{robot}: joint {link.name} follows {drive} times {factor}; allowed: not 0")
+    return {drive: np.array([link.drives.get(drive, 0.0) for link in joints]) for drive in drives}
+
+
+def _parts(joints, coupling):
+    """The Parts: drives, each turns or slides its own joint and all that follow, and followers without drives."""
+    result = []
+    for drive, column in coupling.items():
+        own = next(link for link in joints if link.name == drive)
+        twists = {link.site: by * link.twist for link, by in zip(joints, column, strict=True) if by}
+        result.append(Drive(f"{drive}_{own.unit}", own.unit, own.site, twists.pop(own.site), twists))
+    followers = [Drive(f"{j.name}_{j.unit}", j.unit, j.site, j.twist) for j in joints if j.name not in j.drives]
+    return Parts(drives=tuple(result), followers=tuple(followers))

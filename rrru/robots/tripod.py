@@ -1,7 +1,8 @@
 """What robots share whose three links all end at one point: the platform's centre lies on three spheres.
 
-The driven end of link i, moved inwards by the platform's radius, is E_i(q_i); the platform's centre P keeps the link's
-length from it, which the 3-PTT and the rotary Delta have in common:
+A link is a pair of bars side by side, a parallelogram that keeps the platform from turning. The driven end of link i,
+moved inwards by the platform's radius, is E_i(q_i); the platform's centre P keeps the link's length from it, which the
+3-PTT and the rotary Delta have in common:
 
     |P - E_i(q_i)|^2 - L_i^2 = 0,   i = 1, 2, 3
 
@@ -10,10 +11,13 @@ z points up and the platform hangs below. Lengths in mm, angles in rad.
 
 import numpy as np
 
+from rrru.robots.legs import Bar, Joint, Leg, X, Y
 from rrru.robots.rrru3_kernels import tripod_mean_distance
 from rrru.robots.spheres import lower_intersection
-from rrru.robots.three_legs import ThreeLegs, points
+from rrru.robots.three_legs import ThreeLegs, of_three_legs, points
 
+# both bars of every leg
+BARS = tuple(zip(of_three_legs("a bar"), of_three_legs("b bar"), strict=True))
 ELBOW_SIGN = {"out": 1.0, "in": -1.0}
 
 
@@ -74,7 +78,23 @@ class Tripod(ThreeLegs):
         by_leg[..., self.LINK] = -2.0 * legs[:, self.LINK]
         return by_position, by_leg
 
+    def constraint_moments(self, position_mm, actuators, deviations=None):
+        """Unit directions (n, 3 legs, 3) about which each leg's parallelogram keeps the platform from turning."""
+        across = np.cross(self.tangent, self.link_directions(position_mm, actuators, deviations))
+        return across / np.linalg.norm(across, axis=-1, keepdims=True)
+
     def link_directions(self, position_mm, actuators, deviations=None):
         """Unit vectors (n, 3 legs, 3) along the links, from the driven end to the platform."""
         gradient, _ = self.closure_jacobians(position_mm, actuators, deviations)
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
+
+
+def pair_of_bars(leg, joints, root, sizes_mm):
+    """Both Legs of a leg's bars, side by side behind joints that leave their frame as it stands on the base.
+
+    root (3, 3): that frame, x outwards; sizes_mm: length of the bars, radius of the platform, distance of the bars.
+    """
+    length, radius, spacing = sizes_mm
+    for name, side in (("a", -0.5 * spacing * Y), ("b", 0.5 * spacing * Y)):
+        ball = Joint(f"leg {leg} {name} ball", shift_mm=side)
+        yield Leg(f"leg {leg} {name}", (*joints, ball), bar=Bar(length, root @ (radius * X + side)))

@@ -14,8 +14,9 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Twists, bar_ends, screw
 from rrru.robots.legs import TOOL, WORLD
+from rrru.robots.walk import Twists, bar_ends
+from rrru.robots.wrenches import by_group, frame_along, screw
 
 _EYE = np.eye(3)
 
@@ -82,7 +83,7 @@ class TwistMap:
         if leg.bar:
             near, far, _ = bar_ends(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
             bar, end = (numbers[name] for name in leg.bar_sites)
-            result |= {bar: (_frame_along(far - near), near), end: (self.poses.turn, far)}
+            result |= {bar: (frame_along(far - near), near), end: (self.poses.turn, far)}
         return result
 
     def _own(self, number, turn):
@@ -144,11 +145,16 @@ class TwistMap:
                 result[..., used] += self.effect(name) @ one[:, used]
         return result
 
-    @cached_property
+    @property
     def drive_counts(self):
         """Constraints (n, rows, K) that the actuator values change."""
+        return self.closure.legs.per_actuator(self.driven_counts)
+
+    @cached_property
+    def driven_counts(self):
+        """Constraints (n, rows, D) that the driven values change."""
         legs = self.closure.legs
-        result = np.zeros((len(self), self.closure.rows[-1].stop, legs.drive_count))
+        result = np.zeros((len(self), self.closure.row_count, len(legs.driven_kinds)))
         for leg, way, one, rows in self._legs:
             for joint, axis, place in zip(leg.joints, way.axes, way.places, strict=True):
                 if joint.drive is not None:
@@ -169,11 +175,12 @@ class TwistMap:
         return size[:, -1] / size[:, 0]
 
     def constraint_measures(self, arm_mm):
-        """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by leg.
+        """Smallest singular value and determinant (n,) of the legs' wrenches about the point, orthonormal by group.
 
         Moments count at an arm in mm. The determinant has a sign where every leg is a bar; it is positive elsewhere.
         """
-        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in self._wrenches]
+        groups = by_group(self.closure.legs, self._wrenches)
+        legs = [_orthonormal(_about(one, self.point_mm) / ([1.0] * 3 + [arm_mm] * 3)) for one in groups]
         rows = np.concatenate(legs, axis=1)
         if rows.shape[1] == 6 and all(leg.bar for leg in self.closure.legs.legs):
             return _singular_values(rows)[:, -1], np.linalg.det(rows)
@@ -237,12 +244,3 @@ def _in_site(wrenches, turn, place, own):
     """Wrenches (n, r, 6) at the origin as they count shift and rotation (n, r, 6) of a frame."""
     about = _about(wrenches, place)
     return np.concatenate([about[:, :, :3] @ turn, about[:, :, 3:] @ own], axis=2)
-
-
-def _frame_along(lines):
-    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
-    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
-    helper = _EYE[np.abs(x).argmin(axis=1)]
-    y = np.cross(helper, x)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y, np.cross(x, y)], axis=2)

@@ -25,7 +25,7 @@ def workspace_table(robot, measurements):
     height = float(rows.command(measurements)[:, 2].mean().round(-1))
     reach = float(robot.reach_mm)
     # where z points down, the platform is on that side of the base
-    across, down = (-reach, reach), (0.0 if robot.up[2] < 0.0 else -reach, reach)
+    across, down = (-reach, reach), (0.0 if robot.z_down else -reach, reach)
     frames = []
     for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
         step = reach / robot.workspace_lines
@@ -36,12 +36,13 @@ def workspace_table(robot, measurements):
     return pd.concat(frames, ignore_index=True)
 
 
-def campaign_row(section, measurements, singular, noise, notes, registration=None):
+def campaign_row(robot, section, measurements, singular, noise, notes, registration=None):
     """The row of `campaigns`; noise: a `rrru.fit.campaign_noise.Noise`."""
     counts = measurements["status"].value_counts()
     source = f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}"
     return {
         "robot": section["robot"],
+        "z_down": robot.z_down,
         "source": source,
         "points": len(measurements),
         "runs": measurements["run"].nunique(),

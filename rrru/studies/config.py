@@ -83,7 +83,8 @@ def virtual(config, name):
 def masses(config, section):
     """Masses in kg, the platform's own where the campaign's section states it."""
     loads = config["loads"]
-    if own_robot_file(config["robots"].get(section.get("robot"), {})):
+    own = config["robots"].get(section.get("robot"), {})
+    if "dh" in own or own_robot_file(own):
         return {"platform_kg": section.get("platform_mass_kg", 0.0), "forearm_kg": 0.0, "arm_kg": 0.0}
     return {
         "platform_kg": section.get("platform_mass_kg", loads["platform_mass_kg"]),
@@ -131,8 +132,3 @@ def trajectory_names(section):
     from rrru.campaign import trajectories
 
     return [trajectory.name for trajectory in trajectories.from_config(section)]
-
-
-def z_down(section):
-    """Whether the frame of a campaign's robot has its z pointing down."""
-    return section["robot"] == "rrru3"

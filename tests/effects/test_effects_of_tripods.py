@@ -2,6 +2,8 @@
 slow reading of its docstring.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,8 +58,8 @@ def _values(effect, share=1.0, shape=-1):
 
 def test_robots_with_sliders_have_rails_instead_of_axes():
     turning, sliding = Rrru3(), Ptt3()
-    assert set(SLIDER_EFFECTS) - set(library(turning)) == {"rail_tilt"}
-    assert set(library(turning)) - set(SLIDER_EFFECTS) == {"axis_tilt", "encoder_eccentricity"}
+    assert set(SLIDER_EFFECTS) - set(library(turning)) == {"rail_tilt", "bar_mismatch"}
+    assert set(library(turning)) - set(SLIDER_EFFECTS) == {"axis_tilt", "encoder_eccentricity", "joint_axis_error"}
     assert find("backlash", sliding).parameters["width1"].unit == "mm"
     assert find("backlash", turning).parameters["width1"].unit == "rad"
     assert find("rail_tilt", turning) is None and find("axis_tilt", sliding) is None
@@ -127,30 +129,30 @@ def test_the_loads_on_the_carriages_are_the_slopes_of_the_potential_energy(robot
 
 
 @pytest.mark.parametrize("robot", SLIDERS)
-def test_a_tilted_rail_takes_its_joint_along_and_turns_the_platform(robot):
+def test_a_tilted_rail_takes_its_joints_along_and_turns_the_platform(robot):
     """Against matrices and a general solver; the platform turns by about as much as the rails."""
     mechanism, motion = ROBOTS[robot][0], MOTIONS[robot]
     tilts = np.random.default_rng(3).normal(0.0, 2e-3, (3, 3))
     change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, tilts.ravel())
     position, turned = _exact(mechanism, motion, change)
     feet = np.concatenate([np.zeros((3, 3)), tilts * [1.0, -1.0, 1.0]], axis=1)
-    passive = mechanism.passive_near(motion.position_mm, motion.drive)
+    lengths, inclination = np.full((3, 2), mechanism.L_mm), mechanism.rail_inclination_rad
     for k in range(0, len(motion), 15):
-        guess = np.concatenate([passive[k], np.zeros(3), motion.position_mm[k]])
-        pose = tripods_slow.ptt3_close(motion.drive[k], feet, mechanism.rail_inclination_rad, guess)
-        np.testing.assert_allclose(position[k], pose[:3, 3], atol=1e-7)
+        there = tripods_slow.ptt3_bars(motion.drive[k], feet, inclination, lengths, motion.position_mm[k])
+        np.testing.assert_allclose(position[k], there[0], atol=1e-7)
+        assert turned[k] == pytest.approx(np.linalg.norm(there[1]), abs=1e-9)
     assert 1e-3 < np.median(turned) < 1e-2
 
 
 def _upright(mechanism, turns):
-    """Twists (1, sites, 6) that set the U joint on leg 1's carriage upright again on a rail turned by (3,) in rad."""
+    """Twists (1, sites, 6) that set the ball joints on leg 1's carriage level again on a rail turned by (3,) in rad."""
     result = np.zeros((1, len(mechanism.legs.sites), 6))
     result[0, mechanism.legs.site_numbers["leg 1 upright"], 3:] = -np.asarray(turns)
     return result
 
 
 def test_a_leaning_rail_carries_its_slider_off_in_proportion_to_its_way():
-    """With the carriage's U joint set upright again, rise and swing are those of the calibration's rails."""
+    """With the carriage's ball joints set level again, rise and swing are those of the calibration's rails."""
     mechanism, motion = ROBOTS["level"][0], MOTIONS["level"]
     rise, swing = 2e-3, -1e-3
     change = SLIDER_EFFECTS["rail_tilt"].contribute(motion, np.array([0.0, rise, swing, *np.zeros(6)]))
@@ -165,7 +167,7 @@ def test_a_leaning_rail_carries_its_slider_off_in_proportion_to_its_way():
     along = motion.drive[:, :1] * np.cross([0.0, -rise, swing], [1.0, 0.0, 0.0])
     shifted = np.einsum("naj,nj->na", at.response("leg 1 foot")[:, :, :3], along)
     np.testing.assert_allclose(moved - motion.position_mm, shifted, atol=2e-4)
-    # left as it stands, the joint turns the platform with the rail
+    # left as they stand, the joints turn the platform with the rail
     assert _exact(mechanism, motion, change)[1].min() > 5e-4
 
 
@@ -188,8 +190,30 @@ def test_an_upright_rail_leans_to_the_side_where_a_level_one_swings():
     expected = rich.forward(motion.drive, rich.parameters.vector({"swing1": -1e-3}))
     np.testing.assert_allclose(moved, expected, atol=1e-8)
     assert np.abs(expected - motion.position_mm).max() > 0.02 and turned.max() < 1e-12
-    # left as it stands, the joint turns the platform with the rail
+    # left as they stand, the joints turn the platform with the rail
     assert _exact(mechanism, motion, change)[1].min() > 2e-4
+
+
+@pytest.mark.parametrize("robot", SLIDERS)
+def test_unequal_bars_tilt_a_3_ptt_as_six_bars_do(robot):
+    mechanism, motion = ROBOTS[robot][0], MOTIONS[robot]
+    mismatch = np.array([0.3, -0.2, 0.1])
+    change = library(mechanism)["bar_mismatch"].contribute(motion, mismatch)
+    position, turned = _exact(mechanism, motion, change)
+    lengths = mechanism.L_mm + np.stack([0.5 * mismatch, -0.5 * mismatch], axis=1)
+    still, inclination = np.zeros((3, 6)), mechanism.rail_inclination_rad
+    for k in range(0, len(motion), 15):
+        there = tripods_slow.ptt3_bars(motion.drive[k], still, inclination, lengths, motion.position_mm[k])
+        np.testing.assert_allclose(position[k], there[0], atol=1e-8)
+        assert turned[k] == pytest.approx(np.linalg.norm(there[1]), abs=1e-9)
+    # the largest difference over the bars' distance, about
+    assert 0.5 < np.median(turned) * mechanism.spacing_mm / 0.3 < 2.0
+    # what the bars share turns nothing and is the link's own length
+    shared, level = _exact(mechanism, motion, motion.along(mechanism.parts.members, mismatch[None]))
+    rich = replace(mechanism, parameter_set="legs")
+    expected = rich.forward(motion.drive, rich.parameters.vector({"dL1": 0.3, "dL2": -0.2, "dL3": 0.1}))
+    np.testing.assert_allclose(shared, expected, atol=1e-9)
+    assert level.max() < 1e-12
 
 
 def test_unequal_bars_are_the_delta_of_six_bars():

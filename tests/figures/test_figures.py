@@ -298,6 +298,12 @@ def test_a_sweep_without_visible_scatter_and_one_slice_are_drawn_too(frames):
     assert len(figure.axes) == 3 and len(figure.legends[0].get_texts()) == 2
 
 
+@pytest.mark.parametrize("z_down", [True, False])
+def test_the_workspace_hangs_as_its_robots_frame_says(frames, z_down):
+    low, high = draw("workspace", frames | {"campaigns": synthetic.campaigns(z_down)}).axes[0].get_ylim()
+    assert (low > high) == z_down
+
+
 def test_the_rules_name_tables_that_exist_and_every_figure_has_a_caption():
     for name, (function, needed) in FIGURES.items():
         assert function.__name__ == name and set(needed) <= set(TABLES) and len(function.__doc__) > 60

@@ -10,7 +10,9 @@ A bar has w w^T in place of P_i, w its line. Lengths in mm, angles in rad; in tw
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Closure, Poses, Twists, bar_ends, line_wrench, passive_screws, walk
+from rrru.robots.closure import Closure
+from rrru.robots.walk import Poses, Twists, bar_ends, walk
+from rrru.robots.wrenches import line_wrench, screw
 
 _ARM_MM = 500.0
 _SCALE = np.repeat([_ARM_MM, 1.0], 3)
@@ -21,7 +23,7 @@ def solve(legs, actuators, start, twists=None):
     """Poses at actuator values (n, K) next to the Poses `start`, under twists (n or 1, sites, 6); NaN where none."""
     actuators, every, n = np.asarray(actuators, dtype=float), Twists(legs, twists), len(actuators)
     position, turn, passive = (np.array(part, dtype=float) for part in (start.position_mm, start.turn, start.passive))
-    ranks, left = Closure(legs).ranks, np.full(n, np.inf)
+    ranks, left = [6 - (rows.stop - rows.start) for rows in Closure(legs).rows], np.full(n, np.inf)
     turning = np.array([joint.kind == "R" for joint in legs.passive_joints], dtype=bool)
     known = [np.isfinite(part).reshape(n, -1).all(axis=1) for part in (actuators, position, turn, passive)]
     rows = np.flatnonzero(np.all(known, axis=0))
@@ -57,7 +59,7 @@ def _step(legs, ranks, actuators, poses, twists):
             total = total + line[:, :, None] * line[:, None, :]
             pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _ARM_MM
         else:
-            u, size, v = np.linalg.svd(passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
+            u, size, v = np.linalg.svd(_passive_screws(leg, way) / _SCALE[:, None], full_matrices=False)
             u, size, v = u[:, :, :rank], size[:, None, :rank], v[:, :rank]
             lack, off = lack_of(way, poses) / _SCALE, np.eye(6) - u @ u.transpose(0, 2, 1)
             total, pull = total + off, pull + (off @ lack[:, :, None])[:, :, 0]
@@ -69,6 +71,13 @@ def _step(legs, ranks, actuators, poses, twists):
         change[:, numbers] = (inverse @ (scaled - lack)[:, :, None])[:, :, 0]
     twist = scaled * _SCALE
     return twist[:, :3] + np.cross(twist[:, 3:], poses.position_mm), twist[:, 3:], change
+
+
+def _passive_screws(leg, way):
+    """Screws (n, 6, k) of a leg's passive joints at the world's origin."""
+    every = zip(leg.joints, way.axes, way.places, strict=True)
+    screws = [screw(joint, axis, place) for joint, axis, place in every if joint.passive]
+    return np.stack(screws, axis=-1) if screws else np.zeros((len(way.place), 6, 0))
 
 
 def lack_of(way, poses):

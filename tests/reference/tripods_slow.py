@@ -56,34 +56,22 @@ def _move(rotation_vector, shift):
     return result
 
 
-def ptt3_close(slider, feet, inclination, guess, lengths=(350.0, 300.0, 60.0)):
-    """Platform pose (4, 4) of a 3-PTT whose feet (3 legs, 6) are displaced: shift in mm and rotation vector.
+def ptt3_bars(slider, feet, inclination, lengths, guess, dimensions=(300.0, 60.0, 60.0)):
+    """Platform position (3,) and rotation vector (3,) of a 3-PTT of six bars whose feet (3 legs, 6) are displaced.
 
-    Rails and the U joints on their carriages go with their feet. The legs as chains of matrices: a carriage, four axes
-    of U joints, the platform; fsolve on 18 equations in 12 angles and the pose. lengths: L, R, r.
+    feet: shift in mm and rotation vector; rails and what their carriages hold go with them. lengths: of the bars (3
+    legs, 2); dimensions: R, r and the distance of a leg's bars.
     """
-    link, base, platform = lengths
-
-    def chain(leg, angles):
-        first, second, third, fourth = angles
-        azimuth = np.radians(120.0 * leg)
+    base, platform, spacing = dimensions
+    pairs = []
+    for leg in range(3):
+        azimuth = _move([0.0, 0.0, np.radians(120.0 * leg)], np.zeros(3))
         way = slider[leg] * np.array([np.cos(inclination), 0.0, np.sin(inclination)])
-        pose = _move([0.0, 0.0, azimuth], np.zeros(3)) @ _move(np.zeros(3), [base, 0.0, 0.0])
-        pose = pose @ _move(feet[leg][3:], feet[leg][:3]) @ _move([0.0, -first, 0.0], way)
-        pose = pose @ _move([0.0, 0.0, second], np.zeros(3)) @ _move([0.0, 0.0, third], [link, 0.0, 0.0])
-        return pose @ _move([0.0, -fourth, 0.0], np.zeros(3)) @ _move([0.0, 0.0, -azimuth], [-platform, 0.0, 0.0])
-
-    def equations(unknown):
-        pose = _move(unknown[12:15] / 300.0, unknown[15:])
-        rows = []
-        for leg in range(3):
-            off = np.linalg.inv(pose) @ chain(leg, unknown[4 * leg : 4 * leg + 4])
-            rows += [*off[:3, 3], *(300.0 * Rotation.from_matrix(off[:3, :3]).as_rotvec())]
-        return rows
-
-    solution = fsolve(equations, guess, xtol=1e-12)
-    assert np.abs(equations(solution)).max() < 1e-8
-    return _move(solution[12:15] / 300.0, solution[15:])
+        carriage = azimuth @ _move(np.zeros(3), [base, 0.0, 0.0]) @ _move(feet[leg][3:], feet[leg][:3])
+        for share, length in zip((-0.5, 0.5), lengths[leg], strict=True):
+            start = (carriage @ [way[0], share * spacing, way[2], 1.0])[:3]
+            pairs.append((start, (azimuth @ [platform, share * spacing, 0.0, 1.0])[:3], length))
+    return _on_bars(pairs, guess)
 
 
 def delta_bars(theta, beta, lengths, guess, dimensions=(375.0, 125.0, 60.0, 120.0), depth=0.0):
@@ -99,10 +87,15 @@ def delta_bars(theta, beta, lengths, guess, dimensions=(375.0, 125.0, 60.0, 120.
         for share, length in zip((-0.5, 0.5), lengths[leg], strict=True):
             elbow = (base + platform) * out + arm * delta_arm(beta[leg], theta[leg]) + np.array([0.0, 0.0, depth])
             pairs.append((elbow + share * spacing * side, platform * out + share * spacing * side, length))
+    return _on_bars(pairs, guess)
+
+
+def _on_bars(bars, guess):
+    """Position (3,) and rotation vector (3,) of a platform on six bars: start, end on the platform, and length each."""
 
     def equations(unknown):
         turn = Rotation.from_rotvec(unknown[3:] / 300.0)
-        return [np.linalg.norm(unknown[:3] + turn.apply(end) - elbow) - length for elbow, end, length in pairs]
+        return [np.linalg.norm(unknown[:3] + turn.apply(end) - start) - length for start, end, length in bars]
 
     solution = fsolve(equations, np.concatenate([guess, np.zeros(3)]), xtol=1e-12)
     assert np.abs(equations(solution)).max() < 1e-9

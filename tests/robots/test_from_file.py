@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Poses, Twists
 from rrru.robots.delta import Delta
 from rrru.robots.from_file import from_mjcf, from_urdf
 from rrru.robots.hexapod import hexapod
-from rrru.robots.lumps import drive_loads, places
+from rrru.robots.lumps import driven_loads, places
 from rrru.robots.rrru3 import Rrru3
+from rrru.robots.walk import Poses, Twists
 from tests.robots.mjcf import (
     ARM,
     CRANKED,
@@ -225,7 +225,7 @@ def test_mujoco_s_simulation_of_the_hexapod_comes_to_rest_on_the_closed_form(six
     np.testing.assert_allclose(six.forward(legs)[0], 1000.0 * data.body("plate").xpos, atol=1e-4)
     # a servo pushes with kp times its sag against what the masses load it with
     still = np.zeros((1, 6))
-    load = drive_loads(
+    load = driven_loads(
         six, (legs, still, still), six.solve(legs, six.legs.home_mm[None]), np.array([0.0, 0.0, -9810.0])
     )
     np.testing.assert_allclose(1000.0 * data.ctrl - legs[0], -load[0] / 2e3, rtol=1e-3)
@@ -436,7 +436,7 @@ def test_loads_of_lumps_are_mujoco_s_inverse_dynamics():
     model.opt.gravity[2] = -9.80665
     values, rates, accelerations = (generator.uniform(-1.0, 1.0, (5, 6)) for _ in range(3))
     poses = robot.solve(values, np.zeros((5, 3)))
-    loads = drive_loads(robot, (values, rates, accelerations), poses, np.array([0.0, 0.0, -9806.65]))
+    loads = driven_loads(robot, (values, rates, accelerations), poses, np.array([0.0, 0.0, -9806.65]))
     data = mujoco.MjData(model)
     for k in range(5):
         data.qpos[:], data.qvel[:], data.qacc[:] = values[k], rates[k], accelerations[k]

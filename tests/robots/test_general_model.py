@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots import singularity
 from rrru.robots.cable import cable
-from rrru.robots.closure import Poses
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, loads
 from rrru.robots.hexapod import hexapod
@@ -18,6 +18,8 @@ from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 from rrru.robots.serial import serial
+from rrru.robots.walk import Poses
+from tests.robots import humanoid
 
 _COUNT = 100
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))
@@ -57,6 +59,7 @@ GENERAL = {
         [0.2, 0.9, -1.3, 0.5, 0.8, 0.1],
         tool_mm=(20.0, 10.0, 70.0),
     ),
+    "coupled": make_mechanism("coupled", humanoid.section()),
     "planar_cable": cable(
         [[-600.0, -500.0, 0.0], [600.0, -500.0, 0.0], [50.0, 700.0, 0.0]],
         [[50.0, -60.0, 0.0], [50.0, 60.0, 0.0], [-80.0, 5.0, 0.0]],
@@ -65,7 +68,7 @@ GENERAL = {
     ),
 }
 # steps of central differences: shift in mm, rotation in rad
-_STEPS = np.repeat([2e-2, 2e-5], 3)
+_STEPS = np.repeat([5e-3, 2e-5], 3)
 every_robot = pytest.mark.parametrize("name", ROBOTS)
 every_set = pytest.mark.parametrize(("name", "kind"), SETS)
 
@@ -176,7 +179,7 @@ def test_the_drives_response_is_the_closures_slope(setting):
 def test_a_drives_own_twist_acts_as_its_value_does(setting):
     at = setting.robot.map(setting.actuators, setting.poses)
     for k, drive in enumerate(setting.robot.parts.drives):
-        moved = at.response(drive.site) @ drive.twist
+        moved = sum(at.response(site) @ twist for site, twist in drive.twists.items())
         size = np.abs(moved).max()
         np.testing.assert_allclose(moved, at.drive_response[:, :, k], rtol=0.0, atol=1e-9 * size)
 
@@ -270,7 +273,7 @@ def test_nominal_robots_close_upright_where_they_are_sent(name):
     near = points + np.array([20.0, -10.0, 15.0])
     known = np.isfinite(robot.inverse(near)).all(axis=1)
     poses = robot.solve(actuators, near)
-    assert poses.closed.tolist() == known.tolist() and known.mean() > 0.9
+    assert poses.closed[known].all() and known.mean() > 0.9
     np.testing.assert_allclose(poses.position_mm[known], points[known], rtol=0.0, atol=1e-9)
     assert np.abs(_turned(poses)[known]).max() < 1e-12
 
@@ -319,7 +322,7 @@ def test_the_general_constraint_measure_vanishes_where_the_closed_ones_determina
 def test_the_general_constraint_measure_vanishes_in_the_plane_of_level_rails():
     robot, points = Ptt3(), np.array([[20.0, 10.0, -200.0], [20.0, 10.0, -0.5], [20.0, 10.0, -0.05]])
     measure, _ = robot.map_at(robot.inverse(points), points).constraint_measures(robot.angle_arm_mm)
-    assert measure[0] > 0.1 and measure[1] < 0.01 * measure[0] and measure[2] < 0.11 * measure[1]
+    assert measure[0] > 0.01 and measure[1] < 0.01 * measure[0] and measure[2] < 0.11 * measure[1]
 
 
 _MASSES, _PAYLOAD_KG = Masses(2.0, 0.8, 1.5), 3.0

@@ -1,5 +1,7 @@
 """Robots of a user's own, from a module and from files, the whole way from campaign to figures."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ from rrru.errors import ConfigError
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.geometric_numbers import direction
 from tests.places import ROOT
+from tests.robots import humanoid
 from tests.workflow.folder import run
 
 # a planar 3-RRR: three legs of two links, driven at the base, hold a plate in a plane
@@ -141,6 +144,32 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
     assert "backlash" in result["gap_verdicts"]["effects"].iloc[0]
 
 
+def test_an_arm_of_dh_rows_with_a_joint_that_follows_goes_the_whole_way(tmp_path):
+    """Ten drives and a chest that two of them keep upright, described in the configuration alone."""
+    section = humanoid.section()
+    arm = make_mechanism("arm", section, parameter_set="zero")
+    x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
+    result = _run(
+        tmp_path,
+        robot=json.dumps(section),
+        error="dtorso1",
+        size=0.002,
+        play="{" + ", ".join(f"width{k}: 0.0005" for k in range(1, 11)) + "}",
+        start=[x - 60.0, y, z],
+        end=[x + 60.0, y, z],
+        errors="zero",
+        reads=" noise_rad: 1.0e-4,",
+    )
+    measured = result["measurements"]
+    assert set(arm.parts.columns) <= set(measured) and "chest_rad" not in measured
+    places = arm.forward(measured[arm.parts.columns].to_numpy(dtype=float))
+    np.testing.assert_allclose(places, measured[[f"command_{axis}_mm" for axis in "xyz"]], atol=1e-6)
+    fitted = result["parameters"].query("calibration == 'lines' and method == 'least_squares'").set_index("parameter")
+    assert fitted.loc["dtorso1", "true_value"] == pytest.approx(0.002)
+    assert "backlash" in result["gap_verdicts"]["effects"].iloc[0]
+    assert result["error_summary"].query("mode == 'model'")["mean_mm"].max() < 0.5
+
+
 @pytest.mark.parametrize(
     ("entry", "text"),
     [
@@ -149,6 +178,7 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
         ({"module": "json:JSONDecoder"}, "gave a JSONDecoder"),
         ({"urdf": "nothing.urdf"}, "nothing.urdf"),
         ({"mjcf": "nothing.xml", "platform": "plate"}, "nothing.xml"),
+        ({"dh": [{"range_deg": [-9, 9]}, {"drives": {"q3": 1.0}}]}, "joint q2 follows 'q3'"),
     ],
 )
 def test_an_own_robot_that_cannot_be_made_is_refused(entry, text):

@@ -28,7 +28,7 @@ def main(settings, inputs, outputs):
     known = setup.measured_robot(nominal, measurements)
     noise = campaign_noise(known, measurements, given, settings["use_near_singularity"])
     notes = (*notes, *campaigns.unmatched_sets(settings["sets"], measurements))
-    row = campaigns.campaign_row(section, measurements, singular, noise, notes, registration)
+    row = campaigns.campaign_row(robot, section, measurements, singular, noise, notes, registration)
     if row["notes"]:
         tell(f"campaign {name}: {row['notes']}")
     frames = {

@@ -25,7 +25,8 @@ def main(settings, inputs, outputs):
     frames = {name: frame.assign(campaign=settings["campaign"]) for name, frame in frames.items()}
     frames["gap_points"] = points
     tables.write_all(tables_of(nominal), frames, outputs)
-    draw_all(settings["figures"], {name: outputs[name] for name in frames}, settings["options"], outputs)
+    options = settings["options"] | {"z_down": nominal.z_down}
+    draw_all(settings["figures"], {name: outputs[name] for name in frames}, options, outputs)
 
 
 if __name__ == "__main__":

@@ -14,8 +14,6 @@ from rrru.compensate.rbf import choose, fit, grow, make_folds
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 
-# the richest set of parameters that positions identify
-FULL = {"rrru3": "identifiable", "ptt3": "rails", "delta": "legs"}
 # what each method needs to measure
 NEEDS = {
     "zero_offsets": "positions, or anything that shows them: distances, heights, images",
@@ -120,7 +118,7 @@ def offsets(mechanism, values):
 
 def position_methods(points, candidates, genetic_settings, generator, seed):
     """Every method that learns from measured positions, as functions without arguments, by name."""
-    tracked, full = points.mechanism.TRACKED, FULL[points.mechanism.name]
+    tracked, full = points.mechanism.TRACKED, points.mechanism.RICHEST
     methods = {
         "zero_offsets": lambda: parameters(points, "zero"),
         "least_squares": lambda: parameters(points, tracked),

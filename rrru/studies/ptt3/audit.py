@@ -58,7 +58,7 @@ def _determinants():
 
 @finding(
     *_CONSTRAINT,
-    "upright links let the platform turn, for r < R as well (U joints with tangential outer axes)",
+    "upright links let the platform turn, for r < R as well (bars in pairs on ball joints)",
     "1",
     lambda equal, apart: equal < 1e-4 and apart < 1e-4,
 )

@@ -26,8 +26,8 @@ def test_radii_by_hand():
     by_hand = 250.0 * 1.5 * np.sqrt(3.0) / np.sqrt(350.0**2 - 250.0**2)
     assert _values("det J at (0, 0, -250)") == pytest.approx((by_hand, by_hand))
     assert _values("slider position at which") == pytest.approx((1e-3, 1e-3 - 240.0), abs=1e-6)
-    # the couples then lean 0.001 mm over 350 mm from the vertical
-    assert _values("constraint measure") == pytest.approx(2 * (np.sqrt(1.5) * 1e-3 / 350.0,), rel=1e-4)
+    # the couples then lean 0.001 mm over 350 mm from the horizontal plane, all to one side
+    assert _values("constraint measure") == pytest.approx(2 * (np.sqrt(3.0) * 1e-3 / 350.0,), rel=1e-4)
 
 
 def test_det_j_vanishes_where_the_links_ends_stand_in_line():

@@ -108,7 +108,7 @@ def diagnosed(wildcards):
         "noise_known": section.get("noise_known", False),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
         "figures": GAP_FIGURE,
-        "options": {"campaign": wildcards.campaign, "z_down": parts.z_down(section)},
+        "options": {"campaign": wildcards.campaign},
         **reads("seed", "gap"),
     }
 
@@ -125,8 +125,7 @@ def own_effects():
 
 def campaign_options(campaign):
     """What the figures that every campaign gets are told."""
-    z_down = parts.z_down(config["campaigns"][campaign])
-    return {"campaign": campaign, "z_down": z_down, "method": config["reproduce"]["method"], "mode": "closed_loop"}
+    return {"campaign": campaign, "method": config["reproduce"]["method"], "mode": "closed_loop"}
 
 
 def paper_options():

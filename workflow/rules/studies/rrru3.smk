@@ -32,7 +32,7 @@ PAPERS["A"] = {
 }
 # figures that every campaign gets, the reproduced one in figures/ itself
 CAMPAIGN_FIGURES = {
-    "workspace": ("rrru.figures.workspace:workspace", ["workspace", "singularity", "measurements"]),
+    "workspace": ("rrru.figures.workspace:workspace", ["workspace", "singularity", "measurements", "campaigns"]),
     "observability": ("rrru.figures.observability:observability", ["observability"]),
     "convergence": ("rrru.figures.convergence:convergence", ["genetic_history", "genetic"]),
     "cross": ("rrru.figures.cross:cross", ["error_summary"]),

@@ -1,0 +1,50 @@
+"""Serial arms from the rows of a configuration, in mm and degrees; see `rrru.robots.serial`."""
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.robots.serial import FRAME, JOINT, serial
+
+_LENGTHS, _ANGLES = ("a_mm", "d_mm"), ("alpha_deg", "theta_deg", "rpy_deg")
+_VALUES = ("range_deg", "range_mm", "home_deg", "home_mm")
+_CONVENTIONS = ("standard", "modified")
+
+
+def from_dh(rows, convention="standard", name="arm", **options):
+    """The GeneralRobot of rows as `serial` takes them, with a_mm, d_mm, alpha_deg, theta_deg and rpy_deg.
+
+    A row whose joint has a drive of its own states its range_deg, or range_mm where it slides, and may state home_deg
+    or home_mm, by default the range's middle. convention: "standard" or "modified". Raises ConfigError for unknown keys
+    and missing ranges.
+    """
+    if convention not in _CONVENTIONS:
+        raise ConfigError(f"robot {name}: convention is {convention!r}; allowed: {', '.join(_CONVENTIONS)}")
+    plain, ranges, homes = [], [], []
+    for number, row in enumerate(rows, 1):
+        plain.append(_plain(row, f"robot {name}: row {number}"))
+        own = row.get("name", f"q{number}")
+        if set(row) & {"xyz_mm", "rpy_deg"} or own not in row.get("drives", {own: 1.0}):
+            continue
+        unit = "mm" if row.get("sliding") else "deg"
+        if f"range_{unit}" not in row:
+            raise ConfigError(f"robot {name}: row {number} has no range_{unit}; allowed: lowest and highest value")
+        scale = 1.0 if unit == "mm" else np.pi / 180.0
+        ranges.append(scale * np.asarray(row[f"range_{unit}"], dtype=float))
+        homes.append(scale * row.get(f"home_{unit}", float(np.mean(row[f"range_{unit}"]))))
+    return serial(plain, ranges, homes, modified=convention == "modified", name=name, **options)
+
+
+def _plain(row, where):
+    """A row as `serial` takes it."""
+    result = {}
+    for key, value in row.items():
+        if key in _LENGTHS:
+            result[key.removesuffix("_mm")] = value
+        elif key in _ANGLES:
+            short = "rpy_rad" if key == "rpy_deg" else key.removesuffix("_deg")
+            result[short] = np.radians(value)
+        elif key in {*JOINT, *FRAME} - {"a", "alpha", "d", "theta", "rpy_rad"}:
+            result[key] = value
+        elif key not in _VALUES:
+            raise ConfigError(f"{where} has {key!r}; allowed: {', '.join((*_LENGTHS, *_ANGLES, *_VALUES))}, ..")
+    return result

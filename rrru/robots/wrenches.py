@@ -1,0 +1,126 @@
+"""Screws of passive joints, and the wrenches on the platform that these do not feel.
+
+Legs that share passive joints, behind which they part, make a group. Their screws are stacked, rows 6 m for m legs, a
+shared joint in all of them, and so are the wrenches W with W S = 0; where each leg ends is its own, where the platform
+is the same for all. Screws and twists are at the world's origin, the velocity first. Lengths in mm, angles in rad.
+"""
+
+import numpy as np
+
+from rrru.robots.closure_kernel import ARM_MM
+from rrru.robots.walk import Twists, bar_ends, walks
+
+# passive motions that a leg's singular values, lengths counted in the arm, tell from none
+_RANK = 1e-7
+SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
+
+
+def groups_of(legs):
+    """Numbers of the legs of each group."""
+    result = []
+    for number, leg in enumerate(legs.legs):
+        own = {joint.name for joint in leg.joints if joint.passive}
+        # what legs share lies before where they part, in the first of them as in all
+        near = (group for group in result if own & {joint.name for joint in legs.legs[group[0]].joints})
+        group = next(near, None)
+        if group is None:
+            result.append([number])
+        else:
+            group.append(number)
+    return tuple(map(tuple, result))
+
+
+def screw(joint, axis, place):
+    """Screw (n, 6) of a joint with axes (n, 3) through places (n, 3)."""
+    turning = joint.kind == "R"
+    return np.concatenate([np.cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
+
+
+def line_wrench(near, far):
+    """Wrench (n, 6) of unit force along the lines from near to far, both (n, 3): force and moment about the origin."""
+    line = far - near
+    line = line / np.linalg.norm(line, axis=1, keepdims=True)
+    return np.concatenate([line, np.cross(near, line)], axis=1)
+
+
+def frame_along(lines):
+    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
+    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
+    helper = np.eye(3)[np.abs(x).argmin(axis=1)]
+    y = np.cross(helper, x)
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=2)
+
+
+def group_screws(legs, group, ways, spare=frozenset()):
+    """Names (k,) of the passive joints of a group of m legs, without spare ones, and their screws (n, 6 m, k)."""
+    own = [[j for j in legs.legs[number].joints if j.passive and j.name not in spare] for number in group]
+    names = list(dict.fromkeys(joint.name for joints in own for joint in joints))
+    result = np.zeros((len(ways[group[0]].place), 6 * len(group), len(names)))
+    for row, (number, joints) in enumerate(zip(group, own, strict=True)):
+        for joint in joints:
+            k = legs.legs[number].joints.index(joint)
+            one = screw(joint, ways[number].axes[k], ways[number].places[k])
+            result[:, 6 * row : 6 * row + 6, names.index(joint.name)] = one
+    return names, result
+
+
+def spare_joints(legs):
+    """Names of the passive joints that depend on those before them a little off home, where joints may stand in line.
+
+    They keep their values: a link between two ball joints does not spin.
+    """
+    offset, result = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints))), set()
+    ways = walks(legs, legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs))
+    for group in groups_of(legs):
+        names, (screws,) = group_screws(legs, group, ways)
+        ranks = [rank_of(screws[:, :count]) for count in range(len(names) + 1)]
+        result |= {name for name, more in zip(names, np.diff(ranks), strict=True) if not more}
+    return result
+
+
+def rank_of(screws):
+    """Number of independent screws (6 m, k)."""
+    scale = np.resize(SCALE, len(screws))
+    return int(np.linalg.matrix_rank(screws / scale[:, None], tol=_RANK)) if screws.shape[1] else 0
+
+
+def constraints_of(legs, spare):
+    """Number of the wrenches of every group, `spare` the names of the joints that keep their values."""
+    result = []
+    for group in groups_of(legs):
+        joints = {joint.name for number in group for joint in legs.legs[number].joints if joint.passive}
+        result.append(1 if legs.legs[group[0]].bar else 6 * len(group) - len(joints - spare))
+    return result
+
+
+def wrenches_of(legs, spare, ways, poses, actuators, twists):
+    """Wrenches (n, r, 6) of every leg, which together with its group's others the passive joints do not feel.
+
+    spare: names of joints that keep their values.
+    """
+    result = [None] * len(legs.legs)
+    for group in groups_of(legs):
+        leg, way = legs.legs[group[0]], ways[group[0]]
+        if leg.bar:
+            near, far, _ = bar_ends(legs, leg, way, poses, actuators, twists)
+            result[group[0]] = line_wrench(near, far)[:, None]
+            continue
+        both = _beside(group_screws(legs, group, ways, spare)[1])
+        for row, number in enumerate(group):
+            result[number] = both[:, :, 6 * row : 6 * row + 6]
+    return result
+
+
+def _beside(screws):
+    """Wrenches (n, 6 m - k, 6 m) that independent screws (n, 6 m, k) do not feel."""
+    scale = np.resize(SCALE, screws.shape[1])
+    if not screws.shape[2]:
+        return np.broadcast_to(np.eye(len(scale)), (len(screws), len(scale), len(scale)))
+    u, _, _ = np.linalg.svd(screws / scale[:, None])
+    return u[:, :, screws.shape[2] :].transpose(0, 2, 1) / scale
+
+
+def by_group(legs, wrenches):
+    """Wrenches (n, r, 6) on the platform by groups of legs, from those of the legs."""
+    return [sum((wrenches[k] for k in group[1:]), wrenches[group[0]]) for group in groups_of(legs)]
