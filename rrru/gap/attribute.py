@@ -181,7 +181,9 @@ def _rounds(case, calibrated, prior, stated):
             # a law off the grid of its shapes gets its chance before an unknown function takes what it leaves
             hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
         try:
-            state, covariance = refine(case, state, hypothesis, level)
+            # what a dropped effect has done to the others' numbers can hold a fit back
+            dropped = {name for name, _ in state.effects} - hypothesis.effects
+            state, covariance = refine(case, calibrated if dropped else state, hypothesis, level)
             case, linear, source = seen(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:

@@ -77,19 +77,18 @@ def search(evidence, most=8):
 
 def _grow(tried, choices, layer, most):
     """Try sets of more effects as long as they gain, and the best one with each of its effects out or replaced."""
-    best = layer[:1]
     for size in range(_SMALL + 1, most + 1):
+        best = tried.best
         layer = tried.grown(layer, choices, size)
-        if not layer or layer[0].evidence.max() < best[0].evidence.max():
+        if not layer or layer[0].evidence.max() < best.evidence.max():
             break
-        best = layer[:1]
     for _ in range(_REPLACEMENTS):
-        start = best[0]
-        if len(start.terms) <= _SMALL:
+        start = tried.best
+        if len(start.terms) < _SMALL:
             break
         fewer = [tried.polished(tuple(t for t in start.terms if t != term)) for term in start.terms]
-        best = tried.grown(fewer, choices, len(start.terms))
-        if not best or best[0].terms == start.terms:
+        tried.grown(fewer, choices, len(start.terms))
+        if tried.best is start:
             break
 
 
@@ -161,9 +160,14 @@ class _Tried:
             self.hypotheses[key] = Hypothesis(tuple(terms), full, best)
         return self.hypotheses[key]
 
+    @property
+    def best(self):
+        """The hypothesis of the highest evidence."""
+        return max(self.hypotheses.values(), key=lambda h: h.evidence.max())
+
     def near_levels(self):
         """Indices of the discrepancy levels next to the best hypothesis' own, and none at all."""
-        best = max(self.hypotheses.values(), key=lambda h: h.evidence.max()).evidence.argmax()
+        best = self.best.evidence.argmax()
         return np.unique([0, 1, *(np.clip([best - 1, best, best + 1], 0, len(LEVELS) - 1))])
 
     def best_of_size(self, size):
