@@ -1,4 +1,4 @@
-"""Least mean distance on a linearised model: what the twin's search can afford for every candidate."""
+"""Least mean distance of many draws on a linearised model: what the twin's search can afford for every candidate."""
 
 import numpy as np
 
@@ -7,48 +7,60 @@ from rrru.fit.identifiability import RANK_TOLERANCE
 
 
 def linear_fit(mechanism, theta, measured, start):
-    """Deviations (p,) of least mean distance and the minimum, on the model linearised at its least-squares deviations.
+    """Deviations (d, p) of least mean distance and the minima (d,) of d draws.
 
-    theta, measured, start: (n, 3). Raises FitError where the iteration leaves the reach.
+    The model is linearised once, at the least-squares deviations of the draws' mean. theta, start: (n, 3); measured:
+    (d, n, 3). Raises FitError where the iteration leaves the reach.
     """
-    deviations = mechanism.parameters.nominal
+    deviations, centre = mechanism.parameters.nominal, measured.mean(axis=0)
     for _ in range(3):
-        residual = measured - mechanism.forward(theta, deviations, start)
-        jacobian = mechanism.parameter_jacobian(measured - residual, theta, deviations)
+        residual = centre - mechanism.forward(theta, deviations, start)
+        jacobian = mechanism.parameter_jacobian(centre - residual, theta, deviations)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             raise FitError("the candidate's calibration leaves the reach")
         flat = jacobian.reshape(-1, jacobian.shape[-1])
         step = np.linalg.lstsq(flat, residual.ravel(), rcond=RANK_TOLERANCE)[0]
         deviations = deviations + step
     whitened = np.linalg.qr(flat)
-    q, value = _least_mean(residual - jacobian @ step, whitened.Q.reshape(jacobian.shape))
-    return deviations + np.linalg.solve(whitened.R, q), value
+    basis = whitened.Q.reshape(jacobian.shape)
+    q, value = _least_mean(residual - jacobian @ step + (measured - centre), basis)
+    return deviations + np.linalg.solve(whitened.R, q.T).T, value
 
 
 def _least_mean(residual, basis):
-    """Coordinates q (p,) that minimise the mean distance of residual (n, 3) - basis (n, 3, p) q, and the minimum.
+    """Coordinates q (d, p) that minimise the mean distances of residuals (d, n, 3) - basis (n, 3, p) q, and the minima.
 
-    Damped Newton.
+    Damped Newton from least squares; the basis is orthonormal.
     """
-    q = np.zeros(basis.shape[-1])
-    value = np.linalg.norm(residual, axis=1).mean()
+    q = np.einsum("dna,nap->dp", residual, basis)
+    value = _mean(residual, basis, q)
     for _ in range(30):
-        step, size = _newton_step(residual - basis @ q, basis), 1.0
-        while size > 1e-3 and np.linalg.norm(residual - basis @ (q + size * step), axis=1).mean() > value:
-            size *= 0.5
-        if size <= 1e-3:
-            break
-        q = q + size * step
-        previous, value = value, np.linalg.norm(residual - basis @ q, axis=1).mean()
-        if previous - value < 1e-10:
+        step, size = _newton_step(residual - _moved(basis, q), basis), np.ones(len(q))
+        while (worse := (size > 0.0) & (_mean(residual, basis, q + size[:, None] * step) > value)).any():
+            size[worse] = np.where(size[worse] > 1e-3, 0.5 * size[worse], 0.0)
+        q = q + size[:, None] * step
+        previous, value = value, _mean(residual, basis, q)
+        if (previous - value).max() < 1e-10:
             break
     return q, value
 
 
+def _moved(basis, q):
+    """Basis (n, 3, p) times coordinates (d, p), (d, n, 3)."""
+    return np.einsum("nap,dp->dna", basis, q)
+
+
+def _mean(residual, basis, q):
+    """Mean distances (d,) at coordinates (d, p)."""
+    return np.linalg.norm(residual - _moved(basis, q), axis=-1).mean(axis=-1)
+
+
 def _newton_step(residual, basis):
-    """Newton step (p,) of the mean distance of residuals (n, 3) that change by -basis (n, 3, p)."""
-    distance = np.maximum(np.linalg.norm(residual, axis=1), 1e-9)
-    along = np.einsum("na,nap->np", residual / distance[:, None], basis)
-    scaled = (basis / np.sqrt(distance)[:, None, None]).reshape(-1, basis.shape[-1])
-    along_scaled = along / np.sqrt(distance)[:, None]
-    return np.linalg.solve(scaled.T @ scaled - along_scaled.T @ along_scaled, along.sum(axis=0))
+    """Newton steps (d, p) of the mean distances of residuals (d, n, 3) that change by -basis (n, 3, p)."""
+    distance = np.maximum(np.linalg.norm(residual, axis=-1), 1e-9)
+    along = np.einsum("dna,nap->dnp", residual / distance[..., None], basis)
+    weight = 1.0 / distance
+    gram = np.einsum("nap,naq->npq", basis, basis)
+    turned = along * np.sqrt(weight)[..., None]
+    hessian = np.einsum("dn,npq->dpq", weight, gram) - turned.transpose(0, 2, 1) @ turned
+    return np.linalg.solve(hessian, along.sum(axis=1)[..., None])[..., 0]
