@@ -92,11 +92,11 @@ def spike_orders(trajectory, before_mm, under_lines_mm):
     the highest that is left. Heights are prominences.
     """
     first = np.asarray(trajectory) == "line_1"
-    before, after = (_spikes(np.linalg.norm(errors[first], axis=-1)) for errors in (before_mm, under_lines_mm))
+    before, after = (spikes(np.linalg.norm(errors[first], axis=-1)) for errors in (before_mm, under_lines_mm))
     return {"spikes_before": before[SPIKES - 1] / SPIKE_MM - 1.0, "spikes_after": 1.0 - after[0] / SPIKE_MM}
 
 
-def _spikes(size_mm):
+def spikes(size_mm):
     """Heights in mm of the sharp spikes of errors (n,), highest first, at least SPIKES entries."""
     _, found = find_peaks(size_mm, prominence=0.0, width=(0.0, SPIKE_POINTS))
     return sorted([*found["prominences"], *np.zeros(SPIKES)], reverse=True)

@@ -5,8 +5,8 @@ per leg, whole number of periods per turn), non-repeatability, the line groups' 
 Nothing else: no number of the paper is fed into the simulation. What is compared is the median over draws of wobble and
 noise, so that the twin is a robot and not one lucky measurement. For speed the search solves eq. (8) with clearance to
 first order, which equals the spatial closure to micrometres as long as the axes are ideal, and calibrates on a
-linearised model, which is true to hundredths of a millimetre where it was calibrated; what it finds is then run and calibrated like every other
-campaign. Lengths in mm, angles in rad.
+linearised model, which is true to hundredths of a millimetre where it was calibrated. What it finds is then run and
+calibrated like every other campaign. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
