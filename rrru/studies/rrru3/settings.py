@@ -11,10 +11,10 @@ def check(config):
     for key, known in named.items():
         if reproduce[key] not in known:
             raise ConfigError(f"reproduce.{key} is {reproduce[key]!r}; known: {', '.join(known)}")
-    for name in sweep["readings"]:
-        values = reading(sweep, name)["values"]
+    own = {f"sweep.readings.{name}.values": reading(sweep, name)["values"] for name in sweep["readings"]}
+    for key, values in {"sweep.values": sweep["values"], **own}.items():
         if len({float(value) for value in values}) < len(values):
-            raise ConfigError(f"sweep.readings.{name}: values hold a number twice: {', '.join(values)}")
+            raise ConfigError(f"{key} holds a number twice: {', '.join(values)}")
     for kind, sizes in sweep["populations"].items():
         if (len(sizes) == 1) != (kind == "one"):
             raise ConfigError(f"sweep.populations.{kind} is {sizes}; allowed: one size for one, several for islands")

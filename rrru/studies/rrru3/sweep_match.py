@@ -18,9 +18,9 @@ _MIDDLE = (0.025, 0.975)
 def sweep_match(runs, seed=0):
     """Rows of `sweep_match`, one per SWEEP of a table of runs, whose values the paper prints.
 
-    A printed curve is a single run a value. It is reproduced where it lies from the medians here as far as curves do
-    that are drawn here, a run a value: neither further, nor nearer than chance lets them. The curves' mean is taken
-    off, since the level belongs to the robot. `seed` is of these draws.
+    A printed curve is a single run a value. It is reproduced where it is one of the curves that are drawn here, a run a
+    value: as far from the medians, its mean taken off, since the level belongs to the robot, and of such a range. Each
+    has to lie in the middle 95 % of the drawn ones. `seed` is of these draws.
     """
     rows, runs = [], runs[np.isfinite(runs["objective_mm"])]
     for parameter, (table, printed) in PRINTED.items():
@@ -44,6 +44,8 @@ def _row(group, key, printed, shared, seed):
     generator = stream(seed, "sweep_match", *key)
     drawn = np.stack([generator.choice(sample, _CURVES) for sample in samples.values()], axis=1)
     low, high = np.quantile(_apart(drawn, medians), _MIDDLE)
+    ranges = np.quantile(np.ptp(drawn, axis=1), _MIDDLE)
+    alike = low <= distance <= high and ranges[0] <= np.ptp(curve) <= ranges[1]
     common = np.isin(list(samples), shared)
     return dict(zip(SWEEP, key, strict=True)) | {
         "settings": len(samples),
@@ -55,8 +57,10 @@ def _row(group, key, printed, shared, seed):
         "distance_shared_mm": float(_apart(medians[common], curve[common])),
         "scatter_mm": float(np.median([np.ptp(sample) for sample in samples.values()])),
         "range_mm": float(np.ptp(medians)),
+        "chance_range_low_mm": float(ranges[0]),
+        "chance_range_high_mm": float(ranges[1]),
         "printed_range_mm": float(np.ptp(curve)),
-        "verdict": "reproduced" if low <= distance <= high else "not reproduced",
+        "verdict": "reproduced" if alike else "not reproduced",
     }
 
 

@@ -35,6 +35,11 @@ def test_scatter_like_the_printed_one_reproduces_and_hundreds_of_times_as_much_d
     assert row["printed_range_mm"] == pytest.approx(0.0003)
     # too smooth to be a draw of these
     assert match(runs(flat, 0.03)).iloc[0]["verdict"] == "not reproduced"
+    # medians that happen to be flat do not help where single runs are not
+    pairs = runs(np.full(20, 0.7), 0.0, values=np.repeat(VALUES, 2), seeds=1)
+    pairs["objective_mm"] += 0.02 * np.tile([-1.0, 1.0], 10)
+    row = match(pairs.assign(seed=np.tile([1, 2], 10))).iloc[0]
+    assert row["range_mm"] < 1e-9 < 0.0003 < row["chance_range_low_mm"] and row["verdict"] == "not reproduced"
     # too far away
     assert match(runs(np.linspace(0.5, 0.6, 10), 0.0001)).iloc[0]["verdict"] == "not reproduced"
 
