@@ -28,7 +28,8 @@ range_mm               float  range of the medians
 chance_range_low_mm    float  lower end of the middle 95 % of the range of curves of single runs drawn here
 chance_range_high_mm   float  upper end
 printed_range_mm       float  range of the printed curve
-verdict                str    reproduced where distance and range are as chance makes them here {reproduced, not reproduced}
+verdict                str    reproduced where distance and range are as chance makes them here {reproduced,
+    not reproduced}
 
 ## twin_numbers | tables/twin_numbers.parquet | name
 Every number of the twin that was searched, and the bounds of the search.
