@@ -5,8 +5,8 @@ import numpy as np
 from rrru.errors import FitError
 from rrru.fit.identifiability import RANK_TOLERANCE
 
-# weight in mm of the squared excess over a bound, counted in bounds: they are kept to some ten thousandths
-_STIFFNESS = 1e3
+# weight in mm of the squared excess over a bound, counted in bounds: they are kept to some thousandths
+_STIFFNESS = 10.0
 # shares of a Newton step that are tried
 _SIZES = np.array([0.0, *0.5 ** np.arange(10)])
 
@@ -74,7 +74,7 @@ def _least_mean(residual, basis, bounds):
         return np.linalg.norm(residual - _moved(basis, q), axis=-1).mean(axis=-1) + bounds.value(q)
 
     value, every = cost(q), np.arange(len(q))
-    for _ in range(40):
+    for _ in range(60):
         step = _newton_step(residual - _moved(basis, q), basis, *bounds.slope_and_bend(q))
         tried = q + _SIZES[:, None, None] * step
         costs = cost(tried)
