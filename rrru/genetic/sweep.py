@@ -16,7 +16,7 @@ SWEPT = ("crossover_fraction", "migration_fraction")
 # one sweep: reading of the paper, where runs stop, setting, kind of population
 SWEEP = ["operators", "stop", "parameter", "population"]
 _LEVEL = 0.05
-_RESAMPLES = 4999
+_RESAMPLES = 1999
 
 
 def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
