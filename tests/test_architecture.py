@@ -26,7 +26,7 @@ _FLOORS = {
 _APART = {"store": {"errors"}, "figures": {"errors", "store"}}
 _DRAWING = {p.relative_to(_ROOT).as_posix() for p in (_ROOT / "rrru").rglob("*.py") if "figures" in str(p)}
 _LIBRARIES = {
-    "pygad": {"rrru/genetic/algorithm.py"},
+    "pygad": {"rrru/genetic/pygad_run.py"},
     "matplotlib": _DRAWING,
     "cv2": {"rrru/plant/camera.py", "rrru/studies/delta/vision.py"},
     "snakemake": set(),

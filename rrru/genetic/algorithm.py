@@ -1,75 +1,32 @@
-"""The paper's genetic algorithm (MATLAB `ga`) on PyGAD: PyGAD keeps the loop, the random state and the callbacks.
+"""The paper's genetic algorithm: MATLAB's `ga` step by step, in blocks of generations that run compiled.
 
-PyGAD's own hooks cannot express MATLAB's step, which needs more parents than a population has members, and whose
-crossover *fraction* splits the children between crossover and mutation. So PyGAD's selection passes through, its
-mutation is off, it keeps neither parents nor elites, and its crossover callable returns the whole next population of
-all islands: that after a block of MATLAB's generations, since one of PyGAD's costs several times what the step does.
+PyGAD's own algorithm, another reading of the paper, is in `pygad_run`; `minimise` calls what the settings name.
 """
 
-import logging
-from dataclasses import dataclass
 from numbers import Integral
 
 import numpy as np
-import pandas as pd
-import pygad
 
 from rrru.errors import ConfigError, FitError
-from rrru.genetic import operators
-from rrru.genetic.plan import Box, draws_needed, make_rules, mutation_sigma
+from rrru.genetic import operators, pygad_run
+from rrru.genetic.islands import migrate
+from rrru.genetic.plan import Box, directions, make_rules, migrants_of, mutants_of, mutation_sigma, uniforms_needed
+from rrru.genetic.result import GeneticResult, means
 from rrru.genetic.settings import is_number
 from rrru.robots.compiled import CompiledObjective
 
-# MATLAB's generations in one of PyGAD's: enough to make PyGAD's cost negligible, few enough to stay in the cache
+# generations whose random numbers are drawn at once: few enough to stay in the cache
 BLOCK = 100
-
-# PyGAD logs every exception before raising it again; the exception is enough
-_LOGGER = logging.getLogger(f"{__name__}.pygad")
-_LOGGER.addHandler(logging.NullHandler())
-_LOGGER.propagate = False
-
-
-@dataclass(frozen=True)
-class GeneticResult:
-    """What one run found.
-
-    deviations: (p,) the best individual; objective: its objective, inf if none was feasible; generations: done;
-    evaluations: individuals whose objective was needed (elites and migrants keep theirs); stopped: "generations" or
-    "stalled"; best_history, mean_history: (generations + 1,) best, and mean over the feasible individuals, of the
-    objective in the initial population (entry 0) and after each generation, before migration; inf where nobody is
-    feasible.
-    """
-
-    deviations: np.ndarray
-    objective: float
-    generations: int
-    evaluations: int
-    stopped: str
-    best_history: np.ndarray
-    mean_history: np.ndarray
-
-    def row(self):
-        """Objective, counts and reason to stop, by the tables' names."""
-        counts = {"generations": self.generations, "evaluations": self.evaluations, "stopped": self.stopped}
-        return {"objective_mm": self.objective} | counts
-
-    def history(self):
-        """Frame of the convergence: every generation up to 100, every 10th after it, and the last."""
-        every = np.arange(self.generations + 1)
-        kept = every[(every <= 100) | (every % 10 == 0) | (every == self.generations)]
-        return pd.DataFrame(
-            {"generation": kept, "best_mm": self.best_history[kept], "mean_mm": self.mean_history[kept]}
-        )
 
 
 def minimise(objective, low, high, settings, seed):
-    """Minimum of an objective within bounds by the genetic algorithm.
+    """Minimum of an objective within bounds by the genetic algorithm that GeneticSettings name.
 
     objective: callable, vectors (m, p) to values (m,), inf where infeasible; a CompiledObjective is called without
     Python and not asked again for a child that equals an individual of the last population. low, high: bounds (p,),
-    finite, low < high; seed: whole number in 0..2^32 - 1, handed to PyGAD as it is. Returns a GeneticResult; the same
-    seed gives the same bytes, since every draw comes from PyGAD's own generator. Raises ConfigError for bounds or a
-    seed that are not allowed and FitError where the objective returns NaN or a wrong number of values.
+    finite, low < high; seed: whole number in 0..2^32 - 1. Returns a GeneticResult; the same seed gives the same bytes.
+    Raises ConfigError for bounds or a seed that are not allowed and FitError where the objective returns NaN or a wrong
+    number of values.
     """
     low, high = np.array(low, dtype=float), np.array(high, dtype=float)
     vectors = low.ndim == 1 and low.size and low.shape == high.shape
@@ -77,133 +34,97 @@ def minimise(objective, low, high, settings, seed):
         raise ConfigError(f"bounds are {low} and {high}; allowed: two vectors of one length, finite, low < high")
     if not is_number(seed, Integral) or not 0 <= seed < 2**32:
         raise ConfigError(f"seed is {seed!r}; allowed: a whole number in 0..{2**32 - 1}")
-    run = _Run(objective, low, high, settings)
-    size = sum(settings.populations)
-    ga = _BatchGA(
-        num_generations=-(-int(settings.generations) // BLOCK),
-        num_parents_mating=1,
-        fitness_func=run.fitness,
-        fitness_batch_size=size,
-        sol_per_pop=size,
-        num_genes=low.size,
-        init_range_low=0.0,
-        init_range_high=1.0,
-        parent_selection_type=_pass_through,
-        keep_parents=0,
-        keep_elitism=0,
-        crossover_type=run.crossover,
-        mutation_type=None,
-        on_generation=run.on_generation,
-        suppress_warnings=True,
-        random_seed=int(seed),
-        logger=_LOGGER,
-    )
-    ga.run()
-    return run.result(ga)
+    if settings.operators == "pygad":
+        return pygad_run.run(checked(objective), Box(low, high), settings, int(seed))
+    return _Run(objective, Box(low, high), settings, np.random.default_rng(seed)).result()
 
 
-class _BatchGA(pygad.GA):
-    """PyGAD's loop with the two public methods that visit every individual in Python replaced by array forms."""
+def checked(objective):
+    """The objective that raises FitError where it returns NaN or a wrong number of values."""
 
-    def cal_pop_fitness(self):
-        """Fitness of the whole population, shape (n,), in one call."""
-        return self.fitness_func(self, self.population, None)
+    def rate(deviations):
+        score = np.asarray(objective(deviations), dtype=float)
+        if score.shape != (len(deviations),) or np.isnan(score).any():
+            raise FitError(
+                f"the objective of {len(deviations)} individuals has shape {score.shape} or holds NaN; "
+                "allowed: a number or inf each"
+            )
+        return score
 
-    def best_solution(self, pop_fitness=None):
-        """Best individual, its fitness and its row."""
-        fitness = self.cal_pop_fitness() if pop_fitness is None else pop_fitness
-        row = int(np.argmax(fitness))
-        return self.population[row].copy(), fitness[row], row
+    return rate
 
 
 class _Run:
-    """One run behind the callables that PyGAD is given; each of PyGAD's generations is a block of MATLAB's."""
+    """One run: the last generation's genes and scores, and the histories so far."""
 
-    def __init__(self, objective, low, high, settings):
-        self.objective, self.box, self.settings = objective, Box(low, high), settings
+    def __init__(self, objective, box, settings, generator):
+        self.objective, self.box, self.settings, self.generator = objective, box, settings, generator
         self.rules = make_rules(settings, looks_up=isinstance(objective, CompiledObjective))
-        self.draws = draws_needed(self.rules.plan, low.size)
-        self.score, self.done, self.stopped = None, 0, "generations"
-        self.best = np.empty(int(settings.generations) + 1)
-        self.mean = [np.empty(0)]
+        self.migrants = migrants_of(settings.populations, settings.migration_fraction)
+        self.rate = checked(objective)
+        self.population = generator.random((sum(settings.populations), box.low.size))
+        self.score = self.rate(operators.decoded(self.population, box))
+        self.best, self.size = np.full(int(settings.generations) + 1, np.inf), np.nan
+        self.best[0], self.done, self.stopped = self.score.min(), 0, "generations"
+        self.mean, self.found = [], []
+        self._note(self.population[None], self.score[None])
 
-    def fitness(self, _ga, genes, _rows):
-        """PyGAD's fitness, minus the objective, of the whole population."""
-        if self.score is None:
-            self.score = np.empty(len(genes))
-            self._rate(operators.decoded(genes, self.box), None, None, self.score)
-            self.best[0] = self.score.min()
-            self.mean.append(_means(self.score[None]))
-        return -self.score
+    def result(self):
+        """Breed until the end or until the run stalls; the GeneticResult."""
+        settings, several = self.settings, len(self.settings.populations) > 1
+        while self.done < settings.generations and self.stopped != "stalled":
+            if several and self.done > 0 and self.done % settings.migration_interval == 0:
+                self.population, self.score = migrate(self.population, self.score, self.rules.plan, self.migrants)
+            until_migration = settings.migration_interval - self.done % settings.migration_interval
+            block = min(BLOCK, until_migration) if several else BLOCK
+            self._breed(min(block, settings.generations - self.done))
+        children = len(self.population) - self.rules.plan[:, 2].sum()
+        return GeneticResult(
+            stopped=self.stopped,
+            found=np.concatenate(self.found),
+            best_history=self.best[: self.done + 1],
+            mean_history=np.concatenate(self.mean),
+            asked=len(self.population) + children * np.arange(self.done + 1),
+        )
 
-    def crossover(self, _parents, _shape, ga):
-        """A block of MATLAB's generations: migration if due, elites, crossover children and mutants of all islands."""
-        draws = self._draw(ga.numpy_random_generator)
-        populations = np.empty((len(draws[2]) + 1, *ga.population.shape))
+    def _breed(self, count):
+        """A block of generations: elites, crossover children and mutants of all islands."""
+        draws = self._draw(count)
+        populations = np.empty((count + 1, *self.population.shape))
         scores = np.empty(populations.shape[:2])
-        populations[0], scores[0] = ga.population, self.score
+        populations[0], scores[0] = self.population, self.score
         if self.rules.looks_up:
             advance, objective = operators.advance, (self.objective.kernel, self.objective.legs, self.objective.points)
         else:
-            advance, objective = operators.advance.py_func, (self._rate, None, None)
-        count = advance(*objective, self.box, self.rules, draws, self.done, populations, scores, self.best)
-        self.done += count
-        self.score = scores[count]
-        self.mean.append(_means(scores[1 : count + 1]))
+            advance, objective = operators.advance.py_func, (self._rate_into, None, None)
+        done = advance(*objective, self.box, self.rules, draws, self.done, populations, scores, self.best)
+        self.done += done
+        self.population, self.score, self.size = populations[done], scores[done], draws[2][done]
+        self._note(populations[1 : done + 1], scores[1 : done + 1])
         stall = self.rules.stall_generations, self.rules.stall_tolerance
         if self.done < self.settings.generations and operators.has_stalled(self.best[: self.done + 1], *stall):
             self.stopped = "stalled"
-        return populations[count]
 
-    def on_generation(self, _ga):
-        """Tell PyGAD to stop where the best objective has stalled."""
-        return "stop" if self.stopped == "stalled" else None
-
-    def result(self, ga):
-        """The GeneticResult of a finished run."""
-        genes, fitness, _ = ga.best_solution(ga.last_generation_fitness)
-        children = ga.sol_per_pop - self.rules.plan[:, 2].sum()
-        return GeneticResult(
-            deviations=operators.decoded(genes[None], self.box)[0],
-            objective=float(-fitness),
-            generations=self.done,
-            evaluations=int(ga.sol_per_pop + self.done * children),
-            stopped=self.stopped,
-            best_history=self.best[: self.done + 1],
-            mean_history=np.concatenate(self.mean),
-        )
-
-    def _draw(self, rng):
-        """Random numbers and the mutation's sigma of the next block, in the order of single generations."""
-        settings = self.settings
-        following = range(self.done + 1, min(self.done + BLOCK, settings.generations) + 1)
-        uniform, normal = (np.empty((len(following), number)) for number in self.draws)
-        for k in range(len(following)):
-            uniform[k], normal[k] = rng.random_sample(self.draws[0]), rng.standard_normal(self.draws[1])
+    def _draw(self, count):
+        """Random numbers and the mutation's sizes of the next generations."""
+        settings, genes, plan = self.settings, self.box.low.size, self.rules.plan
+        mutants = int(mutants_of(plan).sum())
+        uniform = self.generator.random((count, uniforms_needed(plan, genes)))
+        if self.rules.adapts:
+            moves = directions(self.generator, count * mutants, genes).reshape(count, mutants, 2 * genes, genes)
+        else:
+            moves = self.generator.standard_normal((count, mutants, 1, genes))
         scale = settings.mutation_scale, settings.mutation_shrink
-        sigma = [mutation_sigma(generation, settings.generations, *scale) for generation in following]
-        return uniform, normal, np.array(sigma)
+        following = range(self.done + 1, self.done + count + 1)
+        sizes = [mutation_sigma(generation, settings.generations, *scale) for generation in following]
+        return uniform, moves, np.array([self.size, *sizes])
 
-    def _rate(self, deviations, _legs, _points, values):
+    def _note(self, populations, scores):
+        """Keep mean objective and best individual of generations (k, n, p) with scores (k, n)."""
+        self.mean.append(means(scores))
+        best = populations[np.arange(len(scores)), scores.argmin(axis=1)]
+        self.found.append(operators.decoded(best, self.box))
+
+    def _rate_into(self, deviations, _legs, _points, values):
         """The objective as `operators.advance` calls it."""
-        score = np.asarray(self.objective(deviations), dtype=float)
-        if score.shape != values.shape or np.isnan(score).any():
-            raise FitError(
-                f"the objective of {len(values)} individuals has shape {score.shape} or holds NaN; "
-                "allowed: a number or inf each"
-            )
-        values[:] = score
-
-
-def _means(scores):
-    """Mean over the feasible individuals of each row (k,) of scores (k, n), inf where nobody is feasible."""
-    feasible = np.isfinite(scores)
-    if feasible.all():
-        return scores.mean(axis=1)
-    rows = zip(scores, feasible, strict=True)
-    return np.array([row[finite].mean() if finite.any() else np.inf for row, finite in rows])
-
-
-def _pass_through(_fitness, count, ga):
-    """PyGAD's selection hook, unused: the first individuals, not copied."""
-    return ga.population[:count], np.arange(count)
+        values[:] = self.rate(deviations)

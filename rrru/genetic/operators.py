@@ -1,4 +1,4 @@
-"""Operators of the genetic algorithm that the paper used (MATLAB `ga`) as array functions, and its loop.
+"""Operators of the genetic algorithm that the paper used (MATLAB `ga`) as array functions, and its generations.
 
 Scores are minimised; `inf` marks an infeasible individual. Genes lie in 0..1. Random numbers are drawn outside and
 handed in, so that the same numbers give the same children. All islands of a population lie in one array, one after the
@@ -12,6 +12,8 @@ import numpy as np
 
 # expected number of the best individual's places over the average's ("shift linear" scaling's default)
 SURVIVAL_RATE = 2.0
+# adaptive feasible mutation's steps, in units of the range: roots of a mesh between 1 and the constraint tolerance 1e-3
+LARGEST_STEP, SMALLEST_STEP = 1.0, 1e-3**0.5
 
 _compiled = numba.njit(cache=True, error_model="numpy")
 
@@ -24,8 +26,7 @@ def shift_linear(score, parents):
     the worst would fall below zero: then the worst gets zero. Where all scores are equal, or none is finite, everyone
     gets the same.
     """
-    # ASSUME an infeasible individual (score not finite) gets no place while anyone is feasible, and does not enter mean
-    # and extremes.
+    # ASSUME an infeasible individual (score inf) gets no place while anyone is feasible, nor enters mean and extremes.
     n = score.size
     feasible = 0
     best, worst = np.inf, -np.inf
@@ -97,12 +98,36 @@ def scattered(population, parents, coin, children):
 @_compiled
 def gaussian(population, parents, step, mutants):
     """Write mutants (k, p) of parents' indices (k,) in a population (n, p): moved by step (k, p), folded to 0..1."""
-    # ASSUME the paper names neither mutation nor bounds; MATLAB's Gaussian one knows none. Reflected at the bounds:
-    # with steps of one range, clipping would put most mutated genes onto a bound, and finds worse minima.
+    # ASSUME MATLAB's Gaussian mutation knows no bounds. Reflected there: with steps of one range, clipping would put
+    # most mutated genes onto a bound, and finds worse minima.
     for i in range(step.shape[0]):
         for q in range(step.shape[1]):
             folded = abs(population[parents[i], q] + step[i, q]) % 2.0
             mutants[i, q] = 2.0 - folded if folded > 1.0 else folded
+
+
+@_compiled
+def feasible(population, parents, steps, mutants):
+    """Write mutants (k, p) of parents' indices (k,): moved by the first of steps (k, t, p) that stays in 0..1.
+
+    A parent for which none does is copied.
+    """
+    for i in range(len(steps)):
+        own = population[parents[i]]
+        mutants[i] = own
+        for step in steps[i]:
+            if ((own + step >= 0.0) & (own + step <= 1.0)).all():
+                mutants[i] = own + step
+                break
+
+
+@_compiled
+def adapted(size, best, generation):
+    """Size of the steps to a generation, from `size` to the one before: doubled after a better one, else halved."""
+    if generation <= 2:
+        return LARGEST_STEP
+    better = best[generation - 1] < best[generation - 2]
+    return min(2.0 * size, LARGEST_STEP) if better else max(0.5 * size, SMALLEST_STEP)
 
 
 @_compiled
@@ -119,42 +144,13 @@ def ranked(score):
 
 
 @_compiled
-def _put(rows, target, first):
-    """Write rows (k, p) to the rows of target from `first` on."""
-    for i in range(rows.shape[0]):
-        for q in range(rows.shape[1]):
-            target[first + i, q] = rows[i, q]
-
-
-@_compiled
-def migrate(population, score, plan, migrants):
-    """Population (n, p) and scores (n,) after the best of each island were copied over the worst of the next.
-
-    migrants: (islands,), see `plan.migrants_of`; they also stay where they were. Of equal scores the earlier is better.
-    """
-    # ASSUME all migrants leave before any arrives, so that nothing travels further than one island at a time.
-    arrived, arrived_score = population.copy(), score.copy()
-    islands = len(plan)
-    for source in range(islands if islands > 1 else 0):
-        target = (source + 1) % islands
-        first, beyond = plan[target, 0], plan[target, 1]
-        best = ranked(score[plan[source, 0] : plan[source, 1]])
-        worst = ranked(score[first:beyond])[beyond - first - migrants[source] :]
-        for k in range(migrants[source]):
-            leaver = plan[source, 0] + best[k]
-            _put(population[leaver : leaver + 1], arrived, first + worst[k])
-            arrived_score[first + worst[k]] = score[leaver]
-    return arrived, arrived_score
-
-
-@_compiled
 def next_population(population, score, plan, draws, children, known):
     """Write the next population to children (n, p) and what is known of its scores (n,): the elites', else NaN.
 
-    draws: uniform and normal random numbers, see `plan.draws_needed`, and the mutation's sigma. Each island's rows are
-    its elites (best first), crossover children and mutants; all parents are selected at once, shuffled, first in pairs.
+    draws: uniform random numbers and moves (mutants, t, p), see `plan`, and the moves' size. Each island's rows are its
+    elites (best first), crossover children and mutants; all parents are selected at once, shuffled, first in pairs.
     """
-    uniform, normal, sigma = draws
+    uniform, moves, size = draws
     genes = population.shape[1]
     known[:] = np.nan
     u, g = 0, 0
@@ -166,7 +162,7 @@ def next_population(population, score, plan, draws, children, known):
         own, own_score = population[start:stop], score[start:stop]
         rank = ranked(own_score)
         for i in range(elites):
-            _put(own[rank[i] : rank[i] + 1], children, start + i)
+            children[start + i] = own[rank[i]]
             known[start + i] = own_score[rank[i]]
         chosen = stochastic_uniform(shift_linear(own_score, count), count, uniform[u])
         parents = shuffled(chosen, uniform[u + 1 : u + 1 + count])
@@ -174,9 +170,12 @@ def next_population(population, score, plan, draws, children, known):
         coin = uniform[u : u + crossed * genes].reshape(crossed, genes)
         u += crossed * genes
         scattered(own, parents, coin, children[start + elites : first])
-        step = sigma * normal[g : g + mutated * genes].reshape(mutated, genes)
-        g += mutated * genes
-        gaussian(own, parents[2 * crossed :], step, children[first:stop])
+        steps = size * moves[g : g + mutated]
+        g += mutated
+        if moves.shape[1] == 1:
+            gaussian(own, parents[2 * crossed :], steps[:, 0], children[first:stop])
+        else:
+            feasible(own, parents[2 * crossed :], steps, children[first:stop])
 
 
 @_compiled
@@ -217,25 +216,26 @@ def has_stalled(best, stall_generations, tolerance):
 
 @_compiled
 def advance(objective, legs, points, box, rules, draws, done, populations, scores, best):
-    """Breed and rate len(sigma) generations, fewer where the run stalls; returns their number.
+    """Breed and rate as many generations as there are draws, fewer where the run stalls; returns their number.
 
     objective: writes the values (m,) of parameters (m, p), see `rrru.robots.compiled`; box, rules: see `plan`; draws:
-    uniform (k, u), normal (k, v) and sigma (k,) of each generation; done: generations before. populations (k + 1, n, p)
-    and scores (k + 1, n) start with the last generation, best (all generations + 1,) is written behind `done`.
+    uniform (k, u), moves (k, mutants, t, p) and their sizes (k + 1,) of each generation and of the one before;
+    adaptive ones are written; done: generations before. populations (k + 1, n, p) and scores (k + 1, n) start with the
+    last generation, best (all generations + 1,) is written behind `done`.
     """
-    uniform, normal, sigma = draws
-    for k in range(len(sigma)):
-        population, score, generation = populations[k], scores[k], done + k
-        if generation > 0 and generation % rules.migration_interval == 0:
-            population, score = migrate(population, score, rules.plan, rules.migrants)
-        children, known = populations[k + 1], scores[k + 1]
-        next_population(population, score, rules.plan, (uniform[k], normal[k], sigma[k]), children, known)
+    uniform, moves, sizes = draws
+    for k in range(len(uniform)):
+        population, score, children, known = populations[k], scores[k], populations[k + 1], scores[k + 1]
+        generation = done + k
+        if rules.adapts:
+            sizes[k + 1] = adapted(sizes[k], best, generation + 1)
+        next_population(population, score, rules.plan, (uniform[k], moves[k], sizes[k + 1]), children, known)
         if rules.looks_up:
             look_up(children, known, population, score)
         asked, count = np.empty_like(children), 0
         for i in range(len(known)):
             if np.isnan(known[i]):
-                _put(children[i : i + 1], asked, count)
+                asked[count] = children[i]
                 count += 1
         values = np.empty(count)
         objective(decoded(asked[:count], box), legs, points, values)
@@ -247,4 +247,4 @@ def advance(objective, legs, points, box, rules, draws, done, populations, score
             best[generation + 1] = min(best[generation + 1], known[i])
         if has_stalled(best[: generation + 2], rules.stall_generations, rules.stall_tolerance):
             return k + 1
-    return len(sigma)
+    return len(uniform)

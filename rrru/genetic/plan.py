@@ -14,13 +14,16 @@ class Box(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What stays the same in a run: plan and migrants of the islands, when they migrate, when the run stops."""
+    """What stays the same in a run: plan of the islands, when the run stops, what a generation does.
+
+    adapts: whether mutation adapts its steps; looks_up: whether a child equal to one of the last population has its
+    score.
+    """
 
     plan: np.ndarray
-    migrants: np.ndarray
-    migration_interval: int
     stall_generations: int
     stall_tolerance: float
+    adapts: bool
     looks_up: bool
 
 
@@ -51,11 +54,34 @@ def make_plan(populations, elite_share, crossover_fraction):
     return np.array(rows, dtype=np.int64)
 
 
-def draws_needed(plan, genes):
-    """Numbers of uniform and of normal random numbers that `operators.next_population` takes, of a number of genes."""
+def uniforms_needed(plan, genes):
+    """Number of uniform random numbers that `operators.next_population` takes, of a number of genes."""
     crossed = plan[:, 3]
-    mutated = plan[:, 1] - plan[:, 0] - plan[:, 2] - crossed
-    return int((1 + 2 * crossed + mutated + crossed * genes).sum()), int((mutated * genes).sum())
+    return int((1 + 2 * crossed + mutants_of(plan) + crossed * genes).sum())
+
+
+def mutants_of(plan):
+    """Numbers of mutants (islands,)."""
+    return plan[:, 1] - plan[:, 0] - plan[:, 2] - plan[:, 3]
+
+
+def directions(generator, count, genes):
+    """Moves (count, 2 p, p) of adaptive feasible mutation, to be tried in their order, of numbers of mutants and genes.
+
+    Both senses of the columns of a lower triangular matrix with 1 or -1 on its diagonal, all in random order: each
+    mutant's moves span the space, as those of mesh adaptive direct search do (Audet and Dennis, SIAM Journal on
+    Optimization 17, 2006, "LTMADS"), from which MATLAB's adaptive mutation is taken.
+    """
+    # ASSUME MATLAB's documentation says that "directions are adaptive with respect to the last successful or
+    # unsuccessful generation" and "satisfy bounds"; the numbers are LTMADS': steps double or halve (a mesh four times
+    # as wide or as fine), entries below the diagonal are even in -1..1 (there rounded to the mesh)
+    sign = np.where(generator.random((count, genes)) < 0.5, -1.0, 1.0)
+    below = np.tril(generator.uniform(-1.0, 1.0, (count, genes, genes)), -1)
+    basis = (below + sign[:, :, None] * np.eye(genes)).transpose(0, 2, 1)
+    coordinates = generator.random((count, 1, genes)).argsort(axis=2)
+    order = generator.random((count, 2 * genes, 1)).argsort(axis=1)
+    basis = np.take_along_axis(basis, coordinates, axis=2)
+    return np.take_along_axis(np.concatenate([basis, -basis], axis=1), order, axis=1)
 
 
 def migrants_of(populations, fraction):
@@ -70,12 +96,11 @@ def mutation_sigma(generation, generations, scale, shrink):
 
 
 def make_rules(settings, looks_up):
-    """Rules of GeneticSettings; looks_up: whether a child equal to one of the last population has its score."""
+    """Rules of GeneticSettings."""
     return Rules(
         make_plan(settings.populations, settings.elite_share, settings.crossover_fraction),
-        migrants_of(settings.populations, settings.migration_fraction),
-        int(settings.migration_interval),
         int(settings.stall_generations),
         float(settings.stall_tolerance),
+        settings.operators == "matlab_adaptive",
         looks_up,
     )

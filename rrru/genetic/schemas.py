@@ -15,6 +15,10 @@ best_mm                float  lowest mean distance so far
 mean_mm                float  mean over the population; infinite where a member is out of reach
 method                 str    how: least_squares, least_mean_distance (the optimum of the paper's objective), genetic;
     none before
+operators              str    reading of the paper: MATLAB's step with Gaussian or adaptive feasible mutation, PyGAD's
+    own operators {matlab_gaussian, matlab_adaptive, pygad}
+stop                   str    where the run ends: after 50 generations without progress (or as configured), or at its
+    last generation {stall, end}
 parameter              str    swept setting {crossover_fraction, migration_fraction}
 population             str    one population, or islands {one, islands}
 value                  float  value of the setting
@@ -60,28 +64,28 @@ Time of one calibration by each method on this machine; the only table whose byt
 campaign calibration method
 seconds                float  wall time of one calibration (median over the seeds)
 
-## sweep_runs | tables/sweep_runs.parquet | parameter population value seed
-One row per run of the sweeps of the crossover and migration fraction.
+## sweep_runs | tables/sweep_runs.parquet | operators stop parameter population value seed
+Runs of the sweeps of the crossover and migration fraction: each to the end, and as it was where it stalled first.
 --
-parameter population value seed objective_mm generations evaluations stopped
+operators stop parameter population value seed objective_mm generations evaluations stopped
 
-## sweep_parameters | tables/sweep_parameters.parquet | parameter population value seed name
+## sweep_parameters | tables/sweep_parameters.parquet | operators stop parameter population value seed name
 Deviations that the runs in `sweep_runs` found.
 --
-parameter population value seed
+operators stop parameter population value seed
 name                   str    name of the robot's parameter
 unit                   str    unit of the deviation {rad, mm}
 deviation              float  deviation from the nominal value
 
-## sweep_history | tables/sweep_history.parquet | parameter population value seed generation
+## sweep_history | tables/sweep_history.parquet | operators parameter population value seed generation
 Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th after it, and the last.
 --
-parameter population value seed generation best_mm mean_mm
+operators parameter population value seed generation best_mm mean_mm
 
-## sweep_effect | tables/sweep_effect.parquet | parameter population
+## sweep_effect | tables/sweep_effect.parquet | operators stop parameter population
 Whether a setting's effect can be told from the seeds' scatter: Kruskal-Wallis test over all values.
 --
-parameter population
+operators stop parameter population
 settings               int    values compared
 runs                   int    runs compared
 statistic              float  H
@@ -92,10 +96,10 @@ p_value_mutating       float  the same
 epsilon_squared_mutating float  the same
 distinguishable_mutating bool   p_value_mutating below 5 %
 
-## sweep_pairs | tables/sweep_pairs.parquet | parameter population value
+## sweep_pairs | tables/sweep_pairs.parquet | operators stop parameter population value
 Every value against the one with the lowest median: Mann-Whitney test, corrected after Holm.
 --
-parameter population value
+operators stop parameter population value
 best_value             float  value with the lowest median
 median_mm              float  median mean distance
 difference_mm          float  median minus that of the best value

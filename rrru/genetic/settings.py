@@ -8,6 +8,8 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.genetic.plan import elite_count
 
+# readings of the paper: MATLAB's step with its Gaussian or its adaptive feasible mutation, and PyGAD's own operators
+OPERATORS = ("matlab_gaussian", "matlab_adaptive", "pygad")
 _ALLOWED = {
     "crossover_fraction": (Real, 0.0, 1.0, "0 to 1"),
     "migration_fraction": (Real, 0.0, 1.0, "0 to 1"),
@@ -23,8 +25,10 @@ _ALLOWED = {
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """Settings of one run, named as MATLAB's; see `operators` and `plan` for what each does.
+    """Settings of one run, named as MATLAB's; see `operators`, `plan` and `pygad_run` for what each does.
 
+    operators: one of OPERATORS; "pygad" takes of the others only the crossover fraction, as its crossover probability,
+    and those of islands, generations and stalling.
     crossover_fraction: P_c, share of the non-elite children made by crossover, the rest by mutation.
     migration_fraction: P_m, share of the smaller island that migrates every `migration_interval` generations.
     populations: sizes of the islands. elite_share: elites per island are ceil(share size). stall_generations,
@@ -42,8 +46,11 @@ class GeneticSettings:
     stall_tolerance: float = 1e-6
     mutation_scale: float = 1.0
     mutation_shrink: float = 1.0
+    operators: str = "matlab_gaussian"
 
     def __post_init__(self):
+        if self.operators not in OPERATORS:
+            raise ConfigError(f"operators is {self.operators!r}; allowed: {', '.join(OPERATORS)}")
         for name, (kind, lowest, highest, allowed) in _ALLOWED.items():
             value = getattr(self, name)
             if not is_number(value, kind) or not np.isfinite(value) or not lowest <= value <= highest:

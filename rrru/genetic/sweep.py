@@ -1,4 +1,7 @@
-"""Sweeps of the genetic algorithm's settings over many seeds, and whether their effect shows above the scatter."""
+"""Sweeps of the genetic algorithm's settings over many seeds, and whether their effect shows above the scatter.
+
+Every run goes to the end. What it would have found had it stopped where it stalls is read off its history.
+"""
 
 from dataclasses import replace
 
@@ -10,59 +13,70 @@ from rrru.genetic.algorithm import minimise
 from rrru.seeds import run_seed
 
 SWEPT = ("crossover_fraction", "migration_fraction")
+# one sweep: reading of the paper, where runs stop, setting, kind of population
+SWEEP = ["operators", "stop", "parameter", "population"]
 _LEVEL = 0.05
-_RESAMPLES = 4999
+_RESAMPLES = 1999
 
 
 def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
     """Frames by table name of the runs of the genetic algorithm at one value of one setting, one per seed number.
 
-    objective, settings: see `algorithm.minimise`; parameters: ParameterSet; parameter: of the settings, one of SWEPT,
-    set to `value`; seeds: seed numbers, each run's own seed being run_seed(study_seed, parameter, population, value,
-    number) with population "one" or "islands". Raises ConfigError for another parameter or a value that is not allowed.
+    objective, settings: see `algorithm.minimise`, but that a run goes on after it stalled; parameters: ParameterSet;
+    parameter: of the settings, one of SWEPT, set to `value`; seeds: seed numbers, each run's own seed being
+    run_seed(study_seed, parameter, population, value, number) with population "one" or "islands". Raises ConfigError
+    for another parameter or a value that is not allowed.
     """
     if parameter not in SWEPT:
         raise ConfigError(f"swept parameter is {parameter!r}; allowed: {', '.join(SWEPT)}")
     settings = replace(settings, **{parameter: value})
+    # PyGAD's "saturate" is equality
+    stall = settings.stall_generations, 0.0 if settings.operators == "pygad" else settings.stall_tolerance
     kind = "one" if len(settings.populations) == 1 else "islands"
     frames = {"sweep_runs": [], "sweep_history": [], "sweep_parameters": []}
     for number in seeds:
         seed = run_seed(study_seed, parameter, kind, value, number)
-        result = minimise(objective, parameters.low, parameters.high, settings, seed)
-        found = {"name": parameters.names, "unit": parameters.units, "deviation": result.deviations}
-        parts = pd.DataFrame([result.row()]), result.history(), pd.DataFrame(found)
-        labels = {"parameter": parameter, "value": float(value), "population": kind, "seed": int(number)}
-        for name, part in zip(frames, parts, strict=True):
-            frames[name].append(part.assign(**labels))
+        whole = minimise(objective, parameters.low, parameters.high, replace(settings, stall_generations=0), seed)
+        labels = {"operators": settings.operators, "parameter": parameter, "value": float(value)}
+        labels |= {"population": kind, "seed": int(number)}
+        frames["sweep_history"].append(whole.history().assign(**labels))
+        for stop, result in (("stall", whole.stalled(*stall)), ("end", whole)):
+            found = {"name": parameters.names, "unit": parameters.units, "deviation": result.deviations}
+            frames["sweep_runs"].append(pd.DataFrame([result.row()]).assign(stop=stop, **labels))
+            frames["sweep_parameters"].append(pd.DataFrame(found).assign(stop=stop, **labels))
     return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
 def setting_effect(runs):
-    """Whether the settings' objectives differ at all: one row per (parameter, population) of a table of runs.
+    """Whether the settings' objectives differ at all: one row per SWEEP of a table of runs.
 
-    Columns: parameter, population, settings (number of values), runs, statistic and p_value of the Kruskal-Wallis test
+    Columns: those of SWEEP, settings (number of values), runs, statistic and p_value of the Kruskal-Wallis test
     over all values, epsilon_squared = H / (n - 1), the share of the rank variance that the settings explain (Tomczak
     and Tomczak 2014), and the same three ending in _mutating without the crossover fraction 1.0, where nothing mutates;
     distinguishable_mutating: that p below 5 %. Equal objectives everywhere, or fewer than two values, give p = 1.
     """
     rows = []
-    for (parameter, population), group in runs.groupby(["parameter", "population"]):
-        mutates = group["value"] < 1.0 if parameter == "crossover_fraction" else np.full(len(group), True)
+    for key, group in runs.groupby(SWEEP):
+        label = dict(zip(SWEEP, key, strict=True))
+        # at 1.0 MATLAB's step does not mutate; PyGAD's does
+        stands_still = label["parameter"] == "crossover_fraction" and label["operators"] != "pygad"
+        mutates = group["value"] < 1.0 if stands_still else np.full(len(group), True)
         every = _kruskal(group)
         mutating = every if mutates.all() else _kruskal(group[mutates])
         rows.append(
-            {"parameter": parameter, "population": population, "settings": group["value"].nunique(), "runs": len(group)}
+            label
+            | {"settings": group["value"].nunique(), "runs": len(group)}
             | every
-            | {f"{key}_mutating": value for key, value in mutating.items()}
+            | {f"{name}_mutating": value for name, value in mutating.items()}
             | {"distinguishable_mutating": mutating["p_value"] < _LEVEL}
         )
     return pd.DataFrame(rows)
 
 
 def setting_pairs(runs, seed=0):
-    """How far each setting is from the best one: a row per value but the best, of each (parameter, population) of runs.
+    """How far each setting is from the best one: a row per value but the best, of each SWEEP of runs.
 
-    Columns: parameter, population, value, best_value (lowest median objective), median_mm, difference_mm (of the
+    Columns: those of SWEEP, value, best_value (lowest median objective), median_mm, difference_mm (of the
     medians, value minus best) with its 95 % percentile-bootstrap interval difference_low_mm, difference_high_mm (NaN
     with a single run or infeasible ones), p_value (Mann-Whitney, two-sided), p_holm (corrected over the values of the
     group), distinguishable (p_holm below 5 %). The best value was picked from the same runs, which makes the
@@ -71,14 +85,14 @@ def setting_pairs(runs, seed=0):
     from scipy import stats
 
     rows = []
-    for (parameter, population), group in runs.groupby(["parameter", "population"]):
+    for key, group in runs.groupby(SWEEP):
         samples = {value: part.to_numpy() for value, part in group.groupby("value")["objective_mm"]}
         best = min(samples, key=lambda value: np.median(samples[value]))
         pairs = []
         for value, sample in samples.items():
             if value != best:
-                own = run_seed(seed, parameter, population, value)
-                label = {"parameter": parameter, "population": population, "value": value, "best_value": best}
+                own = run_seed(seed, *key, value)
+                label = dict(zip(SWEEP, key, strict=True)) | {"value": value, "best_value": best}
                 test = {"p_value": float(stats.mannwhitneyu(sample, samples[best]).pvalue)}
                 difference = _median_difference(sample, samples[best], own)
                 pairs.append(label | {"median_mm": float(np.median(sample))} | difference | test)

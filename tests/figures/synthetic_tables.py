@@ -13,6 +13,7 @@ OPTIONS = {
     "z_down": True,
     "sweep_campaign": CAMPAIGN,
     "sweep_calibration": "lines",
+    "sweep_operators": "matlab_gaussian",
     "calibration_lines": "lines",
     "calibration_spiral": "spiral",
     "method": "least_mean_distance",
@@ -221,7 +222,7 @@ def sweeps(scatter_mm=0.3, seeds=6):
     runs, effects, pairs = [], [], []
     for parameter in ("crossover_fraction", "migration_fraction"):
         for population in ("one", "islands"):
-            label = {"parameter": parameter, "population": population}
+            label = {"operators": "matlab_gaussian", "stop": "end", "parameter": parameter, "population": population}
             test = {"statistic": 20.0, "p_value": 1e-5, "epsilon_squared": 0.3}
             effects.append(
                 label

@@ -1,7 +1,8 @@
-"""The whole algorithm: against a loop that replays it, against stock PyGAD, and for what it promises."""
+"""The whole algorithm: against a loop that replays it, and for what it promises."""
 
 import importlib.util
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,10 +10,9 @@ from scipy.optimize import least_squares
 
 from rrru.errors import ConfigError, FitError
 from rrru.fit.residuals import Residuals
-from rrru.genetic import algorithm as genetic
 from rrru.genetic.algorithm import BLOCK, minimise
 from rrru.genetic.operators import has_stalled
-from rrru.genetic.settings import GeneticSettings
+from rrru.genetic.settings import OPERATORS, GeneticSettings
 from rrru.robots.rrru3 import Rrru3
 from tests.places import ROOT
 
@@ -84,7 +84,7 @@ def run(objective=sphere, genes=3, seed=1, **settings):
 
 
 def same_bytes(first, second):
-    arrays = ("deviations", "best_history", "mean_history")
+    arrays = ("found", "best_history", "mean_history", "asked")
     plain = ("objective", "generations", "evaluations", "stopped")
     return all(getattr(first, a).tobytes() == getattr(second, a).tobytes() for a in arrays) and all(
         getattr(first, p) == getattr(second, p) for p in plain
@@ -112,6 +112,7 @@ def same_bytes(first, second):
         ("stall_tolerance", float("inf")),
         ("mutation_scale", -1.0),
         ("mutation_shrink", 1.5),
+        ("operators", "matlab"),
     ],
 )
 def test_a_setting_out_of_range_is_refused_by_name(name, value):
@@ -164,17 +165,10 @@ def test_a_run_among_infeasible_individuals_is_the_loop_s_run():
     assert np.isfinite(result.mean_history).all()
 
 
+@pytest.mark.parametrize("operators", OPERATORS)
 @pytest.mark.parametrize("populations", [(30,), ISLANDS])
-def test_stock_pygad_makes_the_same_bytes(lines, monkeypatch, populations):
-    settings = GeneticSettings(populations=populations, generations=60)
-    lean = minimise(lines, lines.low, lines.high, settings, 2)
-    monkeypatch.setattr(genetic, "_BatchGA", genetic.pygad.GA)
-    assert same_bytes(lean, minimise(lines, lines.low, lines.high, settings, 2))
-
-
-@pytest.mark.parametrize("populations", [(30,), ISLANDS])
-def test_the_seed_alone_decides_and_no_other_random_state_is_touched(lines, populations):
-    settings = GeneticSettings(populations=populations, generations=100)
+def test_the_seed_alone_decides_and_no_other_random_state_is_touched(lines, populations, operators):
+    settings = GeneticSettings(populations=populations, generations=50, operators=operators)
     before, before_numpy = random.getstate(), np.random.get_state()  # noqa: NPY002 - the state that must not change
     first = minimise(lines, lines.low, lines.high, settings, 4)
     after_numpy = np.random.get_state()  # noqa: NPY002
@@ -288,6 +282,18 @@ def test_a_stalled_run_stops_where_the_rule_says_first(lines):
     best = result.best_history
     late = [g for g in range(50, len(best)) if abs(best[g - 50] - best[g]) / 50 / max(1.0, best[g]) <= 1e-6]
     assert late == [result.generations]
+
+
+@pytest.mark.parametrize("operators", ["matlab_gaussian", "matlab_adaptive"])
+@pytest.mark.parametrize("populations", [(30,), ISLANDS])
+def test_a_whole_run_cut_where_it_stalls_is_the_run_that_stops_there(lines, populations, operators):
+    settings = GeneticSettings(populations=populations, operators=operators, generations=700)
+    whole = minimise(lines, lines.low, lines.high, replace(settings, stall_generations=0), 4)
+    stopped = minimise(lines, lines.low, lines.high, settings, 4)
+    assert stopped.generations < whole.generations == 700
+    assert same_bytes(whole.stalled(50, 1e-6), stopped)
+    assert lines(stopped.deviations[None])[0] == stopped.objective
+    assert whole.stalled(50, 0.0).generations >= stopped.generations
 
 
 def test_equal_individuals_stall_without_harm():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rrru.genetic import operators, plan
+from rrru.genetic import algorithm, islands, plan
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 
@@ -15,7 +15,7 @@ def _population(sizes, seed=0):
 
 def _migrate(population, score, sizes, fraction):
     rows, leaving = plan.make_plan(sizes, 0.05, 0.8), plan.migrants_of(sizes, fraction)
-    return operators.migrate(population, score, rows, leaving)
+    return islands.migrate(population, score, rows, leaving)
 
 
 def test_islands_lie_one_after_the_other():
@@ -86,7 +86,7 @@ def test_migration_follows_every_twentieth_generation(monkeypatch):
         due.append(len(rated) - 1)
         return population, score
 
-    monkeypatch.setattr(operators, "migrate", migrate)
+    monkeypatch.setattr(algorithm, "migrate", migrate)
     settings = GeneticSettings(populations=(5, 5), migration_interval=20, generations=70, stall_generations=0)
     minimise(valley, [-1.0], [1.0], settings, 0)
     assert due == [20, 40, 60]

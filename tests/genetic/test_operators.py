@@ -187,11 +187,11 @@ def test_a_generation_equals_the_loop(crossover_fraction, sizes):
             for size, end in zip(sizes, ends, strict=True)
         ]
     )
-    uniforms, normals = (int(number) for number in plan.draws_needed(rows, 8))
-    uniform, normal = random.uniform(size=uniforms), random.normal(size=normals)
+    uniform = random.uniform(size=plan.uniforms_needed(rows, 8))
+    moves = random.normal(size=(plan.mutants_of(rows).sum(), 1, 8))
     after, known = np.empty_like(population), np.empty_like(score)
-    operators.next_population(population, score, rows, (uniform, normal, 0.7), after, known)
-    one_by_one, steps = iter(uniform.tolist()), iter(normal.tolist())
+    operators.next_population(population, score, rows, (uniform, moves, 0.7), after, known)
+    one_by_one, steps = iter(uniform.tolist()), iter(moves.ravel().tolist())
     for start, stop, _, _ in rows:
         people, scores = matlab_ga.generation(
             population[start:stop].tolist(),

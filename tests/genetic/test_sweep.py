@@ -26,11 +26,13 @@ def swept(parameter="crossover_fraction", value=0.5, seeds=range(3), study_seed=
     return sweep.run_sweep(valley, PARAMETERS, settings, parameter, value, seeds, study_seed)
 
 
-def table(groups, parameter="crossover_fraction", population="one"):
+def table(groups, parameter="crossover_fraction", population="one", operators="matlab_gaussian"):
     return pd.concat(
         [
             pd.DataFrame(
                 {
+                    "operators": operators,
+                    "stop": "end",
                     "parameter": parameter,
                     "population": population,
                     "value": value,
@@ -49,15 +51,26 @@ def test_a_sweep_s_rows_are_single_runs():
         schema = next(table for table in TABLES if table.name == name)
         assert sorted(frame.columns) == sorted(schema.names)
     for row in tables["sweep_runs"].itertuples():
-        settings = GeneticSettings(0.3, populations=(10, 10), generations=25)
+        settings = GeneticSettings(0.3, populations=(10, 10), generations=25, stall_generations=0)
         seed = run_seed(7, "crossover_fraction", "islands", 0.3, row.seed)
         single = minimise(valley, PARAMETERS.low, PARAMETERS.high, settings, seed)
-        assert (row.population, row.objective_mm, row.evaluations) == ("islands", single.objective, single.evaluations)
+        assert (row.operators, row.population, row.stopped) == ("matlab_gaussian", "islands", "generations")
+        assert (row.objective_mm, row.evaluations) == (single.objective, single.evaluations)
         found, own = (tables[name][tables[name]["seed"] == row.seed] for name in ("sweep_parameters", "sweep_history"))
+        found = found[found["stop"] == row.stop]
         assert found[["name", "unit"]].to_numpy().tolist() == [["a", "mm"], ["b", "rad"]]
         np.testing.assert_array_equal(found["deviation"], single.deviations)
         np.testing.assert_array_equal(own["best_mm"], single.best_history)
         np.testing.assert_array_equal(own["mean_mm"], single.mean_history)
+
+
+def test_a_run_that_stalls_is_there_twice():
+    tables = swept(seeds=[1], generations=400, stall_generations=5, stall_tolerance=1e-3)
+    stalled, ended = (tables["sweep_runs"][tables["sweep_runs"]["stop"] == stop].iloc[0] for stop in ("stall", "end"))
+    assert (stalled["stopped"], ended["stopped"], ended["generations"]) == ("stalled", "generations", 400)
+    assert stalled["generations"] < 400 and ended["objective_mm"] <= stalled["objective_mm"]
+    history = tables["sweep_history"].set_index("generation")["best_mm"]
+    assert stalled["objective_mm"] == history[stalled["generations"]]
 
 
 def test_a_sweep_repeats_itself_and_its_seeds_do_not_depend_on_each_other():
@@ -100,13 +113,21 @@ def test_the_setting_without_mutation_is_set_aside_for_crossover_only():
     assert crossover["p_value_mutating"] > 0.05
     assert not crossover["distinguishable_mutating"]
     alone = sweep.setting_effect(table({value: samples[value] for value in (0.2, 0.5, 0.8)})).iloc[0]
+    # PyGAD's mutation does not hang on the crossover
+    mutating = sweep.setting_effect(table(samples, operators="pygad")).iloc[0]
+    assert mutating["p_value_mutating"] == mutating["p_value"]
     assert crossover["p_value_mutating"] == alone["p_value"]
     assert migration["p_value_mutating"] == migration["p_value"] < 1e-6
 
 
 def test_scatter_alone_is_called_an_effect_as_seldom_as_promised():
     random = np.random.default_rng(2)
-    keys = {"parameter": "migration_fraction", "population": np.repeat(np.arange(200), 200)}
+    keys = {
+        "operators": "pygad",
+        "stop": "end",
+        "parameter": "migration_fraction",
+        "population": np.repeat(np.arange(200), 200),
+    }
     runs = pd.DataFrame(keys | {"value": np.tile(np.repeat(np.arange(10), 20), 200)})
     effects = sweep.setting_effect(runs.assign(objective_mm=random.exponential(size=len(runs))))
     # 5 % of 200 tables, standard deviation 3.1

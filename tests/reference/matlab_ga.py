@@ -95,13 +95,32 @@ def migrate(people, scores, fraction):
     return after, after_scores
 
 
-def run(objective, low, high, settings, seed):
+def draws(settings, genes, seed, block):
+    """The first people, then each generation's uniform and normal numbers, as they are drawn for whole blocks.
+
+    A block ends after `block` generations, where islands migrate, and with the run.
+    """
+    random, several = np.random.default_rng(seed), len(settings.populations) > 1
+    yield random.random((sum(settings.populations), genes)).tolist()
+    shares = [counts(size, settings.crossover_fraction, settings.elite_share) for size in settings.populations]
+    uniforms = sum(1 + 2 * crossed + mutated + crossed * genes for _, crossed, mutated in shares)
+    normals = sum(mutated for _, _, mutated in shares) * genes
+    done = 0
+    while done < settings.generations:
+        ends = [done + block, settings.generations]
+        if several:
+            ends.append((done // settings.migration_interval + 1) * settings.migration_interval)
+        count = min(ends) - done
+        yield from zip(random.random((count, uniforms)), random.standard_normal((count, normals)), strict=True)
+        done += count
+
+
+def run(objective, low, high, settings, seed, block=100):
     """Best objective of the initial population and after every generation; `settings` has the fields of
     GeneticSettings, no early stop.
     """
-    random = np.random.RandomState(seed)
-    genes = len(low)
-    start = random.uniform(0.0, 1.0, size=(sum(settings.populations), genes)).tolist()
+    numbers = draws(settings, len(low), seed, block)
+    start = next(numbers)
     people = [[start.pop(0) for _ in range(size)] for size in settings.populations]
 
     def score_of(person):
@@ -112,10 +131,7 @@ def run(objective, low, high, settings, seed):
     for number in range(1, settings.generations + 1):
         if number > 1 and (number - 1) % settings.migration_interval == 0 and len(people) > 1:
             people, scores = migrate(people, scores, settings.migration_fraction)
-        shares = [counts(size, settings.crossover_fraction, settings.elite_share) for size in settings.populations]
-        needed = sum(1 + 2 * crossed + mutated + crossed * genes for _, crossed, mutated in shares)
-        uniforms = iter(random.random_sample(needed).tolist())
-        normals = iter(random.standard_normal(sum(mutated for _, _, mutated in shares) * genes).tolist())
+        uniforms, normals = (iter(part.tolist()) for part in next(numbers))
         sigma = settings.mutation_scale * (1.0 - settings.mutation_shrink * number / settings.generations)
         for island in range(len(people)):
             people[island], known = generation(

@@ -56,7 +56,7 @@ def test_every_number_of_the_paper_stands_beside_ours(results):
 # left out: a second whole run would take three times as long
 _ONE_OF_EACH = (
     *(f"figures/field_09/{name}.png" for name in ("gap", "cross")),
-    *("sweep/migration_fraction/islands/sweep_runs.parquet", "methods/ptt3/methods.parquet"),
+    *("sweep/pygad/migration_fraction/islands/sweep_runs.parquet", "methods/ptt3/methods.parquet"),
     *(f"tables/{name}.parquet" for name in ("delta_calibrations", "printers", "ptt_benefit")),
 )
 

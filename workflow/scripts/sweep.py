@@ -15,13 +15,14 @@ from rrru.studies import setup
 
 def main(settings, inputs, outputs):
     """Write the runs and their history."""
-    section, parameter, population = settings["sweep"], settings["parameter"], settings["population"]
+    operators, parameter, population = (settings[key] for key in ("operators", "parameter", "population"))
     mechanism = setup.mechanism(settings["nominal"], "tied")
     measurements, patterns = tables.read(inputs["measurements"]), settings["patterns"]
     residuals = select(measurements, mechanism, patterns, settings["calibration"]["use_near_singularity"])
     if residuals is None:
         raise ConfigError(f"sweep: too few points on the trajectories {', '.join(patterns)}")
-    genetic = GeneticSettings.from_config(settings["genetic"], populations=section["populations"][population])
+    own = {"operators": operators, "populations": settings["populations"]}
+    genetic = GeneticSettings.from_config(settings["genetic"] | settings["sweep"], **own)
     swept = [
         run_sweep(
             residuals.mean_distance,
@@ -29,10 +30,10 @@ def main(settings, inputs, outputs):
             genetic,
             parameter,
             float(value),
-            range(1, section["seeds"] + 1),
+            range(1, settings["reading"]["seeds"] + 1),
             settings["seed"],
         )
-        for value in tqdm(section["values"], desc=f"{parameter} {population}", unit="value")
+        for value in tqdm(settings["reading"]["values"], desc=f"{operators} {parameter} {population}", unit="value")
     ]
     frames = {name: pd.concat([part[name] for part in swept], ignore_index=True) for name in swept[0]}
     tables.write_all(TABLES, frames, outputs)

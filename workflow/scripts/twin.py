@@ -12,13 +12,17 @@ def main(settings, inputs, outputs):
     """Write the twin as an overlay of the configuration."""
     virtual, section = settings["virtual"], settings["twin"]
     campaign = setup.virtual_campaign(settings["nominal"], virtual)
-    count = len(campaign.plan.targets())
+    # not the draws that `redraws` counts over
+    pairs = [
+        [campaign.generator("twin", number, name) for name in ("measure", "closed_loop")]
+        for number in range(section["draws"])
+    ]
     task = twin_search.Task(
         setup.mechanism(settings["nominal"]),
         virtual["motion"],
         virtual["trajectories"],
         campaign.noise_mm,
-        tuple(twin_search.draw(campaign.generator(name), count) for name in ("measure", "closed_loop")),
+        twin_search.draw(pairs, len(campaign.plan.targets())),
         settings["reproduce"]["line_calibration"],
     )
     start = twin.from_config(virtual) if section["refine"] else None

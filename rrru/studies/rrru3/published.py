@@ -8,29 +8,27 @@ from rrru.campaign.measurements import vectors
 from rrru.genetic.campaign_runs import typical_parameters
 from rrru.robots.rrru3 import Rrru3
 from rrru.studies import paper, setup
+from rrru.studies.rrru3 import study_numbers as computed
 from rrru.studies.rrru3.paper import NUMBERS, SETTINGS, TIED, TIED_TO_PRINTED
-from rrru.studies.rrru3.redraw import spread
-from rrru.studies.rrru3.study_numbers import TRAJECTORIES, group_orders, study_numbers
 
 _DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
 
 
 @dataclass(frozen=True)
 class Reproduced:
-    """Which campaign, calibrations and method stand for the paper's, and how many other draws show the scatter."""
+    """Which campaign, calibrations and method stand for the paper's."""
 
     campaign: str
     line_calibration: str
     spiral_calibration: str
     method: str
-    redraws: int
 
 
-def published_rows(settings, errors, calibrations, parameters, genetic, genetic_parameters, sweep_runs):
+def published_rows(settings, errors, calibrations, parameters, genetic, genetic_parameters, sweep_runs, redraw_counts):
     """Rows of `published` for paper A.
 
-    settings: the configuration's `genetic`, `reproduce` and `calibration`, with the campaign's `nominal` robot and
-    what is `virtual` of it; the others: the tables of those names. Numbers that this study does not have are null.
+    settings: the configuration's `genetic` and `reproduce`, with the campaign's `nominal` robot and what is `virtual`
+    of it; the others: the tables of those names. Numbers that this study does not have are null.
     """
     chosen, nominal, virtual = Reproduced(**settings["reproduce"]), settings["nominal"], settings["virtual"]
     errors, calibrations, parameters, genetic, found = (
@@ -40,20 +38,21 @@ def published_rows(settings, errors, calibrations, parameters, genetic, genetic_
     names = setup.mechanism(nominal).parameters.names
     parameters = pd.concat([parameters, typical_parameters(genetic, found, (*names, "dR", "dr"))], ignore_index=True)
     runs = genetic[genetic["calibration"] == chosen.line_calibration]
-    numbers, order_notes = _error_numbers(errors, chosen)
+    numbers, order_notes = _error_numbers(errors, parameters, chosen)
     here = {
         **_design(nominal, virtual, settings["genetic"]),
-        **_sweep(sweep_runs),
+        **_sweep(sweep_runs, settings["genetic"]["operators"]),
         **_fitted(parameters, chosen),
         **numbers,
         "lines_objective": _objective(calibrations, runs, chosen),
     }
-    draws = {}
-    if virtual:
-        sets, near = settings["calibration"]["sets"], settings["calibration"]["use_near_singularity"]
-        patterns = [sets[name] for name in (chosen.line_calibration, chosen.spiral_calibration)]
-        draws = spread(setup.virtual_campaign(nominal, virtual), patterns, chosen.method, chosen.redraws, near)
-    return paper.published_rows("A", NUMBERS, here, draws, order_notes | _notes(runs, parameters, chosen))
+    counts = redraw_counts[redraw_counts["kind"] != "count"].set_index("item")
+    spread = {row.Index: (row.low, row.high) for row in counts[counts["kind"] == "number"].itertuples()}
+    notes = _notes(runs, parameters, chosen) | order_notes
+    for row in counts.itertuples():
+        text = f"{'holds' if row.kind == 'order' else 'within 15 %'} in {row.met} of {row.draws} other draws"
+        notes[row.Index] = "; ".join(filter(None, (notes.get(row.Index), text)))
+    return paper.published_rows("A", NUMBERS, here, spread, notes)
 
 
 def _design(nominal, virtual, genetic):
@@ -77,9 +76,10 @@ def _design(nominal, virtual, genetic):
     return result
 
 
-def _sweep(runs):
-    """Median objective of the one population at every swept value that the paper has."""
-    median = runs[runs["population"] == "one"].groupby(["parameter", "value"])["objective_mm"].median()
+def _sweep(runs, operators):
+    """Median objective of the one population, run to the end, at every swept value that the paper has."""
+    own = (runs["population"] == "one") & (runs["operators"] == operators) & (runs["stop"] == "end")
+    median = runs[own].groupby(["parameter", "value"])["objective_mm"].median()
     labels = {"crossover_fraction": "P_c", "migration_fraction": "P_m"}
     printed = {(parameter, float(s)): f"{label}={s}" for parameter, label in labels.items() for s in SETTINGS}
     return {printed[key]: objective for key, objective in median.items() if key in printed}
@@ -97,7 +97,7 @@ def _fitted(parameters, chosen):
     return result
 
 
-def _error_numbers(errors, chosen):
+def _error_numbers(errors, parameters, chosen):
     """The error numbers of the paper's section 3 and its orders, and notes on these.
 
     Empty for a campaign that was not driven again along the paper's trajectories.
@@ -110,13 +110,23 @@ def _error_numbers(errors, chosen):
             *(again[again["calibration"] == name] for name in (chosen.line_calibration, chosen.spiral_calibration)),
         )
     )
-    if not len(before) == len(lines) == len(spiral) > 0 or not set(before["trajectory"]) >= TRAJECTORIES:
+    if not len(before) == len(lines) == len(spiral) > 0 or not set(before["trajectory"]) >= computed.TRAJECTORIES:
         return {}, {}
     before_mm, lines_mm, spiral_mm = (vectors(frame, "error") for frame in (before, lines, spiral))
-    margins = group_orders(before["trajectory"], before_mm, lines_mm)
+    trajectory = before["trajectory"]
+    margins = computed.group_orders(trajectory, before_mm, lines_mm, spiral_mm)
+    margins |= computed.spike_orders(trajectory, before_mm, lines_mm) | _links(parameters, chosen)
     orders = {f"order_{name}": float(margin > 0.0) for name, margin in margins.items()}
     notes = {f"order_{name}": f"margin here {100.0 * margin:.1f} %" for name, margin in margins.items()}
-    return study_numbers(before["trajectory"], before_mm, lines_mm, spiral_mm) | orders, notes
+    return computed.study_numbers(trajectory, before_mm, lines_mm, spiral_mm) | orders, notes
+
+
+def _links(parameters, chosen):
+    """Margin of the link errors' order, from those that both calibrations found."""
+    values = parameters.set_index(["calibration", "method", "parameter"])["value"]
+    names = (chosen.line_calibration, chosen.spiral_calibration)
+    found = [[values.get((name, chosen.method, link)) for link in computed.LINKS] for name in names]
+    return {} if None in [*found[0], *found[1]] else computed.link_order(*found)
 
 
 def _objective(calibrations, runs, chosen):

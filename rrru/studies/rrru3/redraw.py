@@ -1,8 +1,11 @@
-"""How much the reproduced numbers scatter: the same robot measured, calibrated and driven again with other draws of
-non-repeatability and noise.
+"""What of the paper holds under other draws of non-repeatability and noise: the same robot measured, calibrated and
+driven again.
 """
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.fit.least_squares import least_squares
@@ -10,31 +13,65 @@ from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
 from rrru.plant.tracker import measure
 from rrru.plant.virtual_robot import non_repeatability
-from rrru.studies.rrru3.study_numbers import TRAJECTORIES, study_numbers
+from rrru.studies.rrru3 import study_numbers as numbers
+from rrru.studies.rrru3.paper import ERRORS_MM
 
 # the middle 90 % of the draws
 _QUANTILES = (0.05, 0.95)
 
 
-def spread(campaign, patterns, method, count, use_near_singularity=True):
-    """Item to (low, high): the middle 90 % of the numbers of paper.ERRORS over `count` other draws.
+def redraws(campaign, patterns, method, count, use_near_singularity=True):
+    """Rows of `redraws` of a virtual campaign over `count` draws.
 
-    campaign: the virtual one; patterns: trajectories of the line and of the spiral calibration; method: "genetic" is
-    stood in for by its optimum, the least mean distance. Empty where the numbers do not apply.
+    patterns: trajectories of the line and of the spiral calibration; method: "genetic" is stood in for by its optimum,
+    the least mean distance. Empty where the numbers do not apply.
     """
-    if count == 0 or not {run.trajectory for run in campaign.plan.runs} >= TRAJECTORIES:
-        return {}
+    columns = ["draw", "item", "kind", "value", "met"]
+    if count == 0 or not {run.trajectory for run in campaign.plan.runs} >= numbers.TRAJECTORIES:
+        return pd.DataFrame(columns=columns)
     measurements, _ = campaign.run()
     usable = rows.usable(measurements, use_near_singularity)
     chosen = [usable & rows.on_trajectories(measurements, names) for names in patterns]
-    attained = _attained(campaign, campaign.robot.mechanism.inverse)
-    draws = [_numbers(campaign, measurements, attained, chosen, method, number) for number in range(count)]
-    return {item: tuple(np.quantile([draw[item] for draw in draws], _QUANTILES).tolist()) for item in draws[0]}
+    motion = campaign.robot.motion(campaign.plan, campaign.robot.mechanism.inverse)
+    result = []
+    for draw in range(count):
+        found, orders = _draw(campaign, measurements, motion, chosen, method, draw)
+        for item, value in found.items():
+            met = bool(numbers.matched(item, value, ERRORS_MM[item]))
+            result.append((draw, item, "number", float(value), met))
+        result += [(draw, f"order_{name}", "order", float(value), bool(value > 0.0)) for name, value in orders.items()]
+    return pd.DataFrame(result, columns=columns)
 
 
-def _attained(campaign, controller):
-    """Positions (n, 3) that the robot attains under a controller, before anything random."""
-    return campaign.robot.positions(campaign.robot.motion(campaign.plan, controller), campaign.plan.targets())[0]
+def redraw_counts(found):
+    """Rows of `redraw_counts` of those of `redraws`."""
+    result = []
+    for (item, kind), part in found.groupby(["item", "kind"], sort=False):
+        result.append({"item": item, "kind": kind, "targets": 1, "met": part["met"].sum(), **_middle(part["value"])})
+    parts = {"numbers": found["kind"] == "number", "orders": found["kind"] == "order", "all": found["met"].notna()}
+    for item, chosen in parts.items():
+        met = found[chosen].groupby("draw")["met"].agg(["sum", "all", "size"])
+        if len(met):
+            whole = {"targets": met["size"].iloc[0], "met": met["all"].sum()}
+            result.append({"item": item, "kind": "count", **whole, **_middle(met["sum"])})
+    frame = pd.DataFrame(result, columns=["item", "kind", "targets", "met", "median", "low", "high"])
+    return frame.assign(draws=found["draw"].nunique())
+
+
+def _middle(values):
+    """Median and middle 90 % of values."""
+    low, high = np.quantile(values, _QUANTILES)
+    return {"median": float(np.median(values)), "low": float(low), "high": float(high)}
+
+
+def _attained(campaign, motion, deviations):
+    """Positions (n, 3) that the robot attains with commands corrected by deviations, before anything random.
+
+    motion: of the nominal commands, whose loads are the same.
+    """
+    path, index = campaign.plan.path()
+    drive = campaign.robot.mechanism.inverse(path, deviations)
+    return campaign.robot.positions(replace(motion, drive=drive[index], path_drive=drive), campaign.plan.targets())[0]
 
 
 def _measured(campaign, attained, generator):
@@ -43,13 +80,11 @@ def _measured(campaign, attained, generator):
     return measure(moved, campaign.noise_mm, generator)
 
 
-def _numbers(campaign, measurements, attained, chosen, method, number):
-    """The numbers of one draw; chosen: rows (n,) of the line and of the spiral calibration."""
-    mechanism, target, theta = (
-        campaign.robot.mechanism,
-        rows.command(measurements),
-        rows.actuators(measurements, campaign.robot.mechanism),
-    )
+def _draw(campaign, measurements, motion, chosen, method, number):
+    """Numbers and margins of orders of one draw; chosen: rows (n,) of the line and of the spiral calibration."""
+    mechanism, target = campaign.robot.mechanism, rows.command(measurements)
+    theta, trajectory = rows.actuators(measurements, mechanism), measurements["trajectory"]
+    attained = campaign.robot.positions(motion, campaign.plan.targets())[0]
     measured = _measured(campaign, attained, campaign.generator("redraw", number, "measure"))
     fits, after = [], []
     for calibrated in chosen:
@@ -57,9 +92,12 @@ def _numbers(campaign, measurements, attained, chosen, method, number):
         fit = least_squares(residuals)
         if method != "least_squares":
             fit = least_mean_distance(residuals, fit.deviations)
-        corrected = _attained(campaign, lambda x, deviations=fit.deviations: mechanism.inverse(x, deviations))
         # the same draw for both calibrations
         generator = campaign.generator("redraw", number, "closed_loop")
-        after.append(_measured(campaign, corrected, generator) - target)
+        after.append(_measured(campaign, _attained(campaign, motion, fit.deviations), generator) - target)
         fits.append(fit)
-    return study_numbers(measurements["trajectory"], measured - target, *after) | {"lines_objective": fits[0].mean_mm}
+    names = [mechanism.parameters.names.index(name) for name in numbers.LINKS]
+    errors = measured - target, *after
+    orders = numbers.group_orders(trajectory, *errors) | numbers.spike_orders(trajectory, *errors[:2])
+    orders |= numbers.link_order(*(fit.deviations[names] for fit in fits))
+    return numbers.study_numbers(trajectory, *errors) | {"lines_objective": fits[0].mean_mm}, orders

@@ -1,56 +1,102 @@
-"""The error numbers of paper A from error vectors of one campaign, for `published` and the twin's search alike."""
+"""The error numbers and the orders of paper A from error vectors, for `published`, `redraws` and the twin's search.
+
+Leading axes (...) of all arrays are draws; without them the results are single numbers.
+"""
 
 import numpy as np
+from scipy.signal import find_peaks
+
+from rrru.studies.rrru3.paper import ERRORS_MM, TABLE_5, TABLE_6
 
 # what the numbers need
 TRAJECTORIES = {*(f"line_{k}" for k in range(1, 8)), "spiral"}
 # printed as "less than": reached when not above
 UPPER_LIMITS = ("spiral_under_lines_z_abs_max",)
+# a number is matched where it is off by no more
+TOLERANCE = 0.15
+LINKS = ("dL1", "dL2", "dL3")
+# "nearly the same": not further apart than Tables 5 and 6 are
+_LINKS_APART_MM = max(abs(TABLE_5[name] - TABLE_6[name]) for name in LINKS)
+# a peak of the error that is gone once errors lie in the printed range after calibration, 0.294 to 1.220 mm
+SPIKE_MM = ERRORS_MM["group1_after_max"] - ERRORS_MM["group1_after_min"]
+# ASSUME "several": three, and "sharp": half of the height is within three of the 26 points
+SPIKES, SPIKE_POINTS = 3, 3.0
 
 
 def study_numbers(trajectory, before_mm, under_lines_mm, under_spiral_mm):
-    """Numbers of paper.ERRORS by item (without the objective), in mm.
+    """Numbers of paper.ERRORS by item (without the objective), in mm, each (...).
 
-    trajectory: (n,) names `line_1` to `line_7` and `spiral`; the others: error vectors (n, 3) before calibration and
-    under both calibrations, NaN where a point was not measured.
+    trajectory: (n,) names `line_1` to `line_7` and `spiral`; the others: error vectors (..., n, 3) before calibration
+    and under both calibrations, NaN where a point was not measured.
     """
     trajectory = np.asarray(trajectory)
-    before, lines, spiral = (np.linalg.norm(e, axis=1) for e in (before_mm, under_lines_mm, under_spiral_mm))
+    before, lines, spiral = (np.linalg.norm(e, axis=-1) for e in (before_mm, under_lines_mm, under_spiral_mm))
     first, curve = trajectory == "line_1", trajectory == "spiral"
+    components = under_spiral_mm[..., curve, :]
     ranges = {
-        "group1_before": before[first],
-        "group1_after": lines[first],
-        "lines_after": lines[~curve],
-        "spiral_under_lines_x": under_lines_mm[curve, 0],
-        "spiral_under_spiral_component": under_spiral_mm[curve],
-        "lines_2_7_under_spiral": spiral[~curve & ~first],
+        "group1_before": before[..., first],
+        "group1_after": lines[..., first],
+        "lines_after": lines[..., ~curve],
+        "spiral_under_lines_x": under_lines_mm[..., curve, 0],
+        "spiral_under_spiral_component": components.reshape(*components.shape[:-2], -1),
+        "lines_2_7_under_spiral": spiral[..., ~curve & ~first],
     }
     largest = {
-        "lines_before_max": before[~curve],
-        "spiral_under_lines_z_abs_max": np.abs(under_lines_mm[curve, 2]),
-        "spiral_under_lines_max": lines[curve],
-        "spiral_under_spiral_max": spiral[curve],
+        "lines_before_max": before[..., ~curve],
+        "spiral_under_lines_z_abs_max": np.abs(under_lines_mm[..., curve, 2]),
+        "spiral_under_lines_max": lines[..., curve],
+        "spiral_under_spiral_max": spiral[..., curve],
     }
     return {
-        **{f"{item}_min": np.nanmin(values) for item, values in ranges.items()},
-        **{f"{item}_max": np.nanmax(values) for item, values in ranges.items()},
-        **{item: np.nanmax(values) for item, values in largest.items()},
+        **{f"{item}_min": np.nanmin(values, axis=-1) for item, values in ranges.items()},
+        **{f"{item}_max": np.nanmax(values, axis=-1) for item, values in ranges.items()},
+        **{item: np.nanmax(values, axis=-1) for item, values in largest.items()},
     }
 
 
-def group_orders(trajectory, before_mm, under_lines_mm):
-    """The paper's orders as margins, positive where they hold: name to ratio - 1.
+def matched(item, value, published):
+    """Whether a number here meets the printed one within TOLERANCE; an upper limit is met below it."""
+    deviation = np.asarray(value) / published - 1.0
+    return (deviation if item in UPPER_LIMITS else np.abs(deviation)) <= TOLERANCE
 
-    centre_before/after: the best mean error of groups 4-7 against the worst of groups 1-3; group6_before/after: the
-    largest error of group 6 against that of the other groups.
+
+def group_orders(trajectory, before_mm, under_lines_mm, under_spiral_mm):
+    """The paper's orders of the line groups as margins (...), positive where they hold: name to ratio - 1.
+
+    centre_*: the best mean error of groups 4-7 against the worst of groups 1-3; group6_*: the largest error of group 6
+    against that of the other groups; outer_*: the better mean error of groups 6 and 7 against the worst of the others.
     """
-    trajectory = np.asarray(trajectory)
-    margins = {}
-    for label, errors in (("before", before_mm), ("after", under_lines_mm)):
-        size = np.linalg.norm(errors, axis=1)
-        groups = [size[trajectory == f"line_{k}"] for k in range(1, 8)]
-        mean, largest = [np.nanmean(group) for group in groups], [np.nanmax(group) for group in groups]
-        sixth = largest.pop(5)
-        margins[f"centre_{label}"] = min(mean[3:]) / max(mean[:3]) - 1.0
-        margins[f"group6_{label}"] = sixth / max(largest) - 1.0
+    trajectory, margins = np.asarray(trajectory), {}
+    for label, errors in (("before", before_mm), ("after", under_lines_mm), ("spiral", under_spiral_mm)):
+        size = np.linalg.norm(errors, axis=-1)
+        groups = [size[..., trajectory == f"line_{k}"] for k in range(1, 8)]
+        mean = np.stack([np.nanmean(group, axis=-1) for group in groups])
+        margins[f"centre_{label}"] = mean[3:].min(axis=0) / mean[:3].max(axis=0) - 1.0
+        if label != "spiral":
+            largest = np.stack([np.nanmax(group, axis=-1) for group in groups])
+            margins[f"group6_{label}"] = largest[5] / np.delete(largest, 5, axis=0).max(axis=0) - 1.0
+            margins[f"outer_{label}"] = mean[5:].min(axis=0) / mean[:5].max(axis=0) - 1.0
     return margins
+
+
+def link_order(lines, spiral):
+    """Margin (...) of link errors (..., 3) in mm that are nearly the same in both calibrations."""
+    apart = np.abs(np.asarray(lines) - np.asarray(spiral)).max(axis=-1)
+    return {"links": _LINKS_APART_MM / np.maximum(apart, 1e-12) - 1.0}
+
+
+def spike_orders(trajectory, before_mm, under_lines_mm):
+    """Margins of the sharp spikes on group 1 that Fig. 9 shows before calibration only; errors (n, 3) of one draw.
+
+    spikes_before: the least of the SPIKES highest before calibration against SPIKE_MM; spikes_after: SPIKE_MM against
+    the highest that is left. Heights are prominences.
+    """
+    first = np.asarray(trajectory) == "line_1"
+    before, after = (spikes(np.linalg.norm(errors[first], axis=-1)) for errors in (before_mm, under_lines_mm))
+    return {"spikes_before": before[SPIKES - 1] / SPIKE_MM - 1.0, "spikes_after": 1.0 - after[0] / SPIKE_MM}
+
+
+def spikes(size_mm):
+    """Heights in mm of the sharp spikes of errors (n,), highest first, at least SPIKES entries."""
+    _, found = find_peaks(size_mm, prominence=0.0, width=(0.0, SPIKE_POINTS))
+    return sorted([*found["prominences"], *np.zeros(SPIKES)], reverse=True)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign import trajectories
 from rrru.effects.library import active_effects
@@ -37,6 +38,10 @@ SEARCH_BOUNDS = {
     "turns": (1.5, 4.0),
     "start_deg": (-180.0, 180.0),
 }
+# no bounds: only the sign counts, or angles that come round
+_UNBOUNDED = {"side", "start_deg", *(f"phase{k}" for k in _LEGS)}
+# a number ends at a bound within this share of the bounds' width
+_AT_BOUND = 0.01
 # keys of the configuration that hold several searched numbers
 _EFFECTS = {
     "joint_clearance": [f"clearance{k}" for k in _LEGS],
@@ -102,7 +107,7 @@ def from_config(virtual):
     values = {
         **robot["errors"],
         **{key: value for effect in robot["effects"].values() for key, value in effect.items()},
-        "wobble_mm": robot["wobble_mm"],
+        "wobble_mm": robot.get("wobble_mm", 0.0),
         "side": np.sign(offsets[1]),
         **dict(zip(_OFFSETS, np.diff([0.0, *np.abs(offsets[1::2])]), strict=True)),
         **{name: value for key, names in _SPIRAL.items() for name, value in zip(names, spiral[key], strict=True)},
@@ -111,6 +116,24 @@ def from_config(virtual):
     if other := sorted(set(values) ^ set(SEARCH_BOUNDS)):
         raise ConfigError(f"twin: campaign {virtual['name']} differs in {other} from what is searched")
     return Twin({name: float(values[name]) for name in SEARCH_BOUNDS})
+
+
+def numbers(virtual):
+    """Rows of `twin_numbers` of a virtual campaign's section; none where it is not what the search knows."""
+    columns, shapes = ["name", "value", "low", "high", "at_bound"], virtual["trajectories"]
+    seven = "spiral" in shapes and len(shapes.get("lines", {}).get("offsets_y_mm", ())) == 7
+    try:
+        values = from_config(virtual).values if seven else {}
+    except ConfigError:
+        values = {}
+    rows = [(name, value, *SEARCH_BOUNDS[name], _at_bound(name, value)) for name, value in values.items()]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _at_bound(name, value):
+    """Whether a searched number ended at a bound."""
+    low, high = SEARCH_BOUNDS[name]
+    return name not in _UNBOUNDED and min(value - low, high - value) < _AT_BOUND * (high - low)
 
 
 def overlay(twin):

@@ -31,7 +31,7 @@ def test_paper_numbers_are_the_sourced_ones():
     assert by_item["P_c=1.0", "Table 3, Fig. 6"] == 0.6516 and by_item["P_m=0.7", "Table 4, Fig. 7"] == 0.5112
     assert sum(paper.CROSSOVER) == pytest.approx(5.3308) and sum(paper.MIGRATION) == pytest.approx(5.1134)
     assert by_item["spiral_dL23", "Table 6"] == -0.1612 and by_item["lines_da", "Table 5, dr - dR"] == 2.0955
-    assert len(by_item) == len(paper.NUMBERS) == 20 + 20 + 2 * 15 + 17 + 2 + 4
+    assert len(by_item) == len(paper.NUMBERS) == 20 + 20 + 2 * 15 + 17 + 2 + 10
 
 
 def test_study_numbers_by_hand():
@@ -49,5 +49,11 @@ def test_study_numbers_by_hand():
     assert numbers["spiral_under_lines_z_abs_max"] == 2.0 and numbers["spiral_under_spiral_component_min"] == -0.7
     assert numbers["lines_2_7_under_spiral_max"] == 0.09
     assert set(numbers) | {"lines_objective"} == set(paper.ERRORS_MM)
-    orders = group_orders(trajectory, before, lines)
+    orders = group_orders(trajectory, before, lines, spiral)
     assert orders["group6_before"] == pytest.approx(9.0 / 4.0 - 1.0) and orders["centre_before"] < 0.0
+    # means 3.5, 1, 1, 1, 1, 9, 1
+    assert orders["outer_before"] == pytest.approx(1.0 / 3.5 - 1.0)
+    assert orders["centre_spiral"] == pytest.approx(1.0 / 3.5 - 1.0)
+    # draws first
+    both = study_numbers(trajectory, *(np.stack([errors, 2.0 * errors]) for errors in (before, lines, spiral)))
+    assert all(both[item].tolist() == pytest.approx([value, 2.0 * value]) for item, value in numbers.items())

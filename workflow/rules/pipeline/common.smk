@@ -136,5 +136,6 @@ def paper_options():
         "calibration_lines": reproduce["line_calibration"],
         "calibration_spiral": reproduce["spiral_calibration"],
         "sweep_campaign": REPRODUCED,
+        "sweep_operators": config["genetic"]["operators"],
         "sweep_calibration": reproduce["line_calibration"],
     }

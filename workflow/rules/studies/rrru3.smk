@@ -4,7 +4,10 @@ paper_a_settings.check(config)
 
 SWEPT = ["crossover_fraction", "migration_fraction"]
 SWEEP_RUNS = ["sweep_runs", "sweep_history", "sweep_parameters"]
-SWEEP_TABLES = [*SWEEP_RUNS, "sweep_effect", "sweep_pairs"]
+SWEEP_TABLES = [*SWEEP_RUNS, "sweep_effect", "sweep_pairs", "sweep_match"]
+# operators/parameter/population
+SWEEPS = paper_a_settings.sweeps(config["sweep"], SWEPT)
+REDRAW_TABLES = ["redraws", "redraw_counts", "twin_numbers"]
 REPRODUCED = config["reproduce"]["campaign"]
 _SWEEP_SHOWN = ["sweep_runs", "sweep_effect", "sweep_pairs", "calibrations"]
 _PAPER_A = "rrru.studies.rrru3.figures"
@@ -18,15 +21,13 @@ PAPER_A_FIGURES = {
 }
 PAPERS["A"] = {
     "study": "rrru.studies.rrru3",
-    "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs"],
+    "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs", "redraw_counts"],
     "settings": {
         "nominal": parts.nominal(config, REPRODUCED),
         "virtual": parts.virtual(config, REPRODUCED),
         **reads(
-            *(f"genetic.{key}" for key in ("crossover_fraction", "migration_fraction", "populations")),
-            *(f"calibration.sets.{config['reproduce'][key]}" for key in ("line_calibration", "spiral_calibration")),
-            "calibration.use_near_singularity",
-            "reproduce",
+            *(f"genetic.{key}" for key in ("operators", "crossover_fraction", "migration_fraction", "populations")),
+            *(f"reproduce.{key}" for key in config["reproduce"] if key != "redraws"),
         ),
     },
 }
@@ -39,15 +40,16 @@ CAMPAIGN_FIGURES = {
 }
 
 
-# all values and seeds of one swept setting
+# all values and seeds of one swept setting in one reading of the paper
 rule sweep:
     input:
         measurements=part("measurements", REPRODUCED),
     output:
-        **named(SWEEP_RUNS, under("sweep/{parameter}/{population}")),
+        **named(SWEEP_RUNS, under("sweep/{operators}/{parameter}/{population}")),
     log:
-        f"{RESULTS}/logs/sweep/{{parameter}}/{{population}}.log",
+        f"{RESULTS}/logs/sweep/{{operators}}/{{parameter}}/{{population}}.log",
     wildcard_constraints:
+        operators="|".join(config["sweep"]["readings"]),
         parameter="|".join(SWEPT),
         population="|".join(config["sweep"]["populations"]),
     params:
@@ -55,7 +57,9 @@ rule sweep:
             **wildcards,
             "nominal": parts.nominal(config, REPRODUCED),
             "patterns": config["calibration"]["sets"][config["reproduce"]["line_calibration"]],
-            **reads("seed", *GENETIC_SETTINGS, "sweep", "calibration.use_near_singularity"),
+            "populations": config["sweep"]["populations"][wildcards.population],
+            "reading": paper_a_settings.reading(config["sweep"], wildcards.operators),
+            **reads("seed", *GENETIC_SETTINGS, "sweep.stall_generations", "calibration.use_near_singularity"),
         },
         code=code("sweep"),
     script:
@@ -64,14 +68,7 @@ rule sweep:
 
 rule sweep_tables:
     input:
-        **{
-            name: expand(
-                under("sweep/{parameter}/{population}")(name),
-                parameter=SWEPT,
-                population=sorted(config["sweep"]["populations"]),
-            )
-            for name in SWEEP_RUNS
-        },
+        **{name: [under(f"sweep/{sweep}")(name) for sweep in SWEEPS] for name in SWEEP_RUNS},
     output:
         **named(SWEEP_TABLES),
     log:
@@ -81,6 +78,30 @@ rule sweep_tables:
         code=code("sweep_tables"),
     script:
         "../../scripts/sweep_tables.py"
+
+
+# the reproduced robot under other draws of wobble and noise
+rule redraws:
+    output:
+        **named(REDRAW_TABLES),
+    log:
+        f"{RESULTS}/logs/redraws.log",
+    params:
+        settings={
+            "nominal": parts.nominal(config, REPRODUCED),
+            "virtual": parts.virtual(config, REPRODUCED),
+            **reads(
+                *(
+                    f"calibration.sets.{config['reproduce'][key]}"
+                    for key in ("line_calibration", "spiral_calibration")
+                ),
+                "calibration.use_near_singularity",
+                "reproduce",
+            ),
+        },
+        code=code("redraws"),
+    script:
+        "../../scripts/redraws.py"
 
 
 rule twin:
@@ -142,4 +163,4 @@ rule figures:
         [drawn(CAMPAIGN_FIGURES, f"figures/{name}").values() for name in CAMPAIGNS if name != REPRODUCED],
 
 
-TARGETS += [*named(SWEEP_TABLES).values(), *rules.figures.input]
+TARGETS += [*named([*SWEEP_TABLES, *REDRAW_TABLES]).values(), *rules.figures.input]

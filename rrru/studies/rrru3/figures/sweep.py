@@ -42,9 +42,7 @@ def _sweep(tables, options, parameter, name):
     """The published curve, then for each kind of population the seeds' scatter beside it on one log axis."""
     published = pd.Series(_PRINTED[parameter], index=[float(setting) for setting in SETTINGS])
     optimum = _optimum(tables, options, name)
-    own = {
-        key: tables[key][tables[key]["parameter"] == parameter] for key in ("sweep_runs", "sweep_pairs", "sweep_effect")
-    }
+    own = {key: _shown(tables[key], parameter, options) for key in ("sweep_runs", "sweep_pairs", "sweep_effect")}
     kinds = [kind for kind in _POPULATIONS if (own["sweep_runs"]["population"] == kind).any()]
     if not kinds:
         raise ConfigError(f"{name}: table sweep_runs has no runs of {parameter}")
@@ -71,6 +69,12 @@ def _sweep(tables, options, parameter, name):
     first.set_ylabel("mean distance above the optimum (mm)")
     style.legend_above(figure, figure.axes, columns=3)
     return figure
+
+
+def _shown(frame, parameter, options):
+    """Rows of one swept parameter in the reading that the study takes, its runs going on to the end."""
+    chosen = (frame["operators"] == options["sweep_operators"]) & (frame["stop"] == "end")
+    return frame[chosen & (frame["parameter"] == parameter)]
 
 
 def _optimum(tables, options, name):

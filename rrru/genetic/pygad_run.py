@@ -1,0 +1,127 @@
+"""PyGAD's genetic algorithm with its own operators: another reading of the paper's words.
+
+What the paper names is set: stochastic universal selection, a population of the stated size, genes in 0..1, and its
+"crossover probability" as PyGAD's, which says how likely each parent may mate. Everything else is PyGAD's default:
+single-point crossover, random mutation of a tenth of the genes (at least one), one elite. PyGAD knows neither islands
+nor migration. Islands are instances of their own here, and migrate as MATLAB's do, between runs of as many generations
+as the migration interval: PyGAD goes on where it stopped when it is run again.
+"""
+
+import logging
+
+import numpy as np
+import pygad
+
+from rrru.errors import FitError
+from rrru.genetic import operators
+from rrru.genetic.islands import migrate
+from rrru.genetic.plan import make_plan, migrants_of
+from rrru.genetic.result import GeneticResult, means
+
+# PyGAD logs every exception before raising it again; the exception is enough
+_LOGGER = logging.getLogger(__name__)
+_LOGGER.addHandler(logging.NullHandler())
+_LOGGER.propagate = False
+
+
+def run(objective, box, settings, seed):
+    """GeneticResult of an objective, see `algorithm.minimise`, within a Box. Raises FitError where nobody is feasible.
+
+    Stalled is PyGAD's "saturate": the best objective stayed the same.
+    """
+    islands = [_Island(objective, box, settings, size, seed + k) for k, size in enumerate(settings.populations)]
+    stall, rows = settings.stall_generations, make_plan(settings.populations, settings.elite_share, 1.0)
+    migrants = migrants_of(settings.populations, settings.migration_fraction)
+    stretch = settings.generations if len(islands) == 1 else settings.migration_interval
+    while (done := islands[0].done) < settings.generations:
+        if done:
+            population = np.concatenate([island.ga.population for island in islands])
+            score = np.concatenate([-island.ga.last_generation_fitness for island in islands])
+            arrived, _ = migrate(population, score, rows, migrants)
+            for island, (start, stop) in zip(islands, rows[:, :2], strict=True):
+                island.ga.population = arrived[start:stop]
+        for island in islands:
+            island.advance(min(stretch, settings.generations - done))
+        result = _joined(islands, box)
+        stopped = result.stalled(stall, 0.0)
+        if stopped.generations < settings.generations and stopped.stopped == "stalled":
+            return stopped
+    return result
+
+
+class _Island:
+    """One PyGAD instance and its histories, from the initial population on."""
+
+    def __init__(self, objective, box, settings, size, seed):
+        self.objective, self.box, self.asked = objective, box, 0
+        self.genes, self.scores, self.rated = [], [], []
+        # the only island may stop by itself
+        alone = len(settings.populations) == 1 and settings.stall_generations
+        self.ga = pygad.GA(
+            num_generations=1,
+            # ASSUME PyGAD has no default: as many parents as there are places
+            num_parents_mating=size,
+            fitness_func=self._fitness,
+            fitness_batch_size=size,
+            sol_per_pop=size,
+            num_genes=box.low.size,
+            init_range_low=0.0,
+            init_range_high=1.0,
+            parent_selection_type="sus",
+            crossover_probability=settings.crossover_fraction,
+            # a mutated gene is drawn anew from the whole range
+            mutation_by_replacement=True,
+            random_mutation_min_val=0.0,
+            random_mutation_max_val=1.0,
+            stop_criteria=f"saturate_{settings.stall_generations}" if alone else None,
+            on_generation=self._note,
+            suppress_warnings=True,
+            random_seed=seed % 2**32,
+            logger=_LOGGER,
+        )
+        self._keep(self.ga.population, self.ga.cal_pop_fitness())
+        # PyGAD rates its first population again when it is run
+        self.asked = 0
+
+    @property
+    def done(self):
+        """Generations done."""
+        return len(self.scores) - 1
+
+    def advance(self, generations):
+        """Run so many generations more."""
+        self.ga.num_generations = generations
+        try:
+            self.ga.run()
+        except ValueError as error:
+            raise FitError(f"PyGAD's selection: {error}") from error
+
+    def _fitness(self, _ga, genes, _rows):
+        """PyGAD's fitness, minus the objective, of a batch."""
+        self.asked += len(genes)
+        return -self.objective(operators.decoded(np.asarray(genes, dtype=float), self.box))
+
+    def _note(self, ga):
+        """Keep a generation."""
+        self._keep(ga.population, ga.last_generation_fitness)
+
+    def _keep(self, population, fitness):
+        """Keep the best individual, all scores and what was asked so far."""
+        score = -np.asarray(fitness, dtype=float)
+        self.genes.append(population[score.argmin()].copy())
+        self.scores.append(score)
+        self.rated.append(self.asked)
+
+
+def _joined(islands, box):
+    """The islands' histories as one GeneticResult."""
+    scores = np.stack([np.concatenate(row) for row in zip(*(island.scores for island in islands), strict=True)])
+    best = np.stack([[row.min() for row in island.scores] for island in islands])
+    genes = np.stack([island.genes for island in islands])[best.argmin(axis=0), np.arange(len(scores))]
+    return GeneticResult(
+        stopped="generations",
+        found=operators.decoded(genes, box),
+        best_history=best.min(axis=0),
+        mean_history=means(scores),
+        asked=np.sum([island.rated for island in islands], axis=0),
+    )
