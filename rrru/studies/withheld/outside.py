@@ -19,6 +19,8 @@ _PLATFORM_KG = Masses().platform_kg + 1.5 * Masses().forearm_kg
 _ANCHOR_MM = np.array([100.0, 900.0, 0.0])
 _SLACK_MM = 1080.0
 _PERIODS_S = (7.3, 19.0, 41.0)
+_TOOTH_RAD = 0.08
+_TEETH_RAD = (-0.3, 0.0, 0.3)
 
 
 def _shifted(motion, shift_mm):
@@ -58,10 +60,9 @@ def _floor_tilt(motion, values):
     return _shifted(motion, np.cross(tilt, motion.position_mm))
 
 
-def _pulley_ripple(motion, values):
-    """A belt pulley off centre that turns five times per turn of the drive arm: sine and cosine (rad) per drive."""
-    sine, cosine = np.reshape(values, (3, 2)).T
-    return motion.at_drives(sine * np.sin(5.0 * motion.drive) + cosine * np.cos(5.0 * motion.drive))
+def _damaged_tooth(motion, values):
+    """A tooth of each drive's wheel is dented: the arm lags (rad) where it meets, a few degrees wide."""
+    return motion.at_drives(values[:3] * np.exp(-(((motion.drive - values[3]) / _TOOTH_RAD) ** 2)))
 
 
 def _make(law, parameters, typical, shapes=({},)):
@@ -81,7 +82,8 @@ _PATTERN = Parameter("pattern", "1", 1.0, 1.0, 1e6, "draw")
 _PERIOD = Parameter("period", "s", 20.0, 1.0, 1e4, "assumed")
 _YIELDING = Parameter("yielding", "mm/mm", 0.0, 0.0, 0.1, "assumed")
 _SOFTNESS = tuple(Parameter(f"softness_{axis}", "rad/(N mm)", 0.0, 0.0, 1e-6, "assumed") for axis in "xy")
-_RIPPLES = leg_parameters("assumed", *((part, "rad", -0.01, 0.01) for part in ("sine", "cosine")))
+_DENTS = leg_parameters("assumed", ("dent", "rad", -0.01, 0.01))
+_TOOTH = Parameter("tooth", "rad", 0.0, -1.0, 1.0, "assumed")
 
 OUTSIDE = {
     cause.name: cause
@@ -91,7 +93,7 @@ OUTSIDE = {
         _make(_tripod_creep, _axes("speed", "mm/s", 0.1), 1e-4),
         _make(_cable_pull, (_YIELDING,), 1e-3),
         _make(_floor_tilt, _SOFTNESS, 5e-9),
-        _make(_pulley_ripple, _RIPPLES, 3e-4),
+        _make(_damaged_tooth, (*_DENTS, _TOOTH), 3e-4, tuple({"tooth": rad} for rad in _TEETH_RAD)),
     )
 }
 _LIBRARY = library(Rrru3())
