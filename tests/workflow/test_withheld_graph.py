@@ -45,7 +45,11 @@ def test_no_diagnosis_is_given_an_answer(jobs):
     for rule, inputs, outputs in jobs:
         if rule == "withheld_diagnose":
             assert {Path(path).stem for path in inputs} == {"withheld_measurements"}
-            assert {Path(path).stem for path in outputs} == {"withheld_verdicts", "withheld_states"}
+            assert {Path(path).stem for path in outputs} == {
+                "withheld_verdicts",
+                "withheld_states",
+                "withheld_budget",
+            }
         if rule == "diagnose":
             assert {Path(path).name for path in inputs} == {"measurements.parquet"}
     # what is measured reaches the diagnosis, and nothing that was scored does

@@ -27,6 +27,12 @@ class Member(NamedTuple):
         return self.about if self.check == "effect" else ""
 
 
+def noise_of(name):
+    """The noise that a robot of that check has by its name, empty for other robots."""
+    check, _, about = name.partition("_")
+    return about.rpartition("_")[0] if check == "noise" else ""
+
+
 def chunks(section):
     """Members of every chunk by the chunk's name, from the configuration's `withheld` section."""
     members = [Member("label", "", k) for k in range(section["robots"])]

@@ -3,8 +3,13 @@ from rrru.studies.withheld.chunks import chunks
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
-WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "summary", "confusion")]
-WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
+WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "parts", "summary", "confusion")]
+WITHHELD_FIGURES = {
+    "withheld": (
+        "rrru.studies.withheld.figures:withheld",
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+    )
+}
 FIGURES["withheld"] = WITHHELD_FIGURES
 # what is known of every robot
 WITHHELD_ROBOT = {
@@ -35,12 +40,12 @@ rule withheld_diagnose:
     input:
         **named(["withheld_measurements"], under("withheld/{chunk}")),
     output:
-        **named(["withheld_verdicts", "withheld_states"], under("withheld/{chunk}")),
+        **named(["withheld_verdicts", "withheld_states", "withheld_budget"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
-            "taken_out": {member.name: member.taken_out for member in WITHHELD[wildcards.chunk]},
+            "robots": {member.name: (member.check, member.taken_out) for member in WITHHELD[wildcards.chunk]},
             **WITHHELD_ROBOT,
             **reads("gap"),
         },
@@ -53,11 +58,11 @@ rule withheld_diagnose:
 rule withheld_score:
     input:
         **named(
-            ["withheld_answers", "withheld_measurements", "withheld_verdicts", "withheld_states"],
+            [f"withheld_{name}" for name in ("answers", "measurements", "verdicts", "states", "budget")],
             under("withheld/{chunk}"),
         ),
     output:
-        **named(["withheld_scores", "withheld_limits"], under("withheld/{chunk}")),
+        **named(["withheld_scores", "withheld_limits", "withheld_parts"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
@@ -72,7 +77,7 @@ rule withheld_summary:
     input:
         **{
             name: [under(f"withheld/{chunk}")(name) for chunk in WITHHELD]
-            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits")
+            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits", "withheld_parts")
         },
         field=[part("gap_verdicts", campaign) for campaign in config["withheld"]["field"]],
         field_answers=config["withheld"]["field_answers"] or [],
