@@ -43,6 +43,16 @@ def chunks(section):
     return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
 
 
+def rivalled(section):
+    """Names of the robots on which other ways are tried by the name of their chunk: the first of the check label."""
+    found = {}
+    for chunk, members in chunks(section).items():
+        names = [one.name for one in members if one.check == "label" and one.number < section["methods"]]
+        if names:
+            found[chunk] = names
+    return found
+
+
 def check(config):
     """Raise ConfigError where the `withheld` section names a campaign or an effect that does not exist."""
     from rrru.studies.withheld.outside import EFFECTS

@@ -101,6 +101,35 @@ found_rms_mm           float? as in gap_budget, 0 where that does not list it; n
 probability            float? as in gap_budget, 0 where that does not list it; null for a cause from outside
 named                  bool   the verdict names it; outside: says unexplained; scatter, runs: more probable than not
 
+## withheld_beliefs | timings/withheld/{chunk}.parquet | robot method
+What each way to find a cause says about robots whose cause is hidden; made without knowing any answer.
+--
+robot
+method                 str    diagnosis; bic: Bayes' information criterion; lasso; gaussian_process: names nothing
+    {diagnosis, bic, lasso, gaussian_process}
+effects                str    its answer, as in gap_verdicts; empty where it names nothing
+probabilities          str    probability by set of effects, as JSON; all that is unexplained is one set; empty where it
+    names nothing
+share_closed           float? share of the gap that it predicts on left-out runs; null where that is not computed
+seconds                float  computing time on this machine
+
+## withheld_methods | timings/withheld_methods.parquet | method
+Ways to find the cause of a gap on the same robots, campaigns and stated noise. Here for its seconds, which differ from
+run to run; the rest does not.
+--
+method                 str    as in withheld_beliefs {diagnosis, bic, lasso, gaussian_process}
+robots                 int    robots, all of the check label
+right                  float? share of robots whose answer is right, see withheld_scores; null where nothing is named
+right_low              float? lower end of its 95 % Wilson interval
+right_high             float? upper end
+probability_true       float? mean probability of the true set, unexplained where the library does not hold it
+brier                  float? mean Brier score over all sets, 0 (best) to 2
+log_score              float? mean natural logarithm of the probability of the true set, 0.001 at least
+share_closed           float? mean share of the gap closed on left-out runs, robots of a gap of 1.5 times the noise or
+    more; null where that is not computed
+seconds                float  mean computing time per robot on this machine
+note                   str    what the method is
+
 ## withheld_summary | tables/withheld_summary.parquet | check group figure
 The scores in figures, against what the tool is meant to reach.
 --

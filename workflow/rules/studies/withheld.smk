@@ -1,4 +1,4 @@
-from rrru.studies.withheld.chunks import chunks
+from rrru.studies.withheld.chunks import chunks, rivalled
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
@@ -11,6 +11,8 @@ WITHHELD_FIGURES = {
     )
 }
 FIGURES["withheld"] = WITHHELD_FIGURES
+# and those among them on which other ways to find a cause are tried
+RIVALLED = rivalled(config["withheld"])
 # what is known of every robot
 WITHHELD_ROBOT = {
     "robot": parts.robot(config, {"robot": "rrru3"}),
@@ -73,6 +75,37 @@ rule withheld_score:
         "../../scripts/withheld_score.py"
 
 
+# as the diagnosis, it never sees an answer
+rule withheld_beliefs:
+    input:
+        **named(["withheld_measurements"], under("withheld/{chunk}")),
+    output:
+        withheld_beliefs=f"{RESULTS}/timings/withheld/{{chunk}}.parquet",
+    log:
+        f"{RESULTS}/logs/withheld_beliefs/{{chunk}}.log",
+    params:
+        settings=lambda wildcards: {"robots": RIVALLED[wildcards.chunk], **WITHHELD_ROBOT, **reads("gap")},
+        own_effects=own_effects_digests(),
+        code=code("withheld_beliefs"),
+    script:
+        "../../scripts/withheld_beliefs.py"
+
+
+rule withheld_methods:
+    input:
+        withheld_answers=[under(f"withheld/{chunk}")("withheld_answers") for chunk in RIVALLED],
+        withheld_beliefs=[f"{RESULTS}/timings/withheld/{chunk}.parquet" for chunk in RIVALLED],
+    output:
+        withheld_methods=f"{RESULTS}/timings/withheld_methods.parquet",
+    log:
+        f"{RESULTS}/logs/withheld_methods.log",
+    params:
+        settings={},
+        code=code("withheld_methods"),
+    script:
+        "../../scripts/withheld_methods.py"
+
+
 rule withheld_summary:
     input:
         **{
@@ -96,4 +129,5 @@ rule withheld_summary:
 rule withheld:
     input:
         named(WITHHELD_TABLES).values(),
+        rules.withheld_methods.output,
         drawn(WITHHELD_FIGURES).values(),
