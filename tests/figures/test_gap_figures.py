@@ -178,7 +178,7 @@ def test_every_verdict_has_a_column(verdict, column):
 
 def test_shares_are_of_the_scores():
     scores = made_up.withheld_scores()
-    figure = draw("withheld", {"withheld_scores": scores, "withheld_confusion": made_up.withheld_confusion(scores)})
+    figure = draw("withheld", made_up.withheld_tables(scores))
     axes = panel(figure, "stated probability")
     sure = scores.query("check == 'label' and probability >= 0.97")
     line = next(one for one in axes.lines if one.get_label() == "label withheld")
@@ -190,13 +190,21 @@ def test_shares_are_of_the_scores():
 
 def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
     scores = made_up.withheld_scores(each=1)
-    for check in ("label", "effect", "field"):
-        one = scores[scores["check"] == check]
-        figure = draw("withheld", {"withheld_scores": one, "withheld_confusion": made_up.withheld_confusion(one)})
-        assert len(figure.axes) == 4
-    nothing = {"withheld_scores": scores.iloc[:0], "withheld_confusion": made_up.withheld_confusion(scores.iloc[:0])}
+    for check in scores["check"].unique():
+        figure = draw("withheld", made_up.withheld_tables(scores[scores["check"] == check]))
+        assert len(figure.axes) == (5 if check in ("many", "noise") else 4)
     with pytest.raises(ConfigError, match="withheld_scores"):
-        draw("withheld", nothing)
+        draw("withheld", made_up.withheld_tables(scores.iloc[:0]))
+
+
+def test_parts_are_drawn_found_against_true():
+    frames = made_up.withheld_tables()
+    figure = draw("withheld", frames)
+    for check, title in (("many", "the gap, many causes"), ("noise", "the gap, noise not")):
+        parts = frames["withheld_parts"].query(f"check == '{check}' and kind == 'scatter' and named")
+        line = next(one for one in panel(figure, title).lines if one.get_label() == "scatter")
+        np.testing.assert_allclose(sorted(line.get_xdata()), sorted(parts["true_rms_mm"].clip(withheld._LEAST_MM)))
+        assert line.get_markerfacecolor() != "white" and len(line.get_xdata()) == len(parts) > 0
 
 
 @pytest.mark.parametrize("name", [name for name in TABLES if name.startswith(("gap_", "withheld_"))])

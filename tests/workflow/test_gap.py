@@ -130,6 +130,11 @@ def test_the_check_on_withheld_effects_runs_from_robots_to_figure(results):
     assert len(scores.loc["label"]) == 4 and len(scores.loc["effect"]) == 1
     assert scores.loc[("field", "field_09"), "right"]
     assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
+    assert len(scores.loc["many"]) == len(scores.loc["background"]) == 1
     summary = pd.read_parquet(results / "tables/withheld_summary.parquet")
-    assert set(summary["check"]) == {"label", "effect", "field"}
+    assert set(summary["check"]) == {"label", "effect", "many", "background", "field"}
+    parts = pd.read_parquet(results / "tables/withheld_parts.parquet")
+    assert set(parts["robot"]) == set(scores.drop("field").index.get_level_values("robot"))
+    methods = pd.read_parquet(results / "timings/withheld_methods.parquet").set_index("method")
+    assert list(methods.index) == ["diagnosis", "bic", "lasso", "gaussian_process"] and (methods["robots"] == 2).all()
     assert (results / "figures/withheld.png").stat().st_size > 10_000

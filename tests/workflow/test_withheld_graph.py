@@ -41,11 +41,17 @@ def test_no_diagnosis_is_given_an_answer(jobs):
     answers = _of(jobs, "answers")
     assert len(answers) == 2
     assert {rule for rule, _, outputs in jobs if outputs & answers} == {"withheld_robots"}
-    assert {rule for rule, inputs, _ in jobs if inputs & answers} == {"withheld_score"}
+    assert {rule for rule, inputs, _ in jobs if inputs & answers} == {"withheld_score", "withheld_methods"}
     for rule, inputs, outputs in jobs:
+        if rule == "withheld_beliefs":
+            assert {Path(path).stem for path in inputs} == {"withheld_measurements"}
         if rule == "withheld_diagnose":
             assert {Path(path).stem for path in inputs} == {"withheld_measurements"}
-            assert {Path(path).stem for path in outputs} == {"withheld_verdicts", "withheld_states"}
+            assert {Path(path).stem for path in outputs} == {
+                "withheld_verdicts",
+                "withheld_states",
+                "withheld_budget",
+            }
         if rule == "diagnose":
             assert {Path(path).name for path in inputs} == {"measurements.parquet"}
     # what is measured reaches the diagnosis, and nothing that was scored does
@@ -65,11 +71,12 @@ def _modules(script):
     return {(file.parent.name, file.stem) for file in closure(f"workflow/scripts/{script}.py")}
 
 
-@pytest.mark.parametrize("script", ["withheld_diagnose", "diagnose"])
+@pytest.mark.parametrize("script", ["withheld_diagnose", "withheld_beliefs", "diagnose"])
 def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     modules = _modules(script)
     assert {("gap", "diagnose"), ("gap", "case")} <= modules
-    # of the study that draws the robots only how verdicts and corrected sims are written down
-    assert {name for package, name in modules if package == "withheld"} <= {"__init__", "schemas", "states"}
+    # of the study that draws the robots only how verdicts and corrected sims are written down, and other ways to them
+    own = {"__init__", "schemas", "states", *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ())}
+    assert {name for package, name in modules if package == "withheld"} <= own
     # and the walk would see them
     assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")

@@ -13,19 +13,24 @@ from rrru.studies.withheld.states import VERDICT, state_row
 
 
 def main(settings, inputs, outputs):
-    """Write verdicts and states of a chunk."""
-    library, taken_out = GapSettings.from_config(settings["gap"], settings["seed"]), settings["taken_out"]
+    """Write verdicts, states and budgets of a chunk."""
+    library = GapSettings.from_config(settings["gap"], settings["seed"])
     robot, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
     noise_mm = settings["withheld"]["noise_mm"]
-    verdicts, states = [], []
+    verdicts, states, budgets = [], [], []
     for (name, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=False):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
-        known = library.without(taken_out[name]) if taken_out[name] else library
+        check, taken_out = settings["robots"][name]
+        known = library.without(taken_out) if taken_out else library
         result = diagnose(points, MeasuredRobot(robot, masses, noise_mm, name), known, details=False)
-        label = {"check": "effect" if taken_out[name] else "label", "robot": name, "kind": kind}
-        verdicts.append(label | {key: result.verdict[key] for key in VERDICT})
+        verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
         states.append(state_row(name, result.attribution.calibrated.deviations, result.state))
-    frames = {"withheld_verdicts": pd.DataFrame(verdicts), "withheld_states": pd.DataFrame(states)}
+        budgets.append(result.tables["gap_budget"].assign(robot=name))
+    frames = {
+        "withheld_verdicts": pd.DataFrame(verdicts),
+        "withheld_states": pd.DataFrame(states),
+        "withheld_budget": pd.concat(budgets, ignore_index=True),
+    }
     tables.write_all(TABLES, frames, outputs)
 
 

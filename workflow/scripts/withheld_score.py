@@ -9,12 +9,12 @@ from rrru.studies.withheld.score import score_chunk
 
 
 def main(settings, inputs, outputs):
-    """Write scores and limits of the robots of a chunk."""
+    """Write scores, limits and parts of the gaps of the robots of a chunk."""
     frames = {name.removeprefix("withheld_"): tables.read(path) for name, path in inputs.items()}
     conditions = Conditions.from_config(settings)
     library = GapSettings.from_config(settings["gap"]).library(conditions.mechanism)
-    scores, limits = score_chunk(**frames, conditions=conditions, library=library)
-    tables.write_all(TABLES, {"withheld_scores": scores, "withheld_limits": limits}, outputs)
+    scored = score_chunk(**frames, conditions=conditions, library=library)
+    tables.write_all(TABLES, {f"withheld_{name}": frame for name, frame in scored._asdict().items()}, outputs)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ def main(settings, inputs, outputs):
             parts["withheld_scores"].append(score_field(field, read_field_answers(inputs["field_answers"])))
     frames = {name: pd.concat([f for f in part if len(f)], ignore_index=True) for name, part in parts.items()}
     scores = frames["withheld_scores"]
-    frames["withheld_summary"] = summary(scores, frames["withheld_limits"])
+    frames["withheld_summary"] = summary(scores, frames["withheld_limits"], frames["withheld_parts"])
     frames["withheld_confusion"] = confusion(scores)
     tables.write_all(TABLES, frames, outputs)
 

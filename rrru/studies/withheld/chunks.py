@@ -27,6 +27,12 @@ class Member(NamedTuple):
         return self.about if self.check == "effect" else ""
 
 
+def noise_of(name):
+    """The noise that a robot of that check has by its name, empty for other robots."""
+    check, _, about = name.partition("_")
+    return about.rpartition("_")[0] if check == "noise" else ""
+
+
 def chunks(section):
     """Members of every chunk by the chunk's name, from the configuration's `withheld` section."""
     members = [Member("label", "", k) for k in range(section["robots"])]
@@ -35,6 +41,16 @@ def chunks(section):
     members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
     size = section["chunk"]
     return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
+
+
+def rivalled(section):
+    """Names of the robots on which other ways are tried by the name of their chunk: the first of the check label."""
+    found = {}
+    for chunk, members in chunks(section).items():
+        names = [one.name for one in members if one.check == "label" and one.number < section["methods"]]
+        if names:
+            found[chunk] = names
+    return found
 
 
 def check(config):

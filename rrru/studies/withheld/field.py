@@ -6,7 +6,7 @@ import pandas as pd
 from rrru.errors import ConfigError
 from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.states import VERDICT
-from rrru.studies.withheld.verdicts import in_order, is_outside, scores
+from rrru.studies.withheld.verdicts import in_order, is_outside, is_right, scores
 
 
 def field_verdicts(verdicts):
@@ -19,8 +19,9 @@ def score_field(verdicts, answers):
     truth = answers.assign(effects=answers["effects"].map(in_order))
     truth = truth.rename(columns={"campaign": "robot", "effects": "truth", "leg": "truth_leg"})
     strength = verdicts["gap_rms_mm"] / verdicts["noise_rms_mm"]
-    told = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan)
-    return scores(told.merge(truth, on="robot"))
+    told = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
+    right = [is_right(*pair, "field") for pair in zip(told["truth"], told["effects"], strict=True)]
+    return scores(told.assign(right=right))
 
 
 def read_field_answers(path):

@@ -14,8 +14,22 @@ NONE, OUTSIDE, SEVERAL = "none", "outside the library", "two or more"
 _CHECKS = {
     "label": ("label withheld", style.LINES),
     "effect": ("effect withheld", style.SPIRAL),
+    "noise": ("noise not as stated", {"color": style.SKY, "marker": "v", "linestyle": (0, (4, 2, 1, 2))}),
+    "background": ("axis errors in all", {"color": style.GREY, "marker": "P", "linestyle": (0, (1, 2))}),
+    "many": ("many causes", {"color": style.BLACK, "marker": "x", "linestyle": (0, (6, 2))}),
     "field": ("field campaigns", style.PUBLISHED),
 }
+# checks whose parts are shown, and looks of the parts' kinds
+_PARTED = ("many", "noise")
+_KINDS = {
+    "effect": ("an effect", {"color": style.BLUE, "marker": "s"}),
+    "background": ("axis errors", {"color": style.GREY, "marker": "P"}),
+    "scatter": ("scatter", {"color": style.ORANGE, "marker": "^"}),
+    "runs": ("offsets of runs", {"color": style.VERMILION, "marker": "D"}),
+    "unexplained": ("unexplained", {"color": style.BLACK, "marker": "o"}),
+}
+# parts below this (mm) are drawn on the edge
+_LEAST_MM = 0.003
 _PROBABILITY_EDGES = np.array([0.0, 0.5, 0.7, 0.8, 0.9, 0.97, 1.0])
 _STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
 # shares closed below this are drawn on the edge
@@ -31,19 +45,22 @@ def withheld(tables, options):
     right answers framed; of the effect check, the row is the effect that was taken out of the library. Unexplained
     counts alone or beside a name. Then the share of right verdicts against the stated probability and against the
     gap over the noise, beside a test that knows the true law (1 % false alarms), with 95 % intervals, and the share
-    of the gap closed as predicted and in truth.
+    of the gap closed as predicted and in truth. Last the parts of gaps that many causes make, or noises that are not
+    as stated: found against true, filled where the verdict names them (scatter and runs: where they are more probable
+    than not), 25 % off between the dotted lines, what is missed or not there on the edges.
     """
     scores, confusion = tables["withheld_scores"], tables["withheld_confusion"]
     if scores.empty:
         raise ConfigError("withheld: table withheld_scores has no robot")
+    parted = [name for name in _PARTED if (tables["withheld_parts"]["check"] == name).any()]
     checks = [name for name in _CHECKS if (scores["check"] == name).any()]
-    cells = _cells(confusion)
+    cells = _cells(confusion[confusion["check"].isin(checks[:2])])
     names = sorted({*cells["row"], *cells["column"]} - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
     maps = [_map(cells[cells["check"] == name], names) for name in checks[:2]]
-    upper = 4.4 * max(len(counts) for counts in maps) + 38.0
-    figure = style.new(style.DOUBLE_MM, upper + 62.0)
-    parts = figure.add_gridspec(2, 1, height_ratios=[upper, 62.0])
-    marks = iter("abcdefg")
+    heights = [4.1 * max(len(counts) for counts in maps) + 38.0, 58.0, *([58.0] if parted else [])]
+    figure = style.new(style.DOUBLE_MM, sum(heights) + 8.0)
+    parts = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    marks = iter("abcdefgh")
     for place, name, counts in zip(parts[0].subgridspec(1, len(maps)), checks, maps, strict=False):
         axes = figure.add_subplot(place)
         _confusion(axes, counts, name == "effect")
@@ -52,8 +69,15 @@ def withheld(tables, options):
     for axes, draw in zip(panels, (_reliability, _strength, _closed), strict=True):
         draw(axes, scores, checks)
         axes.set_title(f"({next(marks)}) {axes.get_title(loc='left')}")
+        axes.yaxis.set_major_locator(MultipleLocator(0.2))
         axes.grid(True)
-    style.legend_above(figure, panels)
+    style.legend_above(figure, panels, columns=4)
+    if parted:
+        below = [figure.add_subplot(part) for part in parts[2].subgridspec(1, len(parted))]
+        for axes, name in zip(below, parted, strict=True):
+            _parts(axes, tables["withheld_parts"].query("check == @name"))
+            axes.set_title(f"({next(marks)}) parts of the gap, {_CHECKS[name][0]}")
+        style.legend_above(figure, below, columns=6, side="lower")
     return figure
 
 
@@ -138,9 +162,29 @@ def _closed(axes, scores, checks):
         axes.plot(*values.T, label=label, **(look | {"linestyle": "none", "markersize": 2.4, "markeredgewidth": 0.5}))
     edges = (_LOWEST_CLOSED - 0.04, 1.04)
     axes.set(xlabel="true share closed", ylabel="predicted share closed", xlim=edges, ylim=edges)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MultipleLocator(0.2))
+    axes.xaxis.set_major_locator(MultipleLocator(0.2))
     axes.set_title("share of the gap closed")
+
+
+def _parts(axes, parts):
+    """Found against true sizes of parts, filled where the verdict names them."""
+    parts = parts[(parts["kind"] != "outside") & (parts[["true_rms_mm", "found_rms_mm"]].max(axis=1) > _LEAST_MM)]
+    for kind, (label, look) in _KINDS.items():
+        for named, face in ((True, look["color"]), (False, "white")):
+            rows = parts[(parts["kind"] == kind) & (parts["named"] == named)]
+            place = rows[["true_rms_mm", "found_rms_mm"]].clip(_LEAST_MM).to_numpy()
+            sizes = {"markersize": 3.0, "markeredgewidth": 0.6, "markerfacecolor": face}
+            axes.plot(*place.T, label=label if named else None, linestyle="none", **look, **sizes)
+    largest = 1.5 * parts[["true_rms_mm", "found_rms_mm"]].to_numpy().max(initial=_LEAST_MM)
+    edges = np.array([0.8 * _LEAST_MM, largest])
+    axes.plot(edges, edges, **_EVEN)
+    for factor in (0.75, 1.25):
+        axes.plot(edges, factor * edges, **(_EVEN | {"linestyle": (0, (1, 2))}))
+    axes.set(xscale="log", yscale="log", xlim=edges, ylim=edges, xlabel="true part (mm)", ylabel="found part (mm)")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+        style.plain_log(axis)
+    axes.grid(True)
 
 
 def _shares(axes, rows, columns, edges, label, look):

@@ -25,6 +25,12 @@ class NoiseLaw:
     scatter: float = 0.0
     runs: float = 0.0
 
+    @property
+    def beyond(self):
+        """Rms of what does not repeat from point to point beyond the stated noise, over that noise."""
+        more = (self.size * np.array(self.axes)) ** 2 + self.scatter**2 - 1.0
+        return float(np.sqrt(np.maximum(more, 0.0).mean()))
+
     def draw(self, measurements, noise_mm, generator):
         """Noise (n, 3) in mm of the rows of a measurement table."""
         run = measurements["run"].to_numpy()

@@ -16,9 +16,11 @@ truth                  str    true effects joined by +; none; or outside:<name> 
 truth_leg              int    the one leg at fault, 1 to 3; 0 for all or none
 strength               float  true gap rms over noise rms, without noise
 weakest                float  the same of the weakest cause alone; 0 where nothing acts
-oracle_detects         bool   a likelihood-ratio test that knows the true law detects it at 1 % false alarms
+oracle_detects         bool   a likelihood-ratio test that knows the true law detects it at 1 % false alarms; of
+    label and effect, false in the other checks
 check                  str    label: the robots' effects are hidden; effect: the robot's effect is taken out of the
-    library; field: recorded by another simulator {label, effect, field}
+    library; noise: the noise is not as stated; many: three to six effects, axis errors and scatter; background: axis
+    errors in every robot; field: recorded by another simulator {label, effect, noise, many, background, field}
 
 ## withheld_answers | withheld/answers/{chunk}.parquet | robot
 What was drawn for each robot: read by the virtual robot and by the scoring, never by the diagnosis.
@@ -35,8 +37,20 @@ deviations             str    the mechanism's deviations of the corrected sim, a
 fitted_effects         str    effects of the corrected sim, as a JSON list of [name, shape, coordinates]
 shapes                 str    shapes' parameters that were fitted further, as JSON by effect and name
 
+## withheld_budget | withheld/budget/{chunk}.parquet | robot part
+The budget of each robot's gap by the diagnosis.
+--
+robot
+part                   str    as in gap_budget
+kind                   str    as in gap_budget
+rms_mm                 float  root of its mean square, negative where that is
+share                  float  of the gap's mean square
+share_low              float  lower end, 95 %, from the posterior
+share_high             float  upper end, 95 %, from the posterior
+probability            float? that the part is real; null where that is no question
+
 ## withheld_limits | tables/withheld_limits.parquet | check robot
-What the data of each robot could tell somebody who knows the true law.
+What the data of each robot could tell somebody who knows the true law; of the checks label and effect.
 --
 check                  str    as in withheld_scores
 robot weakest
@@ -64,12 +78,57 @@ Each verdict beside the truth.
 --
 check robot kind truth truth_leg strength
 verdict                str    the diagnosis's effects
-right                  bool   it names exactly the truth or, where the library lacks that, says unexplained
+right                  bool   it names exactly the truth or, where the library lacks that, says unexplained;
+    background: joint_axis_error may be named; many: it names all causes of 30 % of the gap, nothing that is not there,
+    and unexplained for a cause from outside of twice the noise
 leg_right              float? 1 where the leg is right, 0 where not; null where there is none to name
 probability            float  that the diagnosis gave its verdict, 0 to 1
 oracle_detects
 share_closed_true      float? share of the true gap that the corrected sim closes
 share_closed           float? the same as the diagnosis predicts it; null where it predicts none
+
+## withheld_parts | tables/withheld_parts.parquet | check robot part
+Each part of each robot's gap: its true size beside what the diagnosis finds.
+--
+check robot
+part                   str    effect, cause from outside, or kind
+kind                   str    effect; background: errors of all axes; outside: the library does not hold it; scatter:
+    what does not repeat, beyond the stated noise; runs: offsets between runs; unexplained: all from outside, root of
+    the sum of squares {effect, background, outside, scatter, runs, unexplained}
+strength               float  true rms over that of the stated noise; 0 for what is not there
+true_rms_mm            float  gap that it leaves alone, after its own calibration; 0 for what is not there
+found_rms_mm           float? as in gap_budget, 0 where that does not list it; null for a cause from outside
+probability            float? as in gap_budget, 0 where that does not list it; null for a cause from outside
+named                  bool   the verdict names it; outside: says unexplained; scatter, runs: more probable than not
+
+## withheld_beliefs | timings/withheld/{chunk}.parquet | robot method
+What each way to find a cause says about robots whose cause is hidden; made without knowing any answer.
+--
+robot
+method                 str    diagnosis; bic: Bayes' information criterion; lasso; gaussian_process: names nothing
+    {diagnosis, bic, lasso, gaussian_process}
+effects                str    its answer, as in gap_verdicts; empty where it names nothing
+probabilities          str    probability by set of effects, as JSON; all that is unexplained is one set; empty where it
+    names nothing
+share_closed           float? share of the gap that it predicts on left-out runs; null where that is not computed
+seconds                float  computing time on this machine
+
+## withheld_methods | timings/withheld_methods.parquet | method
+Ways to find the cause of a gap on the same robots, campaigns and stated noise. Here for its seconds, which differ from
+run to run; the rest does not.
+--
+method                 str    as in withheld_beliefs {diagnosis, bic, lasso, gaussian_process}
+robots                 int    robots, all of the check label
+right                  float? share of robots whose answer is right, see withheld_scores; null where nothing is named
+right_low              float? lower end of its 95 % Wilson interval
+right_high             float? upper end
+probability_true       float? mean probability of the true set, unexplained where the library does not hold it
+brier                  float? mean Brier score over all sets, 0 (best) to 2
+log_score              float? mean natural logarithm of the probability of the true set, 0.001 at least
+share_closed           float? mean share of the gap closed on left-out runs, robots of a gap of 1.5 times the noise or
+    more; null where that is not computed
+seconds                float  mean computing time per robot on this machine
+note                   str    what the method is
 
 ## withheld_summary | tables/withheld_summary.parquet | check group figure
 The scores in figures, against what the tool is meant to reach.
@@ -77,7 +136,7 @@ The scores in figures, against what the tool is meant to reach.
 check
 group                  str    which robots are counted
 figure                 str    what is counted
-robots                 int    robots in the group
+robots                 int    robots in the group, or parts of their gaps
 value                  float? the figure; null where the group is empty
 low                    float? lower end of the 95 % Wilson interval; null where the figure is no share
 high                   float? upper end

@@ -3,10 +3,15 @@
 import numpy as np
 import pandas as pd
 
+from rrru.studies.withheld.chunks import noise_of
+from rrru.studies.withheld.noise import NOISES
+from rrru.studies.withheld.parts import CAUSES
 from rrru.studies.withheld.verdicts import in_order, is_outside
 
 _BINS = 10
 _NEAR = 0.05
+# share of a part's true size that the found one may be off
+_NEAR_PART = 0.25
 _PREDICTED = f"share closed predicted within {_NEAR:g}"
 _STRONG = "acts == 'one' and strength >= 1.5"
 _WEAK = "acts == 'one' and 0.3 <= strength <= 1.0"
@@ -33,6 +38,7 @@ def calibration_error(probability, right):
     return float(sum(len(b) * abs(stated[b].mean() - held[b].mean()) for b in bins) / len(order))
 
 
+_CALIBRATED = ("all", "expected calibration error", "", None, 0.05)
 # per check: group, what is counted, which robots (all where empty), column of hits, share asked for or None
 _LABEL = (
     ("one effect, gap >= 1.5 x noise", "named exactly", _STRONG, "right", 0.98),
@@ -45,23 +51,57 @@ _LABEL = (
     (f"{_WEAK_GROUP}, oracle detects it", "named exactly", f"{_WEAK} and oracle_detects", "right", 0.9),
     (_WEAK_GROUP, "oracle detects it", _WEAK, "oracle_detects", None),
     (_WEAK_GROUP, "named exactly", _WEAK, "right", None),
-    ("all", "expected calibration error", "", None, 0.05),
+    _CALIBRATED,
     ("one effect named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
 )
 _EFFECT = (
     ("all", "unexplained", "", "right", 0.95),
     ("others imitate less than 0.8 of the gap", "unexplained", "imitated_share < 0.8", "right", None),
     ("others imitate 0.8 of the gap or more", "unexplained", "not imitated_share < 0.8", "right", None),
+    _CALIBRATED,
+)
+_NOISE = (
+    ("nothing acts, any noise", "named or unexplained", "acts == 'none'", "wrong", 0.05),
+    ("one effect, any noise", "named exactly", "acts == 'one'", "right", 0.92),
+    _CALIBRATED,
+)
+_BACKGROUND = (
+    ("nothing acts but axis errors", "answered none or joint_axis_error", "acts == 'none'", "right", 0.95),
+    ("one effect besides", "named exactly, with or without joint_axis_error", "acts == 'one'", "right", 0.92),
+    _CALIBRATED,
+)
+_MANY = (("all", "what matters named, nothing that is not there", "", "right", None), _CALIBRATED)
+# of the parts of these robots' gaps
+_SIZED = "kind != 'outside' and strength >= 2"
+_WITHIN = f"found within {100 * _NEAR_PART:g} %"
+_PARTS = (
+    ("causes in the library, 0.3 of the gap or more", "named", "kind == 'effect' and share >= 0.3", "named", 0.95),
+    ("causes named", "not there", f"kind in {CAUSES} and named", "invented", 0.02),
+    ("largest cause, where in the library", "named", "kind == 'effect' and largest", "named", 0.97),
+    ("parts >= 2 x noise", _WITHIN, _SIZED, "near", 0.9),
+    ("parts >= 2 x noise, nothing from outside", _WITHIN, f"{_SIZED} and not joined", "near", None),
+    ("parts >= 2 x noise, a cause from outside", _WITHIN, f"{_SIZED} and joined", "near", None),
+    ("a cause from outside >= 2 x noise", "unexplained", "kind == 'unexplained' and strength >= 2", "named", 0.9),
+    ("nothing from outside", "unexplained", "kind == 'unexplained' and strength == 0", "named", None),
 )
 _FIELD = (
     ("all", "named exactly", "", "right", None),
     ("one leg at fault", "leg named", "truth_leg > 0", "leg_right", None),
     *((f"truth: {acts}", "named exactly", f"acts == '{acts}'", "right", None) for acts in _ALL_ACTS),
+    (*_CALIBRATED[:-1], None),
 )
+_CHECKS = {
+    "label": _LABEL,
+    "effect": _EFFECT,
+    "noise": _NOISE,
+    "many": _MANY,
+    "background": _BACKGROUND,
+    "field": _FIELD,
+}
 
 
-def summary(scores, limits):
-    """Frame `withheld_summary` from `withheld_scores` and `withheld_limits`."""
+def summary(scores, limits, parts):
+    """Frame `withheld_summary` from `withheld_scores`, `withheld_limits` and `withheld_parts`."""
     scores = scores.merge(limits[["check", "robot", "weakest", "imitated_share"]], "left", ["check", "robot"])
     off = (scores["share_closed"] - scores["share_closed_true"]).abs()
     pairs = zip(scores["truth"], scores["verdict"], strict=True)
@@ -70,17 +110,21 @@ def summary(scores, limits):
         wrong=~scores["right"].astype(bool),
         nothing_wrong=[set(verdict.split("+")) <= set(truth.split("+")) for truth, verdict in pairs],
         predicted=(off <= _NEAR).astype(float).where(off.notna()),
+        noise=scores["robot"].map(noise_of),
     )
     rows = []
-    for check, own in (("label", _LABEL), ("effect", _EFFECT), ("field", _FIELD)):
+    for check, own in _CHECKS.items():
         robots = scores[scores["check"] == check]
         if len(robots):
-            rows += [_row(robots, *entry) | {"check": check} for entry in (*own, *_per_effect(check, robots))]
+            rows += [_row(robots, *entry) | {"check": check} for entry in (*own, *_each(check, robots))]
+        if check == "many" and len(robots):
+            seen = _seen(parts[parts["check"] == check], robots)
+            rows += [_row(seen, *entry) | {"check": check} for entry in _PARTS]
     return pd.DataFrame(rows)
 
 
-def _per_effect(check, robots):
-    """The rows for single effects, see `_LABEL`."""
+def _each(check, robots):
+    """The rows for single effects and noises, see `_LABEL`."""
     if check == "label":
         for effect in sorted(robots.query("acts == 'one'")["truth"].unique()):
             of_it = f"truth == '{effect}'"
@@ -89,6 +133,26 @@ def _per_effect(check, robots):
     if check == "effect":
         for effect in sorted(robots["truth"].unique()):
             yield effect, "unexplained", f"truth == '{effect}'", "right", None
+    if check == "noise":
+        for noise in (name for name in NOISES if (robots["noise"] == name).any()):
+            of_it = f"noise == '{noise}'"
+            nothing, one = (f"acts == '{acts}' and {of_it}" for acts in ("none", "one"))
+            yield f"nothing acts, {noise}", "named or unexplained", nothing, "wrong", 0.05
+            yield f"one effect, {noise}", "named exactly", one, "right", 0.92
+
+
+def _seen(parts, robots):
+    """Parts of robots of many causes with what is counted of them."""
+    whole = parts["robot"].map(robots.set_index("robot")["strength"])
+    causes = parts[parts["kind"].isin(["effect", "outside"])]
+    outside = parts.loc[parts["kind"] == "outside", "robot"]
+    return parts.assign(
+        share=parts["strength"] / whole,
+        largest=parts.index.isin(causes.groupby("robot")["strength"].idxmax()),
+        joined=parts["robot"].isin(outside),
+        invented=parts["strength"] == 0.0,
+        near=(parts["found_rms_mm"] - parts["true_rms_mm"]).abs() <= _NEAR_PART * parts["true_rms_mm"],
+    )
 
 
 def _row(robots, group, counted, which, column, asked):

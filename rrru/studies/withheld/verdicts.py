@@ -1,15 +1,22 @@
 """Verdicts beside the truth: whether they are right."""
 
 PREFIX = "outside"
-UNEXPLAINED = "unexplained"
+UNEXPLAINED, NONE = "unexplained", "none"
+# what acts in every robot of the check on a background, asked for or not
+_BACKGROUND = "joint_axis_error"
 _SCORES = ["check", "robot", "kind", "truth", "truth_leg", "strength", "verdict", "right", "leg_right", "probability"]
 
 
 def is_right(truth, verdict, check):
-    """Whether a verdict names the truth; where the library does not hold it, whether it says so."""
+    """Whether a verdict names the truth; where the library does not hold it, whether it says so.
+
+    On a background of axis errors these may be named or not. For many causes see `rrru.studies.withheld.parts`.
+    """
     said = set(verdict.split("+"))
     if check == "effect" or is_outside(truth):
         return UNEXPLAINED in said
+    if check == "background":
+        said = said - {_BACKGROUND} or {NONE}
     return said == set(truth.split("+"))
 
 
@@ -19,15 +26,13 @@ def is_outside(truth):
 
 
 def scores(told):
-    """Frame `withheld_scores` from rows of `withheld_verdicts` beside the columns of the truth."""
-    triples = zip(told["truth"], told["effects"], told["check"], strict=True)
+    """Frame `withheld_scores` from rows of `withheld_verdicts` beside the columns of the truth and `right`."""
     # a library without the effect cannot name its leg
     has_leg = (told["truth_leg"] > 0) & (told["check"] != "effect")
     told = told.assign(
         verdict=told["effects"],
-        right=[is_right(*triple) for triple in triples],
         leg_right=(told["leg"] == told["truth_leg"]).astype(float).where(has_leg),
-        share_closed=told["share_closed"].where(~told["effects"].isin(["none", UNEXPLAINED])),
+        share_closed=told["share_closed"].where(~told["effects"].isin([NONE, UNEXPLAINED])),
     )
     return told[[*_SCORES, "oracle_detects", "share_closed_true", "share_closed"]]
 

@@ -14,7 +14,8 @@ from rrru.gap.make_case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.studies.withheld import draw
-from rrru.studies.withheld.chunks import Member, check, chunks
+from rrru.studies.withheld.chunks import Member, check, chunks, noise_of
+from rrru.studies.withheld.noise import NOISES
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import Robot, noise_free, true_gap_mm
@@ -175,11 +176,22 @@ def test_the_laws_from_outside_do_as_they_say():
 
 def test_chunks_hold_every_robot_once():
     section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
-    parts = list(chunks(section).values())
+    parts = list(chunks(section | {"per_noise": 0, "many": 0, "background": 0}).values())
     assert [len(part) for part in parts] == [4] * 10 + [3]
     names = [member.name for part in parts for member in part]
     assert names[:8] == [*(f"label_{k:04d}" for k in range(7)), "effect_backlash_0000"]
     assert names[7:] == [f"effect_{effect}_{k:04d}" for effect in EFFECTS for k in range(3)]
+
+
+def test_chunks_hold_the_robots_of_every_check():
+    section = {"robots": 1, "per_effect": 1, "effects": ["backlash"], "per_noise": 2, "many": 3, "background": 2}
+    (members,) = chunks(section | {"chunk": 100}).values()
+    counted = Counter(member.check for member in members)
+    assert counted == {"label": 1, "effect": 1, "noise": 2 * len(NOISES), "many": 3, "background": 2}
+    assert len({member.name for member in members}) == len(members)
+    for member in members:
+        assert noise_of(member.name) == (member.about if member.check == "noise" else "")
+        assert member.taken_out == ("backlash" if member.check == "effect" else "")
 
 
 @pytest.mark.parametrize(("key", "value"), [("field", ["nosuch"]), ("effects", ["nosuch"])])

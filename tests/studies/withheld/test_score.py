@@ -21,8 +21,10 @@ from rrru.studies.withheld.score import score_chunk
 from rrru.studies.withheld.states import state_of, state_row
 from rrru.studies.withheld.summary import calibration_error, confusion, summary, wilson
 from rrru.studies.withheld.verdicts import is_right
-from tests.schemas import check
+from tests.schemas import TABLES, check
 from tests.studies.withheld.conditions import CONDITIONS, bare
+
+_PART = {"part": "backlash", "kind": "effect", "rms_mm": 0.07, "probability": 0.99}
 
 
 @pytest.fixture(scope="module")
@@ -51,9 +53,11 @@ def _scored(robots, verdicts, states):
     told = pd.DataFrame([base | {"robot": name} | verdict for name, verdict in verdicts.items()])
     told = answers[["robot", "kind"]].merge(told, on="robot")
     corrected = pd.DataFrame([state_row(name, *state) for name, state in states.items()])
-    scores, limit = score_chunk(answers, measurements, told, corrected, CONDITIONS)
-    check("withheld_limits", limit)
-    return check("withheld_scores", scores).set_index("robot")
+    budget = pd.DataFrame([{"robot": name} | _PART for name in robots])
+    scored = score_chunk(answers, measurements, told, corrected, budget, CONDITIONS)
+    for name, frame in scored._asdict().items():
+        check(f"withheld_{name}", frame)
+    return scored.scores.set_index("robot")
 
 
 def test_a_perfect_diagnosis_gets_everything(robots):
@@ -93,6 +97,16 @@ def test_a_wrong_diagnosis_gets_nothing(robots):
         ("backlash", "unexplained", "effect", True),
         ("backlash", "servo_lag+unexplained", "effect", True),
         ("backlash", "servo_lag", "effect", False),
+        ("backlash", "backlash", "noise", True),
+        ("none", "unexplained", "noise", False),
+        ("none", "none", "background", True),
+        ("none", "joint_axis_error", "background", True),
+        ("none", "axis_tilt", "background", False),
+        ("none", "joint_axis_error+unexplained", "background", False),
+        ("backlash", "backlash", "background", True),
+        ("backlash", "joint_axis_error+backlash", "background", True),
+        ("backlash", "joint_axis_error", "background", False),
+        ("backlash", "joint_axis_error+backlash", "label", False),
     ],
 )
 def test_right_is_what_names_exactly_the_truth(truth, verdict, check, right):
@@ -192,7 +206,8 @@ def test_the_summary_counts_whom_it_says():
     limit = pd.DataFrame(
         [{"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "imitated_share": 0.1} for r in scores["robot"]]
     )
-    table = check("withheld_summary", summary(scores, limit)).set_index(["group", "figure"])
+    parts = pd.DataFrame(columns=TABLES["withheld_parts"].names)
+    table = check("withheld_summary", summary(scores, limit, parts)).set_index(["group", "figure"])
     expected = {
         ("one effect, gap >= 1.5 x noise", "named exactly"): (2, 0.5),
         ("nothing acts", "false alarms"): (2, 0.5),

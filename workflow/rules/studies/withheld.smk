@@ -1,11 +1,18 @@
-from rrru.studies.withheld.chunks import chunks
+from rrru.studies.withheld.chunks import chunks, rivalled
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
-WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "summary", "confusion")]
-WITHHELD_FIGURES = {"withheld": ("rrru.studies.withheld.figures:withheld", ["withheld_scores", "withheld_confusion"])}
+WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "parts", "summary", "confusion")]
+WITHHELD_FIGURES = {
+    "withheld": (
+        "rrru.studies.withheld.figures:withheld",
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+    )
+}
 FIGURES["withheld"] = WITHHELD_FIGURES
+# and those among them on which other ways to find a cause are tried
+RIVALLED = rivalled(config["withheld"])
 # what is known of every robot
 WITHHELD_ROBOT = {
     "robot": parts.robot(config, {"robot": "rrru3"}),
@@ -35,12 +42,12 @@ rule withheld_diagnose:
     input:
         **named(["withheld_measurements"], under("withheld/{chunk}")),
     output:
-        **named(["withheld_verdicts", "withheld_states"], under("withheld/{chunk}")),
+        **named(["withheld_verdicts", "withheld_states", "withheld_budget"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
-            "taken_out": {member.name: member.taken_out for member in WITHHELD[wildcards.chunk]},
+            "robots": {member.name: (member.check, member.taken_out) for member in WITHHELD[wildcards.chunk]},
             **WITHHELD_ROBOT,
             **reads("gap"),
         },
@@ -53,11 +60,11 @@ rule withheld_diagnose:
 rule withheld_score:
     input:
         **named(
-            ["withheld_answers", "withheld_measurements", "withheld_verdicts", "withheld_states"],
+            [f"withheld_{name}" for name in ("answers", "measurements", "verdicts", "states", "budget")],
             under("withheld/{chunk}"),
         ),
     output:
-        **named(["withheld_scores", "withheld_limits"], under("withheld/{chunk}")),
+        **named(["withheld_scores", "withheld_limits", "withheld_parts"], under("withheld/{chunk}")),
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
@@ -68,11 +75,42 @@ rule withheld_score:
         "../../scripts/withheld_score.py"
 
 
+# as the diagnosis, it never sees an answer
+rule withheld_beliefs:
+    input:
+        **named(["withheld_measurements"], under("withheld/{chunk}")),
+    output:
+        withheld_beliefs=f"{RESULTS}/timings/withheld/{{chunk}}.parquet",
+    log:
+        f"{RESULTS}/logs/withheld_beliefs/{{chunk}}.log",
+    params:
+        settings=lambda wildcards: {"robots": RIVALLED[wildcards.chunk], **WITHHELD_ROBOT, **reads("gap")},
+        own_effects=own_effects_digests(),
+        code=code("withheld_beliefs"),
+    script:
+        "../../scripts/withheld_beliefs.py"
+
+
+rule withheld_methods:
+    input:
+        withheld_answers=[under(f"withheld/{chunk}")("withheld_answers") for chunk in RIVALLED],
+        withheld_beliefs=[f"{RESULTS}/timings/withheld/{chunk}.parquet" for chunk in RIVALLED],
+    output:
+        withheld_methods=f"{RESULTS}/timings/withheld_methods.parquet",
+    log:
+        f"{RESULTS}/logs/withheld_methods.log",
+    params:
+        settings={},
+        code=code("withheld_methods"),
+    script:
+        "../../scripts/withheld_methods.py"
+
+
 rule withheld_summary:
     input:
         **{
             name: [under(f"withheld/{chunk}")(name) for chunk in WITHHELD]
-            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits")
+            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits", "withheld_parts")
         },
         field=[part("gap_verdicts", campaign) for campaign in config["withheld"]["field"]],
         field_answers=config["withheld"]["field_answers"] or [],
@@ -91,4 +129,5 @@ rule withheld_summary:
 rule withheld:
     input:
         named(WITHHELD_TABLES).values(),
+        rules.withheld_methods.output,
         drawn(WITHHELD_FIGURES).values(),

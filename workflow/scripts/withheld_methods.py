@@ -1,0 +1,21 @@
+"""What the diagnosis and other ways to find a cause say beside the answers."""
+
+import pandas as pd
+
+from rrru.store import tables
+from rrru.store.job import run
+from rrru.studies.withheld.methods import compare
+from rrru.studies.withheld.schemas import TABLES
+
+
+def main(settings, inputs, outputs):
+    """Write the table of methods."""
+    said, answers = (
+        pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
+        for name in ("withheld_beliefs", "withheld_answers")
+    )
+    tables.write_all(TABLES, {"withheld_methods": compare(said, answers)}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
