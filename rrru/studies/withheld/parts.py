@@ -57,8 +57,6 @@ def is_enough(listed, strength):
     """
     cause, kind = listed["kind"].isin(CAUSES), listed["kind"]
     matter = (kind == "effect") & (listed["strength"] >= _LEAST_SHARE * strength)
-    # a name that is not there has the strength 0
-    matter &= listed["strength"] > 0.0
     matter |= (kind == UNEXPLAINED) & (listed["strength"] >= _CLEAR)
     invented = listed["named"] & cause & (listed["strength"] == 0.0)
     return bool(listed.loc[matter, "named"].all() and not invented.any())

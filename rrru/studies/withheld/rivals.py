@@ -33,8 +33,8 @@ _NAMED = ("time_s", "speed_mm_s", "payload_kg")
 
 @dataclass(frozen=True)
 class Campaign:
-    """What all ways are given: the case and, over the stated noise, n points' data (3n,), the calibration's columns
-    (3n, p), and columns (3n, k) by term, legs and shapes tried as the diagnosis does.
+    """What all ways are given of n points: the case; over the stated noise the data (3n,), the calibration's columns
+    (3n, p), and those (3n, k) of every Term that the diagnosis tries: effect, shape and legs.
     """
 
     case: Case

@@ -8,7 +8,8 @@ from rrru.studies.withheld.noise import NOISES
 from rrru.studies.withheld.parts import CAUSES
 from rrru.studies.withheld.verdicts import in_order, is_outside
 
-_BINS = 10
+# of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
+_BINS, _PER_BIN = 10, 20
 _NEAR = 0.05
 # share of a part's true size that the found one may be off
 _NEAR_PART = 0.25
@@ -34,7 +35,7 @@ def calibration_error(probability, right):
         return np.nan
     order = np.argsort(np.asarray(probability, dtype=float), kind="stable")
     stated, held = np.asarray(probability, dtype=float)[order], np.asarray(right, dtype=float)[order]
-    bins = np.array_split(np.arange(len(order)), min(_BINS, len(order)))
+    bins = np.array_split(np.arange(len(order)), min(_BINS, max(len(order) // _PER_BIN, 1)))
     return float(sum(len(b) * abs(stated[b].mean() - held[b].mean()) for b in bins) / len(order))
 
 

@@ -17,7 +17,7 @@ from rrru.studies.withheld.field import field_verdicts, read_field_answers, scor
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.robots import noise_free
-from rrru.studies.withheld.score import score_chunk
+from rrru.studies.withheld.score import _known, score_chunk
 from rrru.studies.withheld.states import state_of, state_row
 from rrru.studies.withheld.summary import calibration_error, confusion, summary, wilson
 from rrru.studies.withheld.verdicts import is_right
@@ -79,6 +79,21 @@ def test_a_wrong_diagnosis_gets_nothing(robots):
     scores = _scored(robots, verdicts, states)
     assert not scores["right"].any() and scores.loc["faulty", "leg_right"] == 0.0
     assert scores.loc["faulty", "share_closed_true"] == 0.0
+
+
+@pytest.mark.parametrize(("effects", "right"), [("backlash", True), ("backlash+servo_lag", False), ("none", False)])
+def test_many_causes_are_scored_by_their_parts_and_have_no_limits(robots, effects, right):
+    own = {"faulty": robots["faulty"]}
+    verdict = {"check": "many", "effects": effects, "leg": 0}
+    calibrated = robots["faulty"][2]
+    scores = _scored(own, {"faulty": verdict}, {"faulty": (calibrated, State(calibrated, {}))})
+    assert scores.loc["faulty", "right"] == right and not scores.loc["faulty", "oracle_detects"]
+
+
+def test_what_holds_an_effect_goes_with_it():
+    known = _known({"leg_asymmetry": None, "joint_axis_error": None, "backlash": None}, "leg_asymmetry")
+    assert known == ["backlash"]
+    assert len(_known(EFFECTS, "")) == len(EFFECTS)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +178,10 @@ def test_wilson_interval():
 
 def test_calibration_error():
     assert calibration_error([1.0] * 20, [True] * 20) == 0.0
-    np.testing.assert_allclose(calibration_error([0.9] * 20, [True] * 10 + [False] * 10), 0.5 * (0.1 + 0.9), atol=1e-12)
+    np.testing.assert_allclose(calibration_error([0.9] * 20, [True] * 10 + [False] * 10), 0.4, atol=1e-12)
+    # too sure by 0.4 in one bin, too unsure by 0.4 in the other
+    stated, right = [0.9] * 20 + [0.1] * 20, [True, False] * 20
+    np.testing.assert_allclose(calibration_error(stated, right), 0.4, atol=1e-12)
     generator = np.random.default_rng(1)
     stated = generator.uniform(size=20000)
     assert calibration_error(stated, generator.uniform(size=20000) < stated) < 0.02
