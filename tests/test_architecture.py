@@ -29,6 +29,7 @@ _LIBRARIES = {
     "pygad": {"rrru/genetic/pygad_run.py"},
     "matplotlib": _DRAWING,
     "cv2": {"rrru/plant/camera.py", "rrru/studies/delta/vision.py"},
+    "sklearn": {"rrru/studies/withheld/rivals.py"},
     "snakemake": set(),
 }
 _FILES = sorted((_ROOT / "rrru").rglob("*.py"))

@@ -8,10 +8,8 @@ import pandas as pd
 
 from rrru.studies.withheld.noise import NoiseLaw
 from rrru.studies.withheld.outside import OUTSIDE
-from rrru.studies.withheld.verdicts import NONE, UNEXPLAINED
+from rrru.studies.withheld.verdicts import CAUSES, NONE, UNEXPLAINED
 
-# what has a name in a verdict and may be there or not
-CAUSES = ("effect", "background")
 _NOISES = ("scatter", "runs")
 _LISTED = ("effect", *_NOISES, UNEXPLAINED)
 # of many causes those have to be named that make this share of the gap's rms, or are from outside and so strong

@@ -4,9 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.studies.withheld.chunks import noise_of
-from rrru.studies.withheld.noise import NOISES
-from rrru.studies.withheld.parts import CAUSES
-from rrru.studies.withheld.verdicts import in_order, is_outside
+from rrru.studies.withheld.verdicts import CAUSES, in_order, is_outside
 
 # of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
 _BINS, _PER_BIN = 10, 20
@@ -135,7 +133,7 @@ def _each(check, robots):
         for effect in sorted(robots["truth"].unique()):
             yield effect, "unexplained", f"truth == '{effect}'", "right", None
     if check == "noise":
-        for noise in (name for name in NOISES if (robots["noise"] == name).any()):
+        for noise in robots["noise"].unique():
             of_it = f"noise == '{noise}'"
             nothing, one = (f"acts == '{acts}' and {of_it}" for acts in ("none", "one"))
             yield f"nothing acts, {noise}", "named or unexplained", nothing, "wrong", 0.05

@@ -2,6 +2,8 @@
 
 PREFIX = "outside"
 UNEXPLAINED, NONE = "unexplained", "none"
+# kinds of parts of a gap that a verdict names and that may not be there
+CAUSES = ("effect", "background")
 # what acts in every robot of the check on a background, asked for or not
 _BACKGROUND = "joint_axis_error"
 _SCORES = ["check", "robot", "kind", "truth", "truth_leg", "strength", "verdict", "right", "leg_right", "probability"]
