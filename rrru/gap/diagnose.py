@@ -19,7 +19,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.noise_model import CONTRADICTED, NoiseModel
 from rrru.gap.settings import GapSettings
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
-from rrru.gap.verdict import Verdict, decide
+from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.seeds import stream
@@ -28,6 +28,7 @@ from rrru.seeds import stream
 _POINTS_PER_PARAMETER = 3
 # what an effect may lose on left-out points before it is ruled out
 _VETO_NATS = 3.0
+_HALF = 0.5
 # the diagnosis looks further than a calibration's bounds, which a strong effect would press against
 _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
 _DEFAULTS = GapSettings()
@@ -152,7 +153,7 @@ def _decide(attribution: Attribution) -> tuple[Verdict, Attribution, list]:
     verdict without it does, by more than chance, is ruled out and the rest decides again.
     """
     while True:
-        verdict = decide(attribution, {term.effect: share for term, share in order_by_share(attribution)})
+        verdict = decide(attribution, _shares(attribution))
         fitted = with_effects(attribution, verdict.effects)
         worse = [name for name in verdict.effects if _gain(fitted, name) < -_VETO_NATS]
         if not worse:
@@ -161,6 +162,16 @@ def _decide(attribution: Attribution) -> tuple[Verdict, Attribution, list]:
         for name in worse:
             beliefs = beliefs.without(name)
         attribution = attribution.believing(beliefs)
+
+
+def _shares(attribution: Attribution) -> dict[str, float]:
+    """Share of the gap that each effect removes: of the best hypothesis, or of those that act beside the unexplained.
+
+    What else the best hypothesis holds there may be a part of what is unexplained, and spoils what is predicted.
+    """
+    if attribution.posterior.probability_unexplained > _HALF:
+        attribution = with_effects(attribution, tuple(certain_beside_unexplained(attribution.posterior)))
+    return {term.effect: share for term, share in order_by_share(attribution)}
 
 
 def _gain(attribution: Attribution, name: str) -> float:

@@ -80,14 +80,25 @@ def decide(attribution, shares):
 def _beside_unexplained(sets, unknown, shares):
     """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained)."""
     within = {effects: p for (effects, flag), p in sets.items() if flag}
-    acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
-    named = frozenset(name for name, p in acting.items() if p > _SURE * unknown)
+    named = _certain(within, unknown)
     if sum(shares.get(name, 0.0) for name in named) < _HALF:
         named = frozenset()
     # what imitates a part of the unknown, and what would do without it
     rivals = {(effects, True): p for effects, p in within.items() if effects != named}
     rivals |= {key: p for key, p in sets.items() if not key[1]}
     return named, sum(p for effects, p in within.items() if named <= effects), rivals
+
+
+def certain_beside_unexplained(beliefs):
+    """Effects, as a set, that act with a probability of 0.9 each if something acts that no effect explains."""
+    within = {effects: p for (effects, flag), p in beliefs.sets().items() if flag}
+    return _certain(within, beliefs.probability_unexplained)
+
+
+def _certain(within, unknown):
+    """Effects that make up 0.9 of the probability of something unexplained, from that of sets with it."""
+    acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
+    return frozenset(name for name, p in acting.items() if p > _SURE * unknown)
 
 
 def _leg(beliefs, effects, library):
