@@ -1,10 +1,11 @@
 """Which further run would tell two answers apart: computed by what each candidate adds, not by rule of thumb.
 
-Candidates are further passes along a campaign's own trajectories. Where none of them helps, poses between its points
-are chosen, each the one that adds most to those before it. What they add is counted as `rrru.gap.worth` says.
+Candidates are further passes along a campaign's own trajectories. Where none of them would rule a rival out, poses are
+chosen too, each the one that adds most to those before it. What they add is counted as `rrru.gap.worth` says.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -16,8 +17,8 @@ from rrru.gap.verdict import label
 from rrru.gap.worth import greedy, worth
 
 _FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS, _MOST_POSES = 300.0, 5.0, 60.0, 4, 2, 10
-# less than this is not worth a run
-_WORTH_NATS = 1.0
+# less than this is not worth a run; as much as makes a rival 20 times less probable rules it out
+_WORTH_NATS, _ENOUGH_NATS = 0.5, 3.0
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
 _POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"), "speed_mm_s", "payload_kg")
@@ -54,11 +55,14 @@ def advise(attribution, verdict, masses, most=3):
             for run, gain in zip(choice, gains, strict=True)
         ]
     runs = pd.DataFrame(result, columns=_COLUMNS)
+    listed = NOTHING.poses
+    if not (runs["gain_nats"] > _ENOUGH_NATS).any():
+        row, listed = _poses(attribution, contests[0], masses)
+        runs = pd.DataFrame([*result, *row], columns=_COLUMNS)
     runs = runs[runs["gain_nats"] > _WORTH_NATS]
-    if runs.empty:
-        return _poses(attribution, contests[0], masses)
     runs = runs.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
-    return Advice(runs.drop_duplicates("run").head(most).reset_index(drop=True), NOTHING.poses)
+    runs = runs.drop_duplicates("run").head(most).reset_index(drop=True)
+    return Advice(runs, listed if (runs["kind"] == "poses").any() else NOTHING.poses)
 
 
 def _contests(attribution, verdict):
@@ -81,24 +85,38 @@ def _planned(case, table, masses):
 
 
 def _poses(attribution, contest, masses):
-    """The Advice of poses, with the campaign's own payload or a higher one, whichever tells more."""
-    (separates, truth, imitator), case, best = contest, attribution.case, NOTHING
+    """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
+
+    They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
+    """
+    (separates, truth, imitator), case, best = contest, attribution.case, ([], NOTHING.poses)
     start, end = poses.passes(case.measurements, case.mechanism)
     if not len(start):
-        return NOTHING
-    speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
-    for load in (np.nan_to_num(own_load), np.nan_to_num(own_load) + _LOAD_KG):
-        table = poses.commands(start, end, case.mechanism, _end_s(case.measurements) + _REST_S, speed, load)
+        return best
+    own_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
+    for fast, loaded in product((False, True), repeat=2):
+        if fast and not (own_speed < _FAST_MM_S and np.isfinite(last_s)):
+            continue
+        speed, load, how = _driven(own_speed, own_load, fast, loaded)
+        table = poses.commands(start, end, case.mechanism, last_s + _REST_S, speed, load)
         now, added = worth(attribution, truth, imitator, _planned(case, table, masses))
         chosen, gain = greedy(now, added, _MOST_POSES)
-        if gain > max([_WORTH_NATS, *best.runs["gain_nats"]]):
-            count = len(chosen)
-            words = f"{count} poses" + (f" with {load:g} kg payload" if load != own_load else "")
-            row = words, "poses", "poses", False, speed, load, count * poses.POINTS, separates, now.nats(), gain
+        # one that tells hardly more is not worth a payload
+        if gain > 1.1 * most:
+            count, most = len(chosen), gain
+            words = " ".join([f"{count} poses", *how]), "poses", "poses", False
+            row = *words, speed, load, count * poses.POINTS, separates, now.nats(), gain
             ends = {**rows.vector_columns("from", start[chosen]), **rows.vector_columns("to", end[chosen])}
             listed = pd.DataFrame({"pose": np.arange(1, count + 1), **ends, "speed_mm_s": speed, "payload_kg": load})
-            best = Advice(pd.DataFrame([row], columns=_COLUMNS), listed)
+            best = [dict(zip(_COLUMNS, row, strict=True))], listed
     return best
+
+
+def _driven(own_speed, own_load, fast, loaded):
+    """Speed and payload of a kind of pass, and in words what is not the campaign's own."""
+    speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
+    return speed, load, [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
 def _end_s(frame):
@@ -111,7 +129,9 @@ def candidates(frame):
 
     Every kind of pass along some of a measurement table's trajectories.
     """
-    names = pd.unique(frame["trajectory"])
+    count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
+    # passes of poses that were driven before are no trajectories
+    names = count.index[(count > poses.POINTS) | (count.max() <= poses.POINTS)]
     chosen = names[np.unique(np.linspace(0, len(names) - 1, _MOST_TRAJECTORIES).astype(int))]
     end, result, tables = _end_s(frame), [], []
     for name in chosen:
@@ -121,8 +141,8 @@ def candidates(frame):
         for reverse, fast, loaded in _KINDS:
             if fast and not (own_speed < _FAST_MM_S and np.isfinite(end)):
                 continue
-            speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
-            how = ["in reverse"] * reverse + [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
+            speed, load, how = _driven(own_speed, own_load, fast, loaded)
+            how = ["in reverse"] * reverse + how
             tables.append(_pass(first, len(tables) + 1, end + _REST_S, reverse, speed, load))
             words = f"{name} {' '.join(how) or 'once more'}"
             result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))

@@ -72,7 +72,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables that tell more than the verdict and what to measure next. Raises FitError where there are too few points to calibrate on.
+    details: also the tables that tell more than the verdict and what to measure next. Raises FitError where there are
+    too few points to calibrate on.
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE

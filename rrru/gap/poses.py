@@ -1,4 +1,4 @@
-"""Poses to drive for a diagnosis: short straight passes inside the region that a campaign has measured.
+"""Poses to drive for a diagnosis: short straight passes in the box about all that a campaign has measured.
 
 A pose is passed in the middle of a straight line between rest and rest, since what play, friction and lag do at it
 depends on how it is reached. Lengths in mm, speeds in mm/s.
@@ -14,28 +14,27 @@ from rrru.campaign.speed_profile import Trapezoid
 # points that are read on a pass, and its length
 POINTS, LENGTH_MM = 5, 100.0
 # log2 of the passes tried
-_TRIED_LOG2 = 7
+_TRIED_LOG2 = 8
 # a pass keeps at least this share of the campaign's own distance from singularities
 _CLEAR = 0.8
 
 
 def passes(measurements, mechanism):
-    """Starts and ends (n, 3) of passes that a robot can drive between measured points, clear of singularities.
+    """Starts and ends (n, 3) of passes that a robot can drive in the box about its measured points.
 
-    They lie on chords from measured point to measured point, chosen by Sobol's sequence (Joe and Kuo, SIAM J. Sci.
-    Comput. 30, 2008), so inside the region that the campaign spans. None where the robot orients its platform.
+    They go from one point of the box towards another, both of Sobol's sequence (Joe and Kuo, SIAM J. Sci. Comput. 30,
+    2008), and keep clear of singularities. None where the robot orients its platform or reflectors are measured.
     """
-    nothing = np.zeros((0, 3)), np.zeros((0, 3))
     if mechanism.orients or rows.readings(measurements) is not None:
-        return nothing
+        return np.zeros((0, 3)), np.zeros((0, 3))
     known = np.unique(rows.command(measurements)[rows.usable(measurements)], axis=0)
-    first, second, share = qmc.Sobol(3, scramble=False).random_base2(_TRIED_LOG2).T
-    start, end = (known[(place * len(known)).astype(int)] for place in (first, second))
-    chord = np.linalg.norm(end - start, axis=1)
-    long = chord > LENGTH_MM
-    start, chord, along = start[long], chord[long, None], (end - start)[long] / chord[long, None]
-    start = start + share[long, None] * (chord - LENGTH_MM) * along
-    end = start + LENGTH_MM * along
+    low, high = known.min(axis=0), known.max(axis=0)
+    shares = qmc.Sobol(6, scramble=False).random_base2(_TRIED_LOG2)
+    start, other = low + shares[:, :3] * (high - low), low + shares[:, 3:] * (high - low)
+    distance = np.linalg.norm(other - start, axis=1, keepdims=True)
+    far = distance[:, 0] > LENGTH_MM
+    start = start[far]
+    end = start + LENGTH_MM * (other[far] - start) / distance[far]
     fine = _clear(known, points_of(start, end), mechanism)
     return start[fine], end[fine]
 

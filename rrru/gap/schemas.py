@@ -157,8 +157,8 @@ Runs that would separate effects which this campaign cannot tell apart, best fir
 campaign
 rank                   int    1: tells most
 run                    str    the run in words
-kind                   str    run: once more along a trajectory; poses: where no such run helps, through those of
-    gap_next_poses {run, poses}
+kind                   str    run: once more along a trajectory; poses: those of gap_next_poses, where no such run would
+    rule a rival out {run, poses}
 trajectory             str    trajectory to drive, or poses
 reverse                bool   true where it is driven backwards
 speed_mm_s             float? speed; null where any will do
@@ -169,8 +169,9 @@ now_nats               float  expected log evidence between them in the present 
 gain_nats              float  expected log evidence that the run adds
 
 ## gap_next_poses | tables/gap_next_poses.parquet | campaign pose
-Poses that would separate effects which no further run along a trajectory of the campaign can. Each is the middle of a
-straight pass from rest to rest, five points of which are read, both ends included.
+Poses that would separate effects where no further run along a trajectory of the campaign would rule a rival out. Each
+is the middle of a straight pass from rest to rest, five points of which are read, both ends included. They lie in the
+box about the measured points, clear of singularities; whether anything else is in the way there nobody has checked.
 --
 campaign
 pose                   int    1: tells most; each further one tells most beside those before it

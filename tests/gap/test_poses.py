@@ -67,8 +67,8 @@ def test_passes_lie_between_measured_points_within_reach():
     assert len(start) > 20 and np.isfinite(SIM.inverse(points)).all()
     assert (points >= known.min(axis=0) - 1e-9).all() and (points <= known.max(axis=0) + 1e-9).all()
     np.testing.assert_allclose(np.linalg.norm(end - start, axis=1), poses.LENGTH_MM)
-    near, _, _ = SIM.singularities(points, SIM.inverse(points))
-    own, _, _ = SIM.singularities(known, SIM.inverse(known))
+    near, *_ = SIM.singularities(points, SIM.inverse(points))
+    own, *_ = SIM.singularities(known, SIM.inverse(known))
     assert near.min() > 0.75 * own.min()
 
 
@@ -103,6 +103,7 @@ def between():
 
 def test_poses_tell_what_no_trajectory_does(between):
     assert between.runs["kind"].tolist() == ["poses"]
+    assert between.runs["separates"].str.contains("local_compliance").all()
     row, listed = between.runs.iloc[0], between.poses
     assert row["gain_nats"] > 3.0 and row["points"] == poses.POINTS * len(listed) and 1 < len(listed) <= 10
     assert listed["pose"].tolist() == list(range(1, len(listed) + 1))

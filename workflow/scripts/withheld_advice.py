@@ -28,7 +28,7 @@ def main(settings, inputs, outputs):
         for name in [name for name in names if name in set(points["robot"])]:
             own = points[points["robot"] == name].drop(columns=["robot", "kind"]).reset_index(drop=True)
             known = MeasuredRobot(mechanism, masses, conditions.noise_mm, name)
-            result.append(follow(Robot.from_json(drawn[name]), own, conditions, known, library))
+            result.extend(follow(Robot.from_json(drawn[name]), own, conditions, known, library))
     columns = next(table.names for table in TABLES if table.name == "withheld_advice")
     followed = pd.DataFrame(result, columns=columns)
     frames = {"withheld_advice": followed, "withheld_advice_summary": advice_summary(followed)}

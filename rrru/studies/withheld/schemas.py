@@ -93,34 +93,36 @@ truth                  str    as in withheld_scores
 verdict                str    as in withheld_scores
 robots                 int    how many
 
-## withheld_advice | tables/withheld_advice.parquet | robot
-Ambiguous robots whose cause is hidden, the verdict below 0.9 beside rivals that have a name: the first advised run
-driven on the same robot with fresh noise, added and diagnosed; and in its place a run drawn at random from those that
-the advice chose from, of as many points or as near to that as any.
+## withheld_advice | tables/withheld_advice.parquet | robot round
+Ambiguous robots whose cause is hidden: the verdict is below 0.9 beside rivals. The first advised run is driven on the
+same robot with fresh noise, added and diagnosed, again until the verdict has 0.9 or nothing is advised; likewise, in
+its place, a run drawn at random from those along trajectories, of as many points or as near to that as any.
 --
 robot truth
-kind                   str    run or poses, as in gap_next_runs; nothing where nothing is advised: then the verdict stays
-    {run, poses, nothing}
-verdict_before         str    verdict on the robot's campaign
+round                  int    times that runs were added, from 1 on
+kind                   str    what is advised at first, as in gap_next_runs; nothing: the verdict stays as it is {run,
+    poses, nothing}
+verdict_before         str    verdict on the robot's own campaign
 probability_before     float  of this verdict, 0 to 1
 right_before           bool   whether it names exactly the truth, or unexplained where the library lacks that
-gain_nats              float? as in gap_next_runs; null where nothing is advised
-advised_run            str    the run in words; empty where nothing is advised
-verdict_advised        str    verdict with the advised run
+gain_nats              float? of this round's advised run, as in gap_next_runs; null where there is none
+advised_run            str    the advised run in words; empty where nothing is advised or the verdict is sure
+verdict_advised        str    verdict with all advised runs so far
 probability_advised    float  of this verdict, 0 to 1
 right_advised          bool   as right_before
 settled_advised        bool   the verdict then is right, and with a probability of 0.9 or more
-random_run             str    the run in words
-verdict_random         str    verdict with the random run
+random_run             str    the random run in words; empty where the verdict is sure
+verdict_random         str    verdict with all random runs so far
 probability_random     float  of this verdict, 0 to 1
 right_random           bool   as right_before
 settled_random         bool   as settled_advised
 
-## withheld_advice_summary | tables/withheld_advice_summary.parquet | group run
+## withheld_advice_summary | tables/withheld_advice_summary.parquet | group round run
 How many of the ambiguous robots are settled, as withheld_advice has it.
 --
 group                  str    which robots are counted
-run                    str    which run was added {advised, random}
+round                  int    as in withheld_advice
+run                    str    which runs were added {advised, random}
 robots                 int    robots in the group
 settled                int    how many of them are settled
 value                  float? share of them; null where the group is empty
