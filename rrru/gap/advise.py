@@ -18,7 +18,9 @@ from rrru.gap.worth import greedy, worth
 
 _FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS, _MOST_POSES = 300.0, 5.0, 60.0, 4, 2, 10
 # less than this is not worth a run; as much as makes a rival 20 times less probable rules it out
-_WORTH_NATS, _ENOUGH_NATS = 0.5, 3.0
+_WORTH_NATS, _ENOUGH_NATS = 0.2, 3.0
+# a verdict of less has rivals even where each of them is too improbable to be named
+_SURE = 0.9
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
 _POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"), "speed_mm_s", "payload_kg")
@@ -70,6 +72,8 @@ def _contests(attribution, verdict):
     effects = frozenset(verdict.effects)
     favoured = attribution.posterior.best_of(effects)
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
+    if not rivals and verdict.probability < _SURE:
+        rivals = [names for names, flag in attribution.posterior.sets() if not flag and names != effects]
     for names in rivals[:_MOST_RIVALS]:
         other = attribution.posterior.best_of(names)
         # a rival may be one only beside something small that is unknown
