@@ -201,6 +201,14 @@ class Effect:
     law: Callable[[Motion, np.ndarray], Contribution]
     needs: tuple[str, ...] = ()
 
+    def doubted(self, name: str, value: float) -> float:
+        """A value of a shape's parameter as far off as it may be, 1 sigma."""
+        search, doubt = self.coordinates.searched, self.coordinates.doubt
+        if search is not None:
+            return search.value(search.order(value) + doubt)
+        stepped = value * (1.0 + doubt)
+        return stepped if stepped <= self.parameters[name].high else value * (1.0 - doubt)
+
     def contribute(self, motion: Motion, values: npt.ArrayLike) -> Contribution:
         """Changes at the points of a motion under parameter values (p,)."""
         return self.law(motion, np.asarray(values, dtype=float))

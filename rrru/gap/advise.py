@@ -1,107 +1,143 @@
 """Which further run would tell two answers apart: computed by what each candidate adds, not by rule of thumb.
 
-If hypothesis A holds with its fitted numbers, the data that it makes differ from the best that hypothesis B can do by
-
-    I = 1/2 min_b |(y_A - X_B b) / sigma|^2 + prior of b
-
-nats, the log Bayes factor to expect. A candidate run adds its points to both sums; what I grows by is its worth.
+Candidates are further passes along a campaign's own trajectories. Where none of them would rule a rival out, poses are
+chosen too, each the one that adds most to those before it. What they add is counted as `rrru.gap.worth` says.
 """
+
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.gap import poses
 from rrru.gap.make_case import make_case
-from rrru.gap.terms import signatures, spread
 from rrru.gap.verdict import label
+from rrru.gap.worth import greedy, worth
 
-_FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS = 300.0, 5.0, 60.0, 4, 2
-# less than this is not worth a run
-_WORTH_NATS = 1.0
-_COLUMNS = ("run", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "now_nats", "gain_nats")
+_FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS, _MOST_POSES = 300.0, 5.0, 60.0, 4, 2, 10
+# less than this is not worth a run; as much as makes a rival 20 times less probable rules it out
+_WORTH_NATS, _ENOUGH_NATS = 0.2, 3.0
+# a verdict of less has rivals even where each of them is too improbable to be named
+_SURE = 0.9
+RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
+_COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
+_POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"), "speed_mm_s", "payload_kg")
 # kinds of further passes: in reverse, fast, loaded
 _KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
 
 
-def advise(attribution, verdict, masses, most=3):
-    """Rows of `gap_next_runs` without campaign and rank, best first.
+@dataclass(frozen=True)
+class Advice:
+    """Rows of `gap_next_runs`, best first, without campaign and rank, and of `gap_next_poses` without campaign."""
 
-    None where no rival answer is left that the library can predict.
-    """
-    nothing, effects = pd.DataFrame(columns=_COLUMNS), frozenset(verdict.effects)
+    runs: pd.DataFrame
+    poses: pd.DataFrame
+
+
+NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
+
+
+def advise(attribution, verdict, masses, most=3):
+    """The Advice, empty where no rival answer is left that the library can predict."""
+    contests = [] if verdict.unexplained else list(_contests(attribution, verdict))
+    if not contests:
+        return NOTHING
+    choice, table = candidates(attribution.case.measurements)
+    if not choice:
+        return NOTHING
+    planned, result = _planned(attribution.case, table, masses), []
+    for separates, truth, imitator in contests:
+        now, added = worth(attribution, truth, imitator, planned)
+        start = now.nats()
+        gains = ((now + one).nats() - start for one in added)
+        result += [
+            run | {"separates": separates, "now_nats": start, "gain_nats": gain}
+            for run, gain in zip(choice, gains, strict=True)
+        ]
+    runs = pd.DataFrame(result, columns=_COLUMNS)
+    listed = NOTHING.poses
+    if not (runs["gain_nats"] > _ENOUGH_NATS).any():
+        row, listed = _poses(attribution, contests[0], masses)
+        runs = pd.DataFrame([*result, *row], columns=_COLUMNS)
+    runs = runs[runs["gain_nats"] > _WORTH_NATS]
+    runs = runs.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
+    runs = runs.drop_duplicates("run").head(most).reset_index(drop=True)
+    return Advice(runs, listed if (runs["kind"] == "poses").any() else NOTHING.poses)
+
+
+def _contests(attribution, verdict):
+    """What is to be told apart, in words, and its two (hypothesis, level), for the favoured answer and its rivals."""
+    effects = frozenset(verdict.effects)
     favoured = attribution.posterior.best_of(effects)
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
-    if favoured is None or verdict.unexplained or not rivals:
-        return nothing
-    candidates, table = _candidates(attribution.case.measurements)
-    if not candidates:
-        return nothing
-    case, result = attribution.case, []
-    planned = make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
-    others = ((names, attribution.posterior.best_of(names)) for names in rivals[:_MOST_RIVALS])
-    for names, other in others:
-        if other is None:
-            # it is one only beside something small that is unknown
+    if not rivals and verdict.probability < _SURE:
+        rivals = [names for names, flag in attribution.posterior.sets() if not flag and names != effects]
+    for names in rivals[:_MOST_RIVALS]:
+        other = attribution.posterior.best_of(names)
+        # a rival may be one only beside something small that is unknown
+        if favoured is not None and other is not None:
+            # the answer with more effects makes the data: the smaller one could not make the larger one's
+            pair = (favoured, other) if len(favoured[0].terms) >= len(other[0].terms) else (other, favoured)
+            yield " / ".join(label(sorted(answer), False) for answer in (effects, names)), *pair
+
+
+def _planned(case, table, masses):
+    """The case of a table of planned runs."""
+    return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
+
+
+def _poses(attribution, contest, masses):
+    """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
+
+    They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
+    """
+    (separates, truth, imitator), case, best = contest, attribution.case, ([], NOTHING.poses)
+    start, end = poses.passes(case.measurements, case.mechanism)
+    if not len(start):
+        return best
+    own_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
+    for fast, loaded in product((False, True), repeat=2):
+        if fast and not (own_speed < _FAST_MM_S and np.isfinite(last_s)):
             continue
-        # the answer with more effects makes the data: the smaller one could not make the larger one's
-        truth, imitator = (favoured, other) if len(favoured[0].terms) >= len(other[0].terms) else (other, favoured)
-        now, gains = _worth(attribution, truth, imitator, planned)
-        separates = " / ".join(label(sorted(answer), False) for answer in (effects, names))
-        result.extend(
-            candidate | {"separates": separates, "now_nats": now, "gain_nats": gain}
-            for candidate, gain in zip(candidates, gains, strict=True)
-        )
-    result = pd.DataFrame(result, columns=_COLUMNS)
-    result = result[result["gain_nats"] > _WORTH_NATS]
-    result = result.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
-    return result.drop_duplicates("run").head(most).reset_index(drop=True)
+        speed, load, how = _driven(own_speed, own_load, fast, loaded)
+        table = poses.commands(start, end, case.mechanism, last_s + _REST_S, speed, load)
+        now, added = worth(attribution, truth, imitator, _planned(case, table, masses))
+        chosen, gain = greedy(now, added, _MOST_POSES)
+        # one that tells hardly more is not worth a payload
+        if gain > 1.1 * most:
+            count, most = len(chosen), gain
+            words = " ".join([f"{count} poses", *how]), "poses", "poses", False
+            row = *words, speed, load, count * poses.POINTS, separates, now.nats(), gain
+            ends = {**rows.vector_columns("from", start[chosen]), **rows.vector_columns("to", end[chosen])}
+            listed = pd.DataFrame({"pose": np.arange(1, count + 1), **ends, "speed_mm_s": speed, "payload_kg": load})
+            best = [dict(zip(_COLUMNS, row, strict=True))], listed
+    return best
 
 
-def _worth(attribution, truth, imitator, planned):
-    """Nats between two (hypothesis, level) now, and what each run of the planned case adds."""
-    (hypothesis, level), (rival, rival_level) = truth, imitator
-    case, evidence = attribution.case, attribution.evidence
-    terms = hypothesis.terms + rival.terms
-    there = planned.linearise(attribution.calibrated, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
-    mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
-    size = sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)
-    made, designs = [], []
-    for linear in (evidence.linear, there):
-        nothing = np.zeros((*linear.data.shape, 0))
-        made.append(
-            np.concatenate([nothing, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean[:size]
-        )
-        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
-    penalty = np.zeros(designs[0].shape[-1])
-    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
-    now = _misfit(designs[0], made[0], penalty, case.noise_mm)
-    gains = []
-    for number in np.unique(planned.measurements["run"]):
-        chosen = planned.run == number
-        design = np.concatenate([designs[0], designs[1][chosen]])
-        gains.append(_misfit(design, np.concatenate([made[0], made[1][chosen]]), penalty, case.noise_mm) - now)
-    return now, gains
+def _driven(own_speed, own_load, fast, loaded):
+    """Speed and payload of a kind of pass, and in words what is not the campaign's own."""
+    speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
+    return speed, load, [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
-def _misfit(design, data, penalty, noise_mm):
-    """Half the penalised least squares of data (n, 3) by a design (n, 3, k), in nats."""
-    flat, target = design.reshape(-1, design.shape[-1]) / noise_mm, data.ravel() / noise_mm
-    precision = flat.T @ flat + np.diag(penalty)
-    unit = 1.0 / np.sqrt(np.maximum(np.diag(precision), 1e-300))
-    scaled = unit[:, None] * precision * unit + 1e-12 * np.eye(len(unit))
-    moment = unit * (flat.T @ target)
-    return float(0.5 * (target @ target - moment @ np.linalg.solve(scaled, moment)))
+def _end_s(frame):
+    """Time at which a measurement table ends, NaN where it has none."""
+    return np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
 
 
-def _candidates(frame):
-    """Candidate runs as rows of `gap_next_runs`, and their table of commands, numbered from 1.
+def candidates(frame):
+    """Candidate runs as mappings of the columns RUN of `gap_next_runs`, and their commands, numbered from 1.
 
     Every kind of pass along some of a measurement table's trajectories.
     """
-    names = pd.unique(frame["trajectory"])
+    count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
+    # passes of poses that were driven before are no trajectories
+    names = count.index[(count > poses.POINTS) | (count.max() <= poses.POINTS)]
     chosen = names[np.unique(np.linspace(0, len(names) - 1, _MOST_TRAJECTORIES).astype(int))]
-    end = np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
-    result, tables = [], []
+    end, result, tables = _end_s(frame), [], []
     for name in chosen:
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
@@ -109,11 +145,11 @@ def _candidates(frame):
         for reverse, fast, loaded in _KINDS:
             if fast and not (own_speed < _FAST_MM_S and np.isfinite(end)):
                 continue
-            speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
-            how = ["in reverse"] * reverse + [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
+            speed, load, how = _driven(own_speed, own_load, fast, loaded)
+            how = ["in reverse"] * reverse + how
             tables.append(_pass(first, len(tables) + 1, end + _REST_S, reverse, speed, load))
-            words = f"{name} {' '.join(how) or 'once more'}", str(name), reverse, speed, load, len(first)
-            result.append(dict(zip(_COLUMNS, words, strict=False)))
+            words = f"{name} {' '.join(how) or 'once more'}"
+            result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
 
 

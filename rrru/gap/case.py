@@ -225,7 +225,7 @@ class Case:
         own = state.contribution(self.library, key, self.motion)
         columns, steps = [], []
         for name, value in shape.items():
-            stepped = _stepped(effect, name, value)
+            stepped = effect.doubted(name, value)
             if stepped != value:
                 other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
                 columns.append(at.move((other - own).twists)[self._kept])
@@ -244,13 +244,3 @@ class Case:
             change = state.contribution(self.library, key, self.motion, one)
             result[..., k] = at.move(change.twists)[self._kept] / step[k]
         return result
-
-
-def _stepped(effect, name, value):
-    """A value of a shape's parameter as far off as it may be, 1 sigma."""
-    search = effect.coordinates.searched
-    if search is not None:
-        return search.value(search.order(value) + effect.coordinates.doubt)
-    doubt = effect.coordinates.doubt
-    stepped = value * (1.0 + doubt)
-    return stepped if stepped <= effect.parameters[name].high else value * (1.0 - doubt)

@@ -73,8 +73,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables that no verdict needs, but for the budget. Raises FitError where there are too few points
-    to calibrate on.
+    details: also the tables that tell more than the verdict, its budget and what to measure next. Raises FitError where
+    there are too few points to calibrate on.
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
@@ -94,12 +94,13 @@ def diagnose(
     residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
     worst = worst_spot(case.motion.position_mm[case.at], residual)
-    row = _row(attribution, verdict, steps, worst, further, robot.noise_mm)
+    row = _row(attribution, verdict, steps, worst, further.runs, robot.noise_mm)
+    ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     own = stream(settings.seed, "gap budget", robot.campaign)
-    tables = {"gap_budget": budget(attribution, robot.noise_mm or None, own, settings.draws)}
+    parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
+    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses}
     if details:
         tables |= details_of(attribution, steps, residual, generator, settings.draws)
-        tables["gap_next_runs"] = further.assign(rank=np.arange(1, len(further) + 1))
     return Diagnosis(row, tables, attribution.state, attribution)
 
 

@@ -8,12 +8,11 @@ with noise e as in `rrru.gap.noise_model`, of mean variance sigma^2, the calibra
 effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
 of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
 O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
-of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of their
-prior. Strengths are averaged over a grid, even in their logarithm; none makes a coefficient's prior wider than the
-largest size that its law allows.
+of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of it.
+Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
 
-A law's shape parameters, such as a time constant, may be off the grid on which they were tried: each has a coefficient
-N(0, 1) on `Linear.shape_columns`.
+A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
+`Linear.shape_columns`.
 """
 
 from dataclasses import dataclass
@@ -193,8 +192,8 @@ class ModelEvidence:
         """
         evidence, best = np.empty(len(levels)), np.ones((len(levels), len(terms)))
         for row, level in enumerate(levels):
+            losses = np.zeros(len(terms))
             for _ in range(_SWEEPS):
-                losses = np.zeros(len(terms))
                 for k, term in enumerate(terms):
                     # what is tried comes last: the others' part stands
                     others = *terms[:k], *terms[k + 1 :]
@@ -239,20 +238,8 @@ class ModelEvidence:
 
 
 def averaged(value, terms):
-    """Log evidence (levels,) averaged over the strengths of some terms from that of all combinations (levels, m).
-
-    A grid that was cut short counts as the whole one.
-    """
-    return log_sum_exp(value) - terms * np.log(len(STRENGTHS))
-
-
-def log_sum_exp(value):
-    """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
-    top = value.max(axis=-1, keepdims=True)
-    largest = value == top
-    count = largest.sum(axis=-1)
-    rest = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
-    return np.log1p(rest / count) + np.log(count) + top[..., 0]
+    """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""
+    return kernels.log_sum_exp(value) - terms * np.log(len(STRENGTHS))
 
 
 def _not_negative(precision, moment, positive):

@@ -1,4 +1,4 @@
-"""Compiled inner loop of the evidence."""
+"""Inner loops of the evidence."""
 
 import math
 
@@ -72,3 +72,12 @@ def log_evidence(gram, moment, scale, positive):
                 gained[r + 1] = gained[r] + (0.5 * half[r] * half[r] - math.log(low[r, r]))
             result[level, j] = _with_positive(gained[k], low, half, inverse, positive, first)
     return result
+
+
+def log_sum_exp(value):
+    """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
+    top = value.max(axis=-1, keepdims=True)
+    largest = value == top
+    count = largest.sum(axis=-1)
+    rest = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
+    return np.log1p(rest / count) + np.log(count) + top[..., 0]

@@ -5,7 +5,8 @@ from math import comb
 
 import numpy as np
 
-from rrru.gap.evidence import LEVELS, log_sum_exp
+from rrru.gap.evidence import LEVELS
+from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
 

@@ -157,7 +157,9 @@ Runs that would separate effects which this campaign cannot tell apart, best fir
 campaign
 rank                   int    1: tells most
 run                    str    the run in words
-trajectory             str    trajectory to drive
+kind                   str    run: once more along a trajectory; poses: those of gap_next_poses, where no such run would
+    rule a rival out {run, poses}
+trajectory             str    trajectory to drive, or poses
 reverse                bool   true where it is driven backwards
 speed_mm_s             float? speed; null where any will do
 payload_kg             float? payload; null where any will do
@@ -165,6 +167,18 @@ points                 int    points of the run
 separates              str    the effects, joined by ' / '
 now_nats               float  expected log evidence between them in the present campaign
 gain_nats              float  expected log evidence that the run adds
+
+## gap_next_poses | tables/gap_next_poses.parquet | campaign pose
+Poses that would separate effects where no further run along a trajectory of the campaign would rule a rival out. Each
+is the middle of a straight pass from rest to rest, five points of which are read, both ends included. They lie in the
+box about the measured points, clear of singularities; whether anything else is in the way there nobody has checked.
+--
+campaign
+pose                   int    1: tells most; each further one tells most beside those before it
+from_{xyz}_mm          float  where the pass begins, robot frame
+to_{xyz}_mm            float  where it ends
+speed_mm_s             float? speed in the middle, to which the robot speeds up evenly; null where any will do
+payload_kg             float  payload
 
 ## gap_points | campaigns/{campaign}/gap_points.parquet | run point
 The gap at every commanded point, before and after the effects are added to the sim.

@@ -37,6 +37,7 @@ DETAILS = {
     "gap_shrink",
     "gap_parameters",
     "gap_next_runs",
+    "gap_next_poses",
     "gap_points",
 }
 

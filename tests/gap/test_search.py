@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from rrru.effects.protocol import Coordinates
-from rrru.gap.advise import advise
+from rrru.gap.advise import NOTHING, advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
 from rrru.gap.case import State
 from rrru.gap.evidence import LEVELS, averaged
@@ -159,7 +159,7 @@ def twins():
     beliefs = posterior(evidence, search(evidence), Prior())
     found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
-    return found, verdict, advise(found, verdict, MASSES)
+    return found, verdict, advise(found, verdict, MASSES).runs
 
 
 def _twins():
@@ -247,5 +247,5 @@ def test_nothing_is_advised_where_nothing_rivals():
     )
     verdict = decide(found, {})
     assert verdict.label == "frame_misregistration"
-    assert advise(found, replace(verdict, rivals=()), MASSES).empty
+    assert advise(found, replace(verdict, rivals=()), MASSES) is NOTHING
     assert isinstance(found.state, State) and found.dropped == 0

@@ -72,6 +72,8 @@ leg                    int    the one leg at fault, 1 to 3; 0 for all or none
 gap_rms_mm             float  gap under the calibrated sim, 3-D
 noise_rms_mm           float  measuring noise, 3-D
 share_closed           float  share of the gap that the verdict's effects close on held-out runs
+confusable_with        str    as in gap_verdicts
+next_runs              str    as in gap_verdicts
 
 ## withheld_scores | tables/withheld_scores.parquet | check robot
 Each verdict beside the truth.
@@ -149,6 +151,42 @@ check
 truth                  str    as in withheld_scores
 verdict                str    as in withheld_scores
 robots                 int    how many
+
+## withheld_advice | tables/withheld_advice.parquet | robot round
+Ambiguous robots whose cause is hidden: the verdict is below 0.9 beside rivals. The first advised run is driven on the
+same robot with fresh noise, added and diagnosed, again until the verdict has 0.9 or nothing is advised; likewise, in
+its place, a run drawn at random from those along trajectories, of as many points or as near to that as any.
+--
+robot truth
+round                  int    times that runs were added, from 1 on
+kind                   str    what is advised at first, as in gap_next_runs; nothing: the verdict stays as it is {run,
+    poses, nothing}
+verdict_before         str    verdict on the robot's own campaign
+probability_before     float  of this verdict, 0 to 1
+right_before           bool   whether it names exactly the truth, or unexplained where the library lacks that
+gain_nats              float? of this round's advised run, as in gap_next_runs; null where there is none
+advised_run            str    the advised run in words; empty where nothing is advised or the verdict is sure
+verdict_advised        str    verdict with all advised runs so far
+probability_advised    float  of this verdict, 0 to 1
+right_advised          bool   as right_before
+settled_advised        bool   the verdict then is right, and with a probability of 0.9 or more
+random_run             str    the random run in words; empty where the verdict is sure
+verdict_random         str    verdict with all random runs so far
+probability_random     float  of this verdict, 0 to 1
+right_random           bool   as right_before
+settled_random         bool   as settled_advised
+
+## withheld_advice_summary | tables/withheld_advice_summary.parquet | group round run
+How many of the ambiguous robots are settled, as withheld_advice has it.
+--
+group                  str    which robots are counted
+round                  int    as in withheld_advice
+run                    str    which runs were added {advised, random}
+robots                 int    robots in the group
+settled                int    how many of them are settled
+value                  float? share of them; null where the group is empty
+low                    float? lower end of the 95 % Wilson interval
+high                   float? upper end
 """)
 _ANSWERS = _TABLES[0]
 _MEASURED = next(table for table in CAMPAIGN_TABLES if table.name == "measurements")

@@ -6,8 +6,17 @@ import numpy as np
 
 from rrru.gap.case import State
 
-# what a verdict is scored by
-VERDICT = ["effects", "probability", "leg", "gap_rms_mm", "noise_rms_mm", "share_closed"]
+# what a verdict is scored by, and what tells whether it is ambiguous
+VERDICT = [
+    "effects",
+    "probability",
+    "leg",
+    "gap_rms_mm",
+    "noise_rms_mm",
+    "share_closed",
+    "confusable_with",
+    "next_runs",
+]
 
 
 def state_row(robot, calibrated, state):

@@ -248,6 +248,7 @@ def test_field_campaigns_are_scored_against_the_users_answers(tmp_path):
     path = tmp_path / "answers.csv"
     path.write_text("campaign,effects,leg\na,servo_lag+backlash,0\nb,backlash,2\nc,none,\nd,outside,0\n")
     verdict = {"probability": 0.7, "gap_rms_mm": 0.2, "noise_rms_mm": 0.04, "share_closed": 0.9}
+    verdict |= {"confusable_with": "", "next_runs": ""}
     said = {
         "a": ("backlash+servo_lag", 0),
         "b": ("backlash", 1),

@@ -9,6 +9,7 @@ GAP_TABLES = [
     "gap_shrink",
     "gap_parameters",
     "gap_next_runs",
+    "gap_next_poses",
 ]
 GAP_FIGURE = {
     "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"])

@@ -4,6 +4,9 @@ CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
 WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "parts", "summary", "confusion")]
+WITHHELD_ADVICE = ["withheld_advice", "withheld_advice_summary"]
+# the chunks that have robots whose cause is hidden
+WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.check == "label" for member in members)]
 WITHHELD_FIGURES = {
     "withheld": (
         "rrru.studies.withheld.figures:withheld",
@@ -125,9 +128,28 @@ rule withheld_summary:
         "../../scripts/withheld_summary.py"
 
 
+# it drives the robots further, so it knows them; the diagnosis that it calls is given measurements alone
+rule withheld_advice:
+    input:
+        **{
+            name: [under(f"withheld/{chunk}")(name) for chunk in WITHHELD_HIDDEN]
+            for name in ("withheld_answers", "withheld_measurements", "withheld_verdicts")
+        },
+    output:
+        **named(WITHHELD_ADVICE),
+    log:
+        f"{RESULTS}/logs/withheld_advice.log",
+    params:
+        settings={**WITHHELD_ROBOT, **reads("motion", "gap", "withheld.noise_mm", "withheld.advice")},
+        own_effects=own_effects_digests(),
+        code=code("withheld_advice"),
+    script:
+        "../../scripts/withheld_advice.py"
+
+
 # not part of the default run
 rule withheld:
     input:
-        named(WITHHELD_TABLES).values(),
+        named([*WITHHELD_TABLES, *WITHHELD_ADVICE]).values(),
         rules.withheld_methods.output,
         drawn(WITHHELD_FIGURES).values(),

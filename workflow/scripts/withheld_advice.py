@@ -1,0 +1,39 @@
+"""The advised run of ambiguous robots driven, added and diagnosed, beside one drawn at random."""
+
+import pandas as pd
+
+from rrru.gap.diagnose import MeasuredRobot
+from rrru.gap.settings import GapSettings
+from rrru.robots.dynamics import Masses
+from rrru.store import tables
+from rrru.store.job import run
+from rrru.studies import setup
+from rrru.studies.withheld.advice import advice_summary, ambiguous, follow
+from rrru.studies.withheld.robots import Conditions, Robot
+from rrru.studies.withheld.schemas import TABLES
+
+
+def main(settings, inputs, outputs):
+    """Write how many ambiguous robots the advice settles; of all chunks only those robots' points are kept."""
+    verdicts, answers = (
+        pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
+        for name in ("withheld_verdicts", "withheld_answers")
+    )
+    names = ambiguous(verdicts, settings["withheld"]["advice"])
+    conditions, library = Conditions.from_config(settings), GapSettings.from_config(settings["gap"], settings["seed"])
+    mechanism, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
+    drawn, result = answers.set_index("robot")["drawn"], []
+    for path in inputs["withheld_measurements"]:
+        points = tables.read(path)
+        for name in [name for name in names if name in set(points["robot"])]:
+            own = points[points["robot"] == name].drop(columns=["robot", "kind"]).reset_index(drop=True)
+            known = MeasuredRobot(mechanism, masses, conditions.noise_mm, name)
+            result.extend(follow(Robot.from_json(drawn[name]), own, conditions, known, library))
+    columns = next(table.names for table in TABLES if table.name == "withheld_advice")
+    followed = pd.DataFrame(result, columns=columns)
+    frames = {"withheld_advice": followed, "withheld_advice_summary": advice_summary(followed)}
+    tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
