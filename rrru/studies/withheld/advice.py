@@ -48,7 +48,7 @@ class Arm:
 def ambiguous(verdicts, most):
     """Names of up to so many robots, in order, whose cause is hidden and whose verdict is unsure beside rivals.
 
-    verdicts: rows of `withheld_verdicts`.
+    verdicts: rows of `withheld_verdicts`. Advice tells of rivals also where none is probable enough for a name.
     """
     rivals = (verdicts["next_runs"] != "") | (verdicts["confusable_with"] != "")
     which = (verdicts["check"] == "label") & (verdicts["probability"] < SURE) & rivals
