@@ -1,4 +1,4 @@
-"""Link flexure: a forearm gives way along its length to the force that it carries.
+"""Link flexure: links that push a platform give way along their length, links and bearings of an arm across its joints.
 
 Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive,
 `rrru.robots.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression shortens
@@ -14,26 +14,37 @@ Which force the forearm carries depends on joint 3: free, it is the component al
 leg is one two-force member from elbow to U-joint (`held_n` of `rrru.robots.dynamics.Loads`). Both are tried; `held` is
 0 or 1, or a share between.
 
+An arm has no such members: its links bend, and its bearings tilt. At every turning joint all that it carries turns by
+
+    w = c_j (m - (m . a) a)
+
+with the moment m of the loads about the joint and its axis a: one compliance c_j per joint, alike in both directions
+across the axis. What turns about the axis is `drive_compliance`.
+
 Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads
 are those at the commanded pose.
 
 Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain
 aluminium tube of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here
-are assumed.
+are assumed, as are those across joints (virtual joints for flexible links: Wernholt and Moberg, Nonlinear gray-box
+identification using local models applied to industrial robots, Automatica 47, 2011).
 """
+
+import numpy as np
 
 from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 _SIZE = ("flexure", "mm/N", 0.0, 0.1)
+_BEND = ("bending", "rad/(N mm)", 0.0, 1e-6)
 _HELD = Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where friction holds it")
 
 
 def for_robot(robot):
-    """The law for robots whose platform is pushed by links, None for others."""
+    """The law for robots whose platform is pushed by links, and for arms; None for others."""
     members = robot.parts.members
     if not members:
-        return None
+        return _across_joints(robot.legs.arm_joints)
     sizes = leg_parameters("axial spring of forearm and its joints, size assumed", _SIZE, count=len(members))
     # a joint within the leg may be held
     shapes = ({"held": 0.0}, {"held": 1.0}) if robot.parts.held_from else ({"held": 0.0},)
@@ -45,3 +56,19 @@ def _shortened(motion, values):
     """Shifts along the members under compliances (members,) in mm/N and the share to which joint 3 is held."""
     force = motion.force_n + values[-1] * (motion.held_force_n - motion.force_n)
     return motion.along(motion.robot.parts.members, -values[:-1] * force)
+
+
+def _across_joints(joints):
+    """The law for an arm with these turning joints, None where there are none."""
+    if not joints:
+        return None
+    parameters = ParameterSet(
+        leg_parameters("bearing and link across the axis, size assumed", _BEND, count=len(joints))
+    )
+
+    def tilted(motion, values):
+        """Turns across the joints' axes under compliances (J,) in rad/(N mm)."""
+        turns = values[:, None] * motion.across
+        return motion.at({joint: np.pad(turns[:, k], ((0, 0), (3, 0))) for k, joint in enumerate(joints)})
+
+    return Effect("link_flexure", parameters, plain_coordinates(parameters, 1e-8), tilted, ("across",))

@@ -59,4 +59,5 @@ def make_motion(robot, masses, course):
         held_force_n=load.held_n,
         drive_load=load.drive,
         follower_load=load.followers,
+        across=load.across,
     )

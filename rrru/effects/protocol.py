@@ -38,7 +38,8 @@ class Motion:
     the campaign's start; payload_kg (n,); force_n (n, members): force with which each member pushes the platform,
     compression positive, and held_force_n the same if friction holds the legs' inner joints; drive_load (n, K): torque
     in N mm or force in N of the loads on each drive, positive in the drive's sense; follower_load (n, f): on each joint
-    that follows drives, likewise.
+    that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
+    joints' frames.
     """
 
     robot: Any
@@ -54,6 +55,7 @@ class Motion:
     held_force_n: np.ndarray
     drive_load: np.ndarray
     follower_load: np.ndarray
+    across: np.ndarray
 
     def __len__(self) -> int:
         return len(self.drive)

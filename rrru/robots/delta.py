@@ -142,6 +142,6 @@ class Delta(Tripod):
         columns = [turned, cosine * self.radial - sine * up, np.zeros(3), self.radial]
         return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
 
-    def own_load(self, masses, theta_rad, _rate, acceleration, _poses):
+    def own_load(self, masses, motion, _poses):
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
-        return arm_load(masses, self.l1_mm, theta_rad, acceleration)
+        return arm_load(masses, self.l1_mm, motion[0], motion[2])

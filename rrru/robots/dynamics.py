@@ -75,13 +75,15 @@ class Loads:
     """Forces (n, members) in N of the members on the platform, compression positive, held_n if friction holds joints.
 
     drive (n, K): load on each drive in N mm or N, positive in the drive's sense; followers (n, f): on the joints that
-    follow drives, likewise.
+    follow drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in their own
+    frames.
     """
 
     member_n: np.ndarray
     held_n: np.ndarray
     drive: np.ndarray
     followers: np.ndarray
+    across: np.ndarray
 
 
 def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s2, payload_kg):
@@ -94,11 +96,28 @@ def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s
     force = _platform_load(robot, masses, acceleration_mm_s2, payload_kg)
     member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
     held = _held(robot, at, force) if robot.parts.held_from else member
-    own = robot.own_load(masses, np.asarray(actuators, dtype=float), *drive_motion, at.poses)
+    motion = np.asarray(actuators, dtype=float), *drive_motion
+    own = robot.own_load(masses, motion, at.poses)
     driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force) + own
     numbers = {joint.name: joint.drive for joint in robot.legs.joints}
     followers = [numbers[one.site] for one in robot.parts.followers]
-    return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers])
+    across = _across(robot, at, force, motion)
+    return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers], across)
+
+
+def _across(robot, at, force, motion):
+    """Moments (n, J, 3) across the axes of an arm's turning joints under forces (n, 3) of the platform and its own."""
+    names = robot.legs.arm_joints
+    if not names:
+        return np.zeros((len(at), 0, 3))
+    turns, places = (
+        np.stack(parts, axis=1) for parts in zip(*(at.frames[robot.legs.site_numbers[n]] for n in names), strict=True)
+    )
+    moment = np.cross(at.point_mm[:, None] - places, force[:, None])
+    moment = moment + robot.own_moments(motion, at.poses, places)
+    axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in names])
+    own = np.einsum("njab,nja->njb", turns, moment)
+    return own - (own * axes).sum(axis=-1, keepdims=True) * axes
 
 
 def _along_members(robot, at, load):

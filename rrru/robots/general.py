@@ -17,7 +17,7 @@ from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import Legs, Parts
-from rrru.robots.lumps import driven_loads
+from rrru.robots.lumps import driven_loads, moments
 from rrru.robots.robot import Robot
 
 SETS = ("zero", "full")
@@ -215,10 +215,13 @@ class GeneralRobot(Robot):
             poses = self.model.solve(actuators, poses, twists)
         return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
-    def own_load(self, _masses, actuators, rate, acceleration, poses):
+    def own_load(self, _masses, motion, poses):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
-        motion = actuators, rate, acceleration
         return driven_loads(self, motion, poses, gravity(self)) if self.lumps else 0.0
+
+    def own_moments(self, motion, poses, at_mm):
+        """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
+        return moments(self, motion, poses, gravity(self), at_mm) if self.lumps else 0.0
 
     @property
     def workspace_lines(self):
@@ -234,9 +237,9 @@ class GeneralRobot(Robot):
     @cached_property
     def _freedoms(self):
         """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
-        actuators, position = self._workspace()
-        poses = self.solve(actuators[:10], position[:10])
-        at = self.map(actuators[:10][poses.closed], poses.of(poses.closed))
+        actuators, position = (part[:10] for part in self._workspace())
+        poses = self.solve(actuators, position)
+        at = self.map(actuators[poses.closed], poses.of(poses.closed))
         position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
         turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
         both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()

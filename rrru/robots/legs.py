@@ -109,6 +109,13 @@ class Legs:
             rows = f"{len(self.coupling)} rows for {len(self.driven_kinds)} driven values"
             raise ConfigError(f"the coupling has {rows}; allowed: one each")
 
+    @property
+    def arm_joints(self):
+        """Names of the turning joints of an arm, a single leg without a bar; none of a robot with more legs."""
+        if len(self.legs) > 1 or self.legs[0].bar:
+            return ()
+        return tuple(joint.name for joint in self.legs[0].joints if joint.kind == "R")
+
     @cached_property
     def joints(self):
         """All joints, each once, in the order of the legs."""

@@ -75,21 +75,50 @@ def driven_loads(robot, motion, poses, gravity_mm_s2):
 
     motion: values, rates and accelerations (n, K) of the drives; poses: the Poses there. NaN where a pose is not known.
     """
-    kinds = robot.legs.driven_kinds
-    actuators, rate, acceleration = (robot.legs.driven(part) for part in motion)
-    robot = robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled)
-
-    def moved(step):
-        return places(robot, actuators + step, robot.model.solve(actuators + step, poses))
-
-    bend = 0.5 * _STEP_S**2 * acceleration
-    steps = (moved(sign * _STEP_S * rate + bend) for sign in (1.0, -1.0))
-    second = (sum(steps) - 2.0 * places(robot, actuators, poses)) / _STEP_S**2
-    mass = np.array([lump.mass_kg for lump in robot.lumps])
-    force = mass[:, None] * (gravity_mm_s2 - second) / 1000.0
+    robot, motion = _uncoupled(robot, motion)
+    force, actuators = _forces(robot, motion, poses, gravity_mm_s2), motion[0]
     result = np.empty(actuators.shape)
-    for k, kind in enumerate(kinds):
+    for k, kind in enumerate(robot.legs.driven_kinds):
         step = _STEP[kind] * np.eye(actuators.shape[1])[k]
-        slope = (moved(step) - moved(-step)) / (2.0 * _STEP[kind])
+        slope = (_moved(robot, actuators + step, poses) - _moved(robot, actuators - step, poses)) / (2.0 * _STEP[kind])
         result[:, k] = np.einsum("nla,nla->n", slope, force)
     return result
+
+
+def moments(robot, motion, poses, gravity_mm_s2, at_mm):
+    """Moments (n, J, 3) in N mm of an arm's masses about the places at_mm (n, J, 3) of the joints that carry them.
+
+    The joints are `rrru.robots.legs.Legs.arm_joints`; motion, poses as in `driven_loads`.
+    """
+    robot, motion = _uncoupled(robot, motion)
+    force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
+    (leg,) = robot.legs.legs
+    order = [*(joint.name for joint in leg.joints), PLATFORM]
+    holder = np.array([order.index(lump.joint) for lump in robot.lumps])
+    result = np.empty(at_mm.shape)
+    for k, name in enumerate(robot.legs.arm_joints):
+        carried = holder >= order.index(name)
+        lever = place[:, carried] - at_mm[:, k, None]
+        result[:, k] = np.cross(lever, force[:, carried]).sum(axis=1)
+    return result
+
+
+def _uncoupled(robot, motion):
+    """The robot with all its driven values free, and a motion (values, rates, accelerations) of these."""
+    motion = tuple(robot.legs.driven(part) for part in motion)
+    return robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled), motion
+
+
+def _moved(robot, actuators, poses):
+    """Places (n, lumps, 3) at other driven values (n, D), from Poses nearby."""
+    return places(robot, actuators, robot.model.solve(actuators, poses))
+
+
+def _forces(robot, motion, poses, gravity_mm_s2):
+    """Weight and inertia force (n, lumps, 3) in N of every point mass."""
+    actuators, rate, acceleration = motion
+    bend = 0.5 * _STEP_S**2 * acceleration
+    steps = (_moved(robot, actuators + sign * _STEP_S * rate + bend, poses) for sign in (1.0, -1.0))
+    second = (sum(steps) - 2.0 * places(robot, actuators, poses)) / _STEP_S**2
+    mass = np.array([lump.mass_kg for lump in robot.lumps])
+    return mass[:, None] * (gravity_mm_s2 - second) / 1000.0

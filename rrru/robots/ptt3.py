@@ -161,10 +161,10 @@ class Ptt3(Tripod):
         """Unit directions (3 legs, 3) in which the sliders count up."""
         return self._directions(self.numbers(deviations))[2]
 
-    def own_load(self, masses, _slider_mm, _rate, acceleration, _poses):
+    def own_load(self, masses, motion, _poses):
         """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.robots.dynamics`."""
         along = self.rails() @ gravity(self)
-        return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - acceleration) / PER_NEWTON
+        return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - motion[2]) / PER_NEWTON
 
     def jacobian(self, position_mm, slider_mm, deviations=None):
         """J (n, 3, 3) of db = J dp, exact at slider positions that fit the position (eqs. 4, 10)."""

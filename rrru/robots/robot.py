@@ -184,8 +184,15 @@ class Robot(ABC):
         at = self.map_at(actuators, position_mm)
         return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
 
-    def own_load(self, masses, actuators, rate, acceleration, poses):
-        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here."""
+    def own_load(self, masses, motion, poses):
+        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here.
+
+        motion: values, rates and accelerations (n, K) of the drives.
+        """
+        return 0.0
+
+    def own_moments(self, motion, poses, at_mm):
+        """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
         return 0.0
 
     def drive_errors(self, twists):

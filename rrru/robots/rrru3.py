@@ -222,9 +222,9 @@ class Rrru3(ThreeLegs):
         """Angles (n, 12) of joints 2 to 5 of every leg near positions (n, 3), of the nominal robot there."""
         return self.passive_angles(position_mm, self.inverse(position_mm)).reshape(-1, 12)
 
-    def own_load(self, masses, theta_rad, _rate, acceleration, _poses):
+    def own_load(self, masses, motion, _poses):
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
-        return arm_load(masses, self.L1_mm, theta_rad, acceleration)
+        return arm_load(masses, self.L1_mm, motion[0], motion[2])
 
     def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.

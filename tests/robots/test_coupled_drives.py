@@ -340,3 +340,50 @@ def test_a_loop_may_hold_a_joint_that_follows(tmp_path):
     at, h = robot.map_at(crank[:, None], expected), 1e-5
     slope = (robot.forward(crank[:, None] + h) - robot.forward(crank[:, None] - h)) / (2.0 * h)
     np.testing.assert_allclose(at.drive_response[:, :, 0], slope, rtol=0.0, atol=1e-5)
+
+
+def test_moments_across_the_joints_are_slopes_of_the_potential_energy():
+    """All that a joint carries is turned about directions across its axis; about the axis itself nothing is left."""
+    motion, h = _motion(ROBOT, NEAR[:5]), 1e-4
+    joints = [joint for joint in ROBOT.legs.joints if joint.name in ROBOT.legs.arm_joints]
+    assert motion.across.shape == (5, len(joints), 3)
+    at = ROBOT.map_at(motion.drive, motion.position_mm)
+    for k, joint in enumerate(joints):
+        np.testing.assert_allclose(motion.across[:, k] @ joint.axis, 0.0, atol=1e-6)
+        site = ROBOT.legs.site_numbers[joint.name]
+        for direction in np.eye(3):
+            direction = direction - (direction @ joint.axis) * joint.axis
+            slope = [_lifted(motion, at, site, sign * h * direction) for sign in (1.0, -1.0)]
+            expected = -(slope[0] - slope[1]) / (2.0 * h)
+            np.testing.assert_allclose(motion.across[:, k] @ direction, expected, rtol=1e-4, atol=0.5)
+
+
+def _lifted(motion, at, site, turn):
+    """Potential energy (n,) in N mm of the masses behind a site after a turn (3,) of its frame."""
+    frame, place = at.frames[site]
+    order = [joint.name for joint in ROBOT.legs.legs[0].joints]
+    name, up = ROBOT.legs.sites[site], ROBOT.up
+    total = np.zeros(len(motion))
+    now = places(ROBOT, motion.drive, at.poses)
+    whole = frame @ Rotation.from_rotvec(turn).as_matrix() @ np.swapaxes(frame, 1, 2)
+    for number, lump in enumerate(ROBOT.lumps):
+        if lump.joint not in order or order.index(lump.joint) >= order.index(name):
+            moved = np.einsum("nab,nb->na", whole, now[:, number] - place) + place
+            total += lump.mass_kg * GRAVITY_MM_S2 / 1e3 * (moved @ up)
+    return total
+
+
+def test_links_that_bend_turn_the_hand_about_the_joints():
+    """To first order the hand turns about every joint by the compliance times the moment across its axis."""
+    motion, effect = _motion(ROBOT, NEAR[:5]), library(ROBOT)["link_flexure"]
+    assert len(effect.parameters) == len(ROBOT.legs.arm_joints)
+    values = np.random.default_rng(6).uniform(1e-11, 3e-11, len(effect.parameters))
+    twists = effect.contribute(motion, values).twists
+    found = ROBOT.measured(ROBOT.solve(motion.drive, motion.position_mm, twists), twists)
+    at, shift = ROBOT.map_at(motion.drive, motion.position_mm), 0.0
+    for k, name in enumerate(ROBOT.legs.arm_joints):
+        frame, place = at.frames[ROBOT.legs.site_numbers[name]]
+        turn = np.einsum("nab,nb->na", frame, values[k] * motion.across[:, k])
+        shift = shift + np.cross(turn, motion.position_mm - place)
+    np.testing.assert_allclose(found - motion.position_mm, shift, rtol=1e-4, atol=1e-8)
+    assert np.linalg.norm(shift, axis=1).min() > 1e-4
