@@ -278,9 +278,9 @@ def test_what_is_known_of_a_gear_is_used():
     effect = EFFECTS["transmission_error"]
     values = effect.coordinates.to_values(3.0 * drawn("transmission_error", 1), {"ratio": 31.0})
     frame = measure((ActiveEffect(effect, effect.parameters.mapping(values)),))
-    assert diagnosed(frame).verdict["effects"] != "transmission_error"
-    settings = GapSettings(known={"transmission_error": {"ratio": 31.0}}, draws=20)
-    assert diagnosed(frame, settings=settings).verdict["effects"] == "transmission_error"
+    known, other = (GapSettings(known={"transmission_error": {"ratio": ratio}}, draws=20) for ratio in (31.0, 60.0))
+    assert diagnosed(frame, settings=known).verdict["effects"] == "transmission_error"
+    assert diagnosed(frame, settings=other).verdict["effects"] != "transmission_error"
 
 
 def test_the_papers_campaign_each_trajectory_once_suffices_for_a_plain_effect():

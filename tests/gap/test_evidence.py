@@ -224,12 +224,18 @@ def test_no_effect_explains_nothing_and_a_strong_one_what_it_made():
     same = Linear(made, linear.base, linear.columns, {}, {}, None)
     strong = ModelEvidence(LIBRARY, same, RUN, NoiseModel.white(NOISE_MM))
     hypothesis = SimpleNamespace(
-        terms=(Term("free"),), evidence=np.eye(len(LEVELS))[0], strengths=np.full((len(LEVELS), 1), 300.0)
+        terms=(Term("free"),),
+        effects={"free"},
+        evidence=np.eye(len(LEVELS))[0],
+        strengths=np.full((len(LEVELS), 1), 300.0),
     )
     basis, _ = np.linalg.qr(linear.base.reshape(-1, 3))
     beyond = made.ravel() - basis @ (basis.T @ made.ravel())
-    assert strong.explained(hypothesis) == pytest.approx(np.sqrt((beyond**2).mean()) / NOISE_MM, rel=1e-3)
-    assert strong.explained(SimpleNamespace(terms=())) == 0.0
+    assert strong.explained(hypothesis, {"free", "legged"}) == pytest.approx(
+        np.sqrt((beyond**2).mean()) / NOISE_MM, rel=1e-3
+    )
+    assert strong.explained(hypothesis, {"legged"}) == 0.0
+    assert strong.explained(SimpleNamespace(terms=(), effects=set()), {"free"}) == 0.0
 
 
 def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there():

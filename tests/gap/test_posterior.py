@@ -19,7 +19,7 @@ WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_
 
 def _stub(explained=0.0):
     """Evidence that tells how much a hypothesis explains, in units of the noise."""
-    return SimpleNamespace(library=EFFECTS, explained=lambda h: explained if h.terms else 0.0)
+    return SimpleNamespace(library=EFFECTS, explained=lambda h, effects: explained if h.effects & set(effects) else 0.0)
 
 
 def _hypothesis(*terms, evidence=0.0):

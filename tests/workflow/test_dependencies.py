@@ -90,6 +90,7 @@ def test_a_digest_follows_imports_wherever_they_stand(tmp_path, monkeypatch):
             {
                 *("diagnose", "gather_gap"),
                 *("withheld_diagnose", "withheld_score", "withheld_beliefs", "withheld_methods"),
+                "withheld_advice",
             },
         ),
     ],

@@ -31,3 +31,17 @@ def sweeps(sweep, swept):
     every = [f"{parameter}/{population}" for parameter in swept for population in sorted(sweep["populations"])]
     chosen = {name: own.get("sweeps", every) for name, own in sweep["readings"].items()}
     return [f"{name}/{one}" for name, own in chosen.items() for one in own if one in every]
+
+
+def design(virtual):
+    """What the paper states of a virtual campaign's motion and trajectories; None of a measured one."""
+    if virtual is None:
+        return None
+    shape = virtual["trajectories"]
+    kept = {"lines": ("start_mm", "end_mm", "offsets_y_mm", "points"), "spiral": ("points",)}
+    return {
+        "motion": {key: virtual["motion"][key] for key in ("speed_mm_s", "acceleration_mm_s2")},
+        "trajectories": {
+            name: {key: shape[name][key] for key in keys} for name, keys in kept.items() if shape.get(name)
+        },
+    }

@@ -24,7 +24,7 @@ PAPERS["A"] = {
     "tables": ["errors", "calibrations", "parameters", "genetic", "genetic_parameters", "sweep_runs", "redraw_counts"],
     "settings": {
         "nominal": parts.nominal(config, REPRODUCED),
-        "virtual": parts.virtual(config, REPRODUCED),
+        "virtual": paper_a_settings.design(parts.virtual(config, REPRODUCED)),
         **reads(
             *(f"genetic.{key}" for key in ("operators", "crossover_fraction", "migration_fraction", "populations")),
             *(f"reproduce.{key}" for key in config["reproduce"] if key != "redraws"),
