@@ -96,7 +96,7 @@ rule redraws:
                     for key in ("line_calibration", "spiral_calibration")
                 ),
                 "calibration.use_near_singularity",
-                "reproduce",
+                *(f"reproduce.{key}" for key in config["reproduce"] if key != "campaign"),
             ),
         },
         code=code("redraws"),
