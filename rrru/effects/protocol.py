@@ -119,7 +119,8 @@ class Coordinates:
     variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,); weights: prior
     probabilities of the shapes, None where all are alike; searched: what is searched beside the listed shapes, of which
     the first so many are stated; doubt: share that a shape's parameter may be off by, 1 sigma, of what is searched the
-    order itself.
+    order itself; broad: so many coordinates that they are averaged over before anything else is tried; spectra: sizes
+    (c,) of the coordinates, of which the campaign chooses; log_prior: of a choice that has been made otherwise.
     """
 
     typical: np.ndarray
@@ -132,6 +133,9 @@ class Coordinates:
     searched: Search | None = None
     stated: int = 0
     doubt: float = 0.3
+    broad: bool = False
+    spectra: tuple[np.ndarray, ...] = ()
+    log_prior: float = 0.0
 
     def __len__(self) -> int:
         return len(self.typical)
@@ -194,7 +198,10 @@ def plain_coordinates(
 class Effect:
     """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: fields of Motion without which the law says nothing.
+    needs: fields of Motion without which the law says nothing; along_drives: of a law that changes nothing but actuator
+    values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
+    with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
+    law that has them.
     """
 
     name: str
@@ -202,6 +209,8 @@ class Effect:
     coordinates: Coordinates
     law: Callable[[Motion, np.ndarray], Contribution]
     needs: tuple[str, ...] = ()
+    along_drives: Callable[[Motion], list[np.ndarray]] | None = None
+    with_waves: Callable[..., "Effect"] | None = None
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""

@@ -19,6 +19,7 @@ from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
+from rrru.gap.spectra import with_spectra
 from rrru.gap.unknown import UNKNOWN
 
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
@@ -154,6 +155,8 @@ def _rounds(case, calibrated, prior, stated):
     def seen(case, state, terms=()):
         linear = case.linearise(state)
         case, added = with_orders(case, linear, terms)
+        case, found = with_spectra(case, linear, terms)
+        added = [*added, *found]
         if added:
             linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
         if stated == KNOWN:

@@ -235,6 +235,11 @@ class Case:
 
     def _columns(self, at, key, state):
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
+        functions = getattr(self.library[key[0]], "along_drives", None)
+        if functions is not None:
+            response = at.drive_effect[self._kept]
+            made = (f[self.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(functions(self.motion)))
+            return np.concatenate(list(made), axis=-1)
         step = np.array(self.library[key[0]].coordinates.typical)
         if key in state.effects:
             active = state.effects[key]

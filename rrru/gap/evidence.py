@@ -15,17 +15,17 @@ A law's shape parameters may be off the grid on which they were tried: each has 
 `Linear.shape_columns`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import block_diag
 from scipy.optimize import lsq_linear
 
 from rrru.campaign.noise import along_runs
 from rrru.gap import evidence_kernels as kernels
+from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.noise_model import NoiseModel, lengths
 from rrru.gap.terms import EACH, SAME, per_leg, spread
 
@@ -53,13 +53,18 @@ class _Prior(NamedTuple):
     largest: np.ndarray
     positive: np.ndarray
 
+    def at(self, strength):
+        """Sizes at a strength."""
+        return np.minimum(strength * self.size, self.largest)
+
 
 @dataclass(frozen=True)
 class Projected:
     """Least squares of k coefficients with their priors, the calibration taken out.
 
     Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels,
-    k); size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody.
+    k); size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody; index
+    (k,): of the columns.
     """
 
     gram: np.ndarray
@@ -68,6 +73,7 @@ class Projected:
     largest: np.ndarray
     positive: np.ndarray
     owner: np.ndarray
+    index: np.ndarray
 
     def scale(self, strengths):
         """Prior standard deviations (m, k) at strengths (m, terms)."""
@@ -101,47 +107,61 @@ class ModelEvidence:
         blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
         ends = np.cumsum([0, *(size for _, size in blocks)])
         numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
-        every, made = np.eye(ends[-1]), [np.eye(ends[-1])]
+        made = [np.zeros((ends[-1], 0))]
         for name, shape in linear.columns:
             if per_leg(self.library[name]):
-                sums = every[:, numbers[name, shape, EACH]] @ spread(self.library[name].coordinates, SAME)
-                numbers[name, shape, SAME] = sum(map(np.size, made)) // len(every) + np.arange(sums.shape[1])
-                made.append(sums)
+                own, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
+                numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
+                made.append(np.zeros((ends[-1], sums.shape[1])))
+                made[-1][own] = sums
         return numbers, np.concatenate(made, axis=1)
 
     @cached_property
-    def _grams(self):
-        """Gram matrices (levels, k, k) of the whitened columns, their moments (levels, k) with the data, constants.
-
-        The calibration is projected out; of the last matrix (k, k), without discrepancy, it is not.
-        """
-        linear, (_, join) = self.linear, self._layout
-        p = linear.base.shape[-1]
+    def _together(self):
+        """Columns of calibration and effects, and the data, (m, 3, k), as they are and by the runs' cosines; waves."""
+        linear = self.linear
         blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
         together = np.concatenate(blocks, axis=-1)
         cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
-        cosines, shape = cosines.reshape(together.shape), spectrum(wave)
-        unit, own = self.noise.mean_mm, self.noise.variance(wave, lengths(self.run)) / self.noise.mean_mm**2
-        join = block_diag(join, 1.0)
-        grams, constants = [], []
-        for level in LEVELS:
-            variance = own + level**2 * shape[:, None]
-            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, together.shape[-1])
+        return together, cosines.reshape(together.shape), wave
+
+    @cached_property
+    def _whole(self):
+        """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
+        together, _, _ = self._together
+        columns = (together[..., self.linear.base.shape[-1] : -1] / self.noise.mean_mm).reshape(3 * len(self), -1)
+        sums = columns @ self._layout[1]
+        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)])
+
+    @cached_property
+    def _made(self):
+        """Grams of the levels that have been asked for."""
+        return {}
+
+    def _gram(self, level):
+        """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
+
+        The calibration is projected out.
+        """
+        if level not in self._made:
+            (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+            own = self.noise.variance(wave, lengths(self.run)) / unit**2
+            variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
+            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
             basis, triangle = np.linalg.qr(white[:, :p])
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
-            gram = rest.T @ rest
-            grams.append(join.T @ gram @ join)
-            constants.append(
-                -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
-            )
-        grams, whole = np.array(grams), (together[..., p:] / unit).reshape(-1, together.shape[-1] - p)
-        whole = join.T @ (whole.T @ whole) @ join
-        return grams[:, :-1, :-1], grams[:, :-1, -1], np.array(constants), whole[:-1, :-1]
+            gram, sums = rest.T @ rest, self._layout[1]
+            none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
+            gram, moment = gram[:-1, :-1], gram[:-1, -1]
+            across = gram @ sums
+            gram = np.block([[gram, across], [across.T, sums.T @ across]])
+            self._made[level] = gram, np.concatenate([moment, sums.T @ moment]), none
+        return self._made[level]
 
     @property
     def none(self):
         """Log evidence (levels,) of no effect at all."""
-        return self._grams[2]
+        return np.array([self._gram(level)[2] for level in range(len(LEVELS))])
 
     @cached_property
     def _priors(self):
@@ -152,12 +172,12 @@ class ModelEvidence:
     def _prior(self, term):
         """The prior of one term's coefficients."""
         if term not in self._priors:
-            coordinates, (grams, _, _, whole) = self.library[term.effect].coordinates, self._grams
+            coordinates, gram = self.library[term.effect].coordinates, np.diag(self._gram(0)[0])
             matrix = spread(coordinates, term.legs)
             index = self._layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
             index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
             size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
-            power, total = ((gram[index, index] * size**2).sum() / (3.0 * len(self)) for gram in (grams[0], whole))
+            power, total = ((all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whole))
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
             size /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
             most = np.broadcast_to(coordinates.most, len(coordinates))
@@ -171,19 +191,66 @@ class ModelEvidence:
         priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
         owner = np.repeat(np.minimum(np.arange(len(priors)), len(terms)), [len(prior.index) for prior in priors])
         index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
-        grams, moments, *_ = self._grams
-        return Projected(grams[levels][:, index[:, None], index], moments[levels][:, index], *rest, owner)
+        grams = [self._gram(level) for level in np.arange(len(LEVELS))[levels]]
+        gram, moment = (
+            np.array(part) for part in zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True)
+        )
+        return Projected(gram, moment, *rest, owner, index)
 
     def over_strengths(self, terms, strengths=None, levels=slice(None)):
         """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
 
         strengths: grids, one per term, by default STRENGTHS for each.
         """
-        problem = self.projected(terms, levels)
-        combinations = np.array(list(product(*(strengths or (STRENGTHS,) * len(terms)))))
-        scale = np.ascontiguousarray(problem.scale(combinations))
-        gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
-        return self.none[levels, None] + kernels.log_evidence(gram, moment, scale, problem.positive), combinations
+        grids = tuple(strengths or (STRENGTHS,) * len(terms))
+        combinations = np.array(list(product(*grids)))
+        levels = np.arange(len(LEVELS))[levels]
+        broad = self._broadest(terms)
+        if broad is None:
+            none = np.array([self._gram(level)[2] for level in levels])
+            return none[:, None] + _evidence(self.projected(terms, levels), combinations), combinations
+        rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
+        rows = np.array(list(product(*others)))
+        problem = self.projected(rest, levels) if rest else None
+        values = [self._beside(terms[broad], strength, problem, rows, levels) for strength in grids[broad]]
+        values = [value.reshape(len(levels), *map(len, others)) for value in values]
+        return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
+
+    def _broadest(self, terms):
+        """Number of the term of the most coefficients if these are many, None where no term has."""
+        counts = [len(self._prior(term).index) for term in terms]
+        wide = [counts[k] if self._is_broad(term) else 0 for k, term in enumerate(terms)]
+        return int(np.argmax(wide)) if any(wide) else None
+
+    def _is_broad(self, term):
+        """Whether a term's coefficients are averaged over first."""
+        return self.library[term.effect].coordinates.broad
+
+    def _beside(self, broad, strength, problem, strengths, levels):
+        """Log evidence (levels, m) of a broad term at a strength beside other terms.
+
+        problem: the others' Projected at the levels, None where there are none; strengths (m, terms): theirs.
+        """
+        averages = [self._average(broad, strength, level) for level in levels]
+        value = np.array([self._gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[:, None]
+        if problem is None:
+            return value
+        gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
+        return value + _evidence(replace(problem, gram=gram, moment=moment), strengths)
+
+    def _average(self, term, strength, level):
+        """The Average over the coefficients of a broad term at a strength and a level (an index)."""
+        key = term, float(strength), int(level)
+        if key not in self._averages:
+            gram, moment, _ = self._gram(level)
+            prior = self._prior(term)
+            self._averages[key] = Average.over(gram, moment, prior.index, prior.at(strength))
+        return self._averages[key]
+
+    @cached_property
+    def _averages(self):
+        """Averages that have been asked for."""
+        return {}
 
     def independent(self, terms, levels):
         """Log evidence (l,) of many terms at levels (indices), and their best strengths (l, terms).
@@ -216,11 +283,29 @@ class ModelEvidence:
         if hypothesis.effects.isdisjoint(effects):
             return 0.0
         level = int(hypothesis.evidence.argmax())
-        mean, _ = self.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+        mean = self._mean(hypothesis.terms, hypothesis.strengths[level], level)
         problem = self.projected(hypothesis.terms, [0])
         chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
         mean = np.where(chosen[problem.owner], mean, 0.0)
         return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self))))
+
+    def _mean(self, terms, strengths, level):
+        """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
+        broad = self._broadest(terms)
+        if broad is None:
+            return self.coefficients(terms, strengths, level)[0]
+        rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
+        index, found = np.zeros(0, dtype=int), np.zeros(0)
+        if rest:
+            problem = self.projected(rest, [level])
+            index = problem.index
+            gram, moment = self._average(terms[broad], strengths[broad], level).rest(index)
+            scale = problem.scale(np.delete(strengths, broad)[None])[0]
+            found = _posterior_mean(gram + np.diag(scale**-2.0), moment, problem.positive)
+        gram, moment, _ = self._gram(level)
+        own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, found)
+        before = sum(len(self._prior(term).index) for term in terms[:broad])
+        return np.concatenate([found[:before], own, found[before:]])
 
     def coefficients(self, terms, strengths, level):
         """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).
@@ -230,16 +315,25 @@ class ModelEvidence:
         problem = self.projected(terms, [level])
         moment, positive = problem.moment[0], problem.positive
         precision = problem.gram[0] + np.diag(problem.scale(np.asarray(strengths)[None])[0] ** -2.0)
-        covariance = np.linalg.inv(precision)
-        mean = covariance @ moment
-        if (mean[positive] < 0.0).any():
-            mean = _not_negative(precision, moment, positive)
-        return mean, covariance
+        return _posterior_mean(precision, moment, positive), np.linalg.inv(precision)
+
+
+def _evidence(problem, strengths):
+    """Log evidence (levels, m) of a Projected problem at strengths (m, terms) over that of none of its terms."""
+    scale = np.ascontiguousarray(problem.scale(strengths))
+    gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
+    return kernels.log_evidence(gram, moment, scale, problem.positive)
 
 
 def averaged(value, terms):
     """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""
     return kernels.log_sum_exp(value) - terms * np.log(len(STRENGTHS))
+
+
+def _posterior_mean(precision, moment, positive):
+    """The mean (k,) of normal coefficients, or where that has negative positive ones their most probable point."""
+    mean = np.linalg.solve(precision, moment)
+    return _not_negative(precision, moment, positive) if (mean[positive] < 0.0).any() else mean
 
 
 def _not_negative(precision, moment, positive):

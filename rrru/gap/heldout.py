@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import cho_solve
 
 from rrru.campaign.noise import along_runs
 from rrru.gap.case import Case
@@ -62,29 +63,35 @@ class HeldOut:
         result = (within(run, self.case.at) // _STRETCH + run) % _FOLDS
         return np.unique(result, return_inverse=True)[1]
 
-    def predict(self, terms, strengths, level):
+    def predict(self, terms, strengths, level, uncertain=True):
         """Prediction by the calibration together with a set of terms.
 
         The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
-        laws as they are.
+        laws as they are. uncertain: tell the prediction's spread, too.
         """
         evidence, linear = self.evidence, self.evidence.linear
         columns = np.concatenate([linear.base, *signatures(evidence.library, linear, terms)], axis=-1)
         penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
         weights, transformed, data = self._weighted(columns, level)
-        gram = np.einsum("nak,nal,na->nkl", transformed, transformed, weights)
-        moment = np.einsum("nak,na,na->nk", transformed, data, weights)
-        total, total_moment = gram.sum(axis=0), moment.sum(axis=0)
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
-        residual, spread = np.empty_like(linear.data), np.empty((len(self.case), 3, columns.shape[-1]))
+        root = np.sqrt(weights)
+        white, target = root[..., None] * transformed, root * data
+        grams, moments = {}, {}
         for number in np.unique(self.fold):
+            own = white[self.fold == number].reshape(-1, columns.shape[-1])
+            grams[number], moments[number] = own.T @ own, own.T @ target[self.fold == number].ravel()
+        total, total_moment = sum(grams.values()), sum(moments.values())
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
+        residual = np.empty_like(linear.data)
+        spread = np.empty((len(self.case), 3, columns.shape[-1] if uncertain else 0))
+        for number in grams:
             out = self.fold == number
-            precision = total - gram[out].sum(axis=0) + np.diag(penalty)
+            precision = total - grams[number] + np.diag(penalty)
             factor = np.linalg.cholesky(unit[:, None] * precision * unit + 1e-12 * np.eye(len(unit)))
-            half = unit[:, None] * np.linalg.inv(factor).T
-            mean = half @ (half.T @ (total_moment - moment[out].sum(axis=0)))
+            mean = unit * cho_solve((factor, True), unit * (total_moment - moments[number]))
             residual[out] = linear.data[out] - columns[out] @ mean
-            spread[out] = columns[out] @ half
+            if uncertain:
+                half = unit[:, None] * np.linalg.inv(factor).T
+                spread[out] = columns[out] @ half
         return Prediction(residual, spread, self.case.noise_mm)
 
     def _weighted(self, columns, level):

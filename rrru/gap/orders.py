@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import find_peaks
 
-from rrru.gap.terms import spread
+from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
 
 # orders per resolved one, and the largest number of orders found that are kept
@@ -41,9 +41,9 @@ def periodogram(data, drive_effect, drive, beside, orders):
     for row, order in enumerate(orders):
         waves = [drive_effect * part(order * drive)[:, None] for part in (np.sin, np.cos)]
         columns = np.concatenate(waves, axis=-1).reshape(data.size, -1)
-        columns = columns - basis @ (basis.T @ columns)
-        fitted, *_ = np.linalg.lstsq(columns, left, rcond=1e-9)
-        gains[row] = left @ (columns @ fitted)
+        taken, moment = basis.T @ columns, columns.T @ left
+        fitted, *_ = np.linalg.lstsq(columns.T @ columns - taken.T @ taken, moment, rcond=1e-12)
+        gains[row] = moment @ fitted
     return gains
 
 
@@ -67,8 +67,7 @@ def _found(case, linear, effect, others):
     """An effect with the orders that stand out added to its shapes."""
     coordinates, drive = effect.coordinates, case.motion.drive[case.at]
     search, step = coordinates.searched, resolution(case.motion.drive[case.used])
-    known = [linear.columns[t.effect, t.shape] @ spread(case.library[t.effect].coordinates, t.legs) for t in others]
-    beside = np.concatenate([linear.base, *known], axis=-1)
+    beside = np.concatenate([linear.base, *signatures(case.library, linear, others)], axis=-1)
     orders = np.arange(step, search.highest, step / _DENSITY)
     if len(orders) < 3 or beside.shape[-1] > linear.data.size // 2:
         return effect

@@ -113,7 +113,7 @@ class _LogPrior:
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
             coordinates = library[name].coordinates
             weights = coordinates.weights or np.full(len(coordinates.shapes), 1.0 / len(coordinates.shapes))
-            self._effects[name] = np.log(weights) - np.log(len(kinds))
+            self._effects[name] = np.log(weights) - np.log(len(kinds)) + coordinates.log_prior
 
     def terms(self, terms):
         """Of a set of terms, alike for all sets of one size."""

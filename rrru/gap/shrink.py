@@ -43,7 +43,7 @@ def order_by_share(attribution):
     noise = 3.0 * attribution.case.noise_mm**2
 
     def gap(terms):
-        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level)
+        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
         return max(float((prediction.residual_mm**2).sum(axis=1).mean()) - noise, 0.0)
 
     start = now = gap([])

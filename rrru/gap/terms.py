@@ -50,7 +50,8 @@ def variants(effect):
 
 def signatures(library, linear, terms):
     """Columns (n, 3, k) of each term's free numbers on a linearisation."""
-    return [linear.columns[t.effect, t.shape] @ spread(library[t.effect].coordinates, t.legs) for t in terms]
+    own = ((linear.columns[term.effect, term.shape], term) for term in terms)
+    return [c if t.legs == EACH else c @ spread(library[t.effect].coordinates, t.legs) for c, t in own]
 
 
 def sites(library, motion, term):

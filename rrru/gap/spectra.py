@@ -1,0 +1,131 @@
+"""Errors of the drives by their angle: which sharp waves a campaign shows, and how rough a function is.
+
+Both look at what the calibration, and known effects beside it, leave. Waves are found one after another (matching
+pursuit), each the drive and order that take most off the sum of squares; the next has its place where it takes off more
+than what choosing it among all resolved ones costs. The spectrum of a function is the one of highest likelihood, its
+size and the noise chosen with it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.special import gammaln
+
+from rrru.effects.drive_error_function import waves
+from rrru.gap.terms import signatures
+from rrru.gap.unknown import UNKNOWN
+
+# orders per resolved one; highest order; most waves that are still called few
+_DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
+_STRENGTHS, _ROUNDS = np.geomspace(0.1, 10.0, 5), 3
+
+
+def with_spectra(case, linear, terms):
+    """The case whose waves are found and whose spectra are chosen, of effects that no term holds; and keys of these.
+
+    linear: about the state that the terms of a hypothesis, fitted beside them, have led to.
+    """
+    library, held = dict(case.library), {term.effect for term in terms}
+    open_ones = [e for e in library.values() if (e.coordinates.spectra or _waits(e)) and e.name not in held]
+    if not open_ones:
+        return case, []
+    known = [term for term in terms if term.effect not in UNKNOWN]
+    beside = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
+    basis, _ = np.linalg.qr(beside.reshape(linear.data.size, -1))
+    data = _without(linear.data.reshape(-1, 1), basis)[:, 0]
+    changed = []
+    for effect in open_ones:
+        if _waits(effect):
+            found = pursue(data, basis, linear.drive, case.motion.drive[case.at])
+            # nothing stands out: there is nothing to test
+            library.pop(effect.name)
+            if found[0]:
+                library[effect.name] = effect.with_waves(*found)
+                changed.append((effect.name, 0))
+            continue
+        columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
+        best = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
+        chosen = replace(effect.coordinates, typical=effect.coordinates.spectra[best], spectra=())
+        library[effect.name] = replace(effect, coordinates=chosen)
+    return replace(case, library=library), changed
+
+
+def _waits(effect):
+    """Whether an effect's waves are still to be found."""
+    return getattr(effect, "with_waves", None) is not None
+
+
+def _without(columns, basis):
+    """Columns (m, k) without what a basis (m, b) makes of them."""
+    return columns - basis @ (basis.T @ columns)
+
+
+def pursue(data, basis, drive_effect, drive):
+    """Pairs (drive, order) of the waves that stand out in data (m,), and the log prior of having chosen just these.
+
+    basis (m, b): what is fitted beside them; drive_effect (n, 3, K): derivative by the actuator values; drive (n, K):
+    these in rad.
+    """
+    reach = np.ptp(drive, axis=0)
+    atoms = [(k, order) for k in range(drive.shape[1]) for order in _orders(reach[k])]
+    if not atoms:
+        return (), 0.0
+    columns = np.concatenate([_waves_of(k, reach[k], drive_effect, drive) for k in range(drive.shape[1])], axis=1)
+    columns = _without(columns, basis)
+    norm = np.sqrt((columns**2).sum(axis=0))
+    # what the calibration takes up is none
+    unit = columns / np.where(norm > 1e-3 * norm.max(), norm, np.inf)
+    resolved = sum(_HIGHEST * span / (2.0 * np.pi) for span in reach)
+    price = np.log(max(resolved, 1.0)) + np.log(len(data))
+    chosen, left = [], data
+    while len(chosen) < min(_MOST_WAVES, len(data) // 20):
+        best = int((((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)).argmax())
+        if best in chosen:
+            break
+        index = np.array([2 * k + part for k in (*chosen, best) for part in (0, 1)])
+        trial = data - unit[:, index] @ np.linalg.lstsq(unit[:, index], data, rcond=1e-9)[0]
+        if 0.5 * len(data) * np.log((left @ left) / (trial @ trial)) < price:
+            break
+        chosen.append(best)
+        left = trial
+    count = len(chosen)
+    return tuple(atoms[k] for k in chosen), float(gammaln(count + 1) - count * np.log(max(resolved, 1.0)))
+
+
+def _orders(reach):
+    """Orders that a drive which swings through so many rad is searched for."""
+    step = 2.0 * np.pi / reach if reach > 0.0 else np.inf
+    return np.arange(step, _HIGHEST, step / _DENSITY) if step < _HIGHEST else np.zeros(0)
+
+
+def _waves_of(k, reach, drive_effect, drive):
+    """Columns (3 n, 2 orders) of the waves of one drive."""
+    made = waves(drive[:, k], _orders(reach))
+    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(-1, made.shape[1])
+
+
+def likeliest(data, columns, spectra, fitted):
+    """Number of the spectrum of highest likelihood of data (m,), of coefficients (c,) of columns (m, c).
+
+    spectra: sizes (c,) of the coefficients up to a common factor; fitted: numbers fitted beside them.
+    """
+    gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
+    count = len(data) - fitted
+
+    def likelihood(size):
+        """At the noise that the coefficients of these sizes leave, found in turn with them."""
+        variance = 0.1 * square / count
+        for _ in range(_ROUNDS):
+            scaled = size[:, None] * gram * size / variance + np.eye(len(size))
+            factor = cho_factor(scaled, lower=True)
+            mean = size * cho_solve(factor, size * moment) / variance
+            fit = moment @ mean
+            spare = len(size) - np.trace(cho_solve(factor, np.eye(len(size))))
+            result = -0.5 * count * np.log(variance) - 0.5 * (square - fit) / variance
+            result -= np.log(np.diag(factor[0])).sum()
+            variance = (square - 2.0 * fit + mean @ gram @ mean) / max(count - spare, 1.0)
+        return result
+
+    best = [max(likelihood(strength * size) for strength in _STRENGTHS) for size in spectra]
+    return int(np.argmax(best))
