@@ -20,6 +20,8 @@ _DENSITY, _PEAKS, _MOST = 6, 2, 8
 _SAME = 0.03
 # an order that was found is off by this share of the resolution, 1 sigma
 _DOUBT = 0.1
+# a combination of waves of which less than this share is left beside the calibration is not told
+_TOLD = 1e-6
 # of what may be any order, this share is believed to be the stated one
 _STATED = 0.5
 
@@ -41,9 +43,11 @@ def periodogram(data, drive_effect, drive, beside, orders):
     for row, order in enumerate(orders):
         waves = [drive_effect * part(order * drive)[:, None] for part in (np.sin, np.cos)]
         columns = np.concatenate(waves, axis=-1).reshape(data.size, -1)
-        taken, moment = basis.T @ columns, columns.T @ left
-        fitted, *_ = np.linalg.lstsq(columns.T @ columns - taken.T @ taken, moment, rcond=1e-12)
-        gains[row] = moment @ fitted
+        taken, moment, whole = basis.T @ columns, columns.T @ left, columns.T @ columns
+        size, turned = np.linalg.eigh(whole - taken.T @ taken)
+        # what the calibration takes up is no wave
+        told = size > _TOLD * np.trace(whole) / len(size)
+        gains[row] = ((turned[:, told].T @ moment) ** 2 / size[told]).sum()
     return gains
 
 

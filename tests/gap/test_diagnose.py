@@ -174,7 +174,8 @@ def test_columns_that_the_cause_does_not_need_may_be_missing(lagging, column):
 
 def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
     verdict = _checked(diagnosed(lagging.assign(time_s=np.nan), details=True)).verdict
-    assert "servo_lag" not in verdict["effects"] and "unexplained" in verdict["effects"]
+    assert "servo_lag" not in verdict["effects"]
+    assert "unexplained" in verdict["effects"] + verdict["confusable_with"]
     assert "servo_lag not tested" in verdict["notes"] and "thermal_growth not tested" in verdict["notes"]
 
 
