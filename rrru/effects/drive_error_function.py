@@ -21,6 +21,9 @@ import numpy as np
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
+# a law of campaigns of many poses: it is tested where a configuration names it
+BY_NAME_ONLY = True
+
 ORDERS = np.arange(1, 65)
 _BENDS, _STEEPNESS, _TYPICAL, _MOST = (3.0, 6.0, 12.0, 24.0, 48.0), 4, 1e-4, 0.01
 

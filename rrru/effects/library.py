@@ -38,16 +38,13 @@ def _module(name):
 
 
 NAMES = _names()
-# effects for campaigns of many poses, tested only where the configuration names them
-SPECIAL = ("transmission_orders", "drive_error_function")
-USUAL = tuple(name for name in NAMES if name not in SPECIAL)
 # effects that hold others as special cases: what they are told apart by is how few numbers do
 HOLDS = {"joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement")}
 
 
 def library(robot):
-    """The library's usual effects that a robot may have, by name."""
-    made = {name: _module(name).for_robot(robot) for name in USUAL}
+    """The library's effects that a robot may have, by name."""
+    made = {name: _module(name).for_robot(robot) for name in NAMES}
     return {name: effect for name, effect in made.items() if effect is not None}
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rrru.effects.library import HOLDS, USUAL, find
+from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import MECHANISMS
 
@@ -34,7 +34,7 @@ class GapSettings:
     such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
     """
 
-    effects: tuple = USUAL
+    effects: tuple = NAMES
     known: dict = field(default_factory=dict)
     prior: Prior = field(default_factory=Prior)
     draws: int = 200

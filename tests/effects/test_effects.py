@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from rrru.effects.backlash import play
-from rrru.effects.library import USUAL, active_effects
+from rrru.effects.library import NAMES, active_effects
 from rrru.effects.protocol import ActiveEffect, Contribution, Motion
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
@@ -72,8 +72,8 @@ def _under(effect, coordinates, shape=None):
 
 def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
-    assert tuple(name for name in USUAL if name in EFFECTS) == _NAMES
-    assert set(USUAL) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset"}
+    assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
+    assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset"}
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 import pytest
 
-from rrru.effects.library import USUAL, active_effects, find, library
+from rrru.effects.library import NAMES, active_effects, find, library
 from rrru.errors import ConfigError
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
@@ -76,8 +76,8 @@ def own(tmp_path, monkeypatch):
 def test_a_library_name_finds_the_librarys_effect():
     for robot in (ROBOT, Ptt3(), Delta()):
         effects = library(robot)
-        assert set(effects) < set(USUAL)
-        for name in USUAL:
+        assert set(effects) < set(NAMES)
+        for name in NAMES:
             found = find(name, robot)
             assert (found is not None) == (name in effects)
             if found is not None:
