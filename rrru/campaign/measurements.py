@@ -12,6 +12,8 @@ from rrru.robots.geometric_numbers import Reads
 from rrru.robots.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
+# rows kept for a test: no fit uses them, the robot was there nevertheless
+HELD_OUT = "held_out"
 
 
 def vectors(frame: pd.DataFrame, name: str) -> np.ndarray:
@@ -117,6 +119,15 @@ def usable(measurements: pd.DataFrame, use_near_singularity: bool = True) -> np.
     """Rows (n,) that fits may use: measured, no outlier and, if so asked, not near a singularity."""
     allowed = USED if use_near_singularity else USED[:1]
     return measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1)
+
+
+def hold_out(measurements: pd.DataFrame, chosen: np.ndarray) -> pd.DataFrame:
+    """The table with status "held_out" where rows (n,) are chosen that a fit might use.
+
+    The rows stay: what a robot does at a stop depends on the one before it, whether that is fitted or not.
+    """
+    held = np.asarray(chosen, dtype=bool) & measurements["status"].isin(USED).to_numpy()
+    return measurements.assign(status=measurements["status"].where(~held, HELD_OUT))
 
 
 def direction(measurements: pd.DataFrame) -> np.ndarray:

@@ -13,8 +13,8 @@ command_{xyz}_mm       float  commanded position, robot frame
 measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
 speed_mm_s             float? speed of the run; null where the file has none
 payload_kg             float? payload on the platform; null where the file has none
-status                 str    every point is kept; outlier and unsolved are left out of fits, near_singularity only
-    with use_near_singularity: false {ok, outlier, near_singularity, unsolved}
+status                 str    every point is kept; outlier, unsolved and held_out (kept for a test) are left out of
+    fits, near_singularity only with use_near_singularity: false {ok, outlier, near_singularity, unsolved, held_out}
 campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
@@ -49,7 +49,7 @@ point                  int    as in measurements
 translational_measure  float  0 where the platform can move with locked drives
 constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
 constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
-status                 str    as in measurements {ok, outlier, near_singularity, unsolved}
+status                 str    as in measurements {ok, outlier, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
 Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.

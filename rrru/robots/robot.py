@@ -195,6 +195,10 @@ class Robot(ABC):
         """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
         return 0.0
 
+    def own_base_moment(self, motion, poses):
+        """Moments (n, 3) in N mm about the origin of all that moves but for the platform; none here."""
+        return 0.0
+
     def drive_errors(self, twists):
         """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
         numbers = self.legs.site_numbers
