@@ -8,8 +8,8 @@ down, shifts by
 
 about and along the horizontal axes e_k of the robot's frame: a tilt c_k and a shift s_k per moment for each. The robot
 and everything that stands on the same body move as one, so that it is a twist of the world as an instrument on the
-floor sees it: reflectors on the table beside the robot show it plainly, and those on the tool together with them. Without
-reflectors on the table it is told from `drive_compliance` of the first joints by its pattern alone.
+floor sees it: reflectors on the table beside the robot show it plainly, together with those on the tool. Without them
+it is told from `drive_compliance` of the first joints by its pattern alone.
 
 Assumptions: linear spring; loads at rest, those of the commanded pose; the weight itself, which does not change, is
 part of where the robot stands.
