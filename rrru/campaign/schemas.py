@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from rrru.campaign.measurements import ON_PLATFORM, ON_WORLD
 from rrru.store.schema import Column, read_tables
 
 TABLES = read_tables("""
@@ -21,7 +22,8 @@ campaign               str    name of the campaign in the configuration
 One row per commanded point: what was commanded and what the instrument saw. After the commanded position stand the
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
-target_x_mm, its nominal place on the platform.
+target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
+world.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -112,6 +114,8 @@ def measurement_table(robot, names=()):
     for after, name, text in _MORE:
         more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", "_r" in name) for axis in "xyz"]
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
+    fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
+    more["measured_z_mm"].append(fixed_to)
     for after, added in more.items():
         at = [column.name for column in columns].index(after) + 1
         columns[at:at] = [column for column in added if column.name in names]
