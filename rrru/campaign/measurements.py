@@ -12,6 +12,10 @@ from rrru.robots.geometric_numbers import Reads
 from rrru.robots.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
+# rows kept for a test: no fit uses them, the robot was there nevertheless
+HELD_OUT = "held_out"
+# what a reflector is fixed to
+ON_PLATFORM, ON_WORLD = "platform", "world"
 
 
 def vectors(frame: pd.DataFrame, name: str) -> np.ndarray:
@@ -61,13 +65,22 @@ def readings(measurements: pd.DataFrame, arm_mm: float = np.nan) -> Readings | N
 
     arm_mm: see Readings.
     """
-    reflectors = place = None
+    reflectors = place = on_world = None
     if "target" in measurements:
         reflectors, place = sites(measurements["target"]).to_numpy(), vectors(measurements, "target")
+        on_world = on_the_world(measurements)
     elif not has_turns(measurements):
         return None
     turn = turns(measurements, "measured") if has_turns(measurements) else None
-    return Readings(measured(measurements), reflectors, place, turn, arm_mm)
+    return Readings(measured(measurements), reflectors, place, turn, arm_mm, on_world)
+
+
+def on_the_world(measurements: pd.DataFrame) -> np.ndarray | None:
+    """Rows (n,) of reflectors that are fixed to the world, not to the platform; None where no row is."""
+    if "target_on" not in measurements:
+        return None
+    result = (measurements["target_on"] == ON_WORLD).to_numpy()
+    return result if result.any() else None
 
 
 def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> Reads:
@@ -91,13 +104,19 @@ def series(measurements: pd.DataFrame) -> np.ndarray:
 
 
 def at_tool(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
-    """The table with the tool's positions alone: those of reflectors carried to it, as the nominal robot holds them."""
+    """The table with the tool's positions alone: those of reflectors carried to it, as the nominal robot holds them.
+
+    Without the rows of reflectors that it does not hold.
+    """
+    if (on_world := on_the_world(measurements)) is not None:
+        measurements = measurements[~on_world]
     measurements = measurements.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"], errors="ignore")
     if "target" not in measurements:
         return measurements
     poses, place = robot.solve(actuators(measurements, robot), command(measurements)), vectors(measurements, "target")
     offset = poses.point(place) - poses.point(place_on_platform(robot, robot.twists()))
-    plain = measurements.drop(columns=["target", *(f"target_{axis}_mm" for axis in "xyz")])
+    places = [f"target_{axis}_mm" for axis in "xyz"]
+    plain = measurements.drop(columns=["target", "target_on", *places], errors="ignore")
     return plain.assign(**vector_columns("measured", measured(measurements) - offset))
 
 
@@ -117,6 +136,15 @@ def usable(measurements: pd.DataFrame, use_near_singularity: bool = True) -> np.
     """Rows (n,) that fits may use: measured, no outlier and, if so asked, not near a singularity."""
     allowed = USED if use_near_singularity else USED[:1]
     return measurements["status"].isin(allowed).to_numpy() & np.isfinite(measured(measurements)).all(axis=1)
+
+
+def hold_out(measurements: pd.DataFrame, chosen: np.ndarray) -> pd.DataFrame:
+    """The table with status "held_out" where rows (n,) are chosen that a fit might use.
+
+    The rows stay: what a robot does at a stop depends on the one before it, whether that is fitted or not.
+    """
+    held = np.asarray(chosen, dtype=bool) & measurements["status"].isin(USED).to_numpy()
+    return measurements.assign(status=measurements["status"].where(~held, HELD_OUT))
 
 
 def direction(measurements: pd.DataFrame) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+from rrru.campaign.measurements import ON_PLATFORM, ON_WORLD
 from rrru.store.schema import Column, read_tables
 
 TABLES = read_tables("""
@@ -13,15 +14,16 @@ command_{xyz}_mm       float  commanded position, robot frame
 measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
 speed_mm_s             float? speed of the run; null where the file has none
 payload_kg             float? payload on the platform; null where the file has none
-status                 str    every point is kept; outlier and unsolved are left out of fits, near_singularity only
-    with use_near_singularity: false {ok, outlier, near_singularity, unsolved}
+status                 str    every point is kept; outlier, unsolved and held_out (kept for a test) are left out of
+    fits, near_singularity only with use_near_singularity: false {ok, outlier, near_singularity, unsolved, held_out}
 campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
 One row per commanded point: what was commanded and what the instrument saw. After the commanded position stand the
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
-target_x_mm, its nominal place on the platform.
+target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
+world.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -49,7 +51,7 @@ point                  int    as in measurements
 translational_measure  float  0 where the platform can move with locked drives
 constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
 constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
-status                 str    as in measurements {ok, outlier, near_singularity, unsolved}
+status                 str    as in measurements {ok, outlier, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
 Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.
@@ -112,6 +114,8 @@ def measurement_table(robot, names=()):
     for after, name, text in _MORE:
         more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", "_r" in name) for axis in "xyz"]
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
+    fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
+    more["measured_z_mm"].append(fixed_to)
     for after, added in more.items():
         at = [column.name for column in columns].index(after) + 1
         columns[at:at] = [column for column in added if column.name in names]

@@ -14,7 +14,8 @@ class Course:
 
     position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3), drive (n, K); path_drive (N, K): actuator values along
     everything that is driven, with rows path_index (n,); time_s, payload_kg: (n,); drive_motion: first and second
-    derivatives (n, K) of the actuator values, None where the positions tell them.
+    derivatives (n, K) of the actuator values, None where the positions tell them; stops: whether the robot stopped at
+    every point.
     """
 
     position_mm: np.ndarray
@@ -26,6 +27,7 @@ class Course:
     acceleration_mm_s2: np.ndarray
     payload_kg: np.ndarray
     drive_motion: tuple | None = None
+    stops: bool = False
 
 
 def make_motion(robot, masses, course):
@@ -60,4 +62,13 @@ def make_motion(robot, masses, course):
         drive_load=load.drive,
         follower_load=load.followers,
         across=load.across,
+        base_moment=load.base,
+        last_move=last_move(course.drive, course.path_index) if course.stops else np.full_like(rate, np.nan),
     )
+
+
+def last_move(drive, stop):
+    """How far drives (n, K) went to each row's stop from the one before, NaN at the first; stop (n,): never falling."""
+    values, number = np.asarray(drive, dtype=float), np.unique(stop, return_inverse=True)[1]
+    at_stop = values[np.unique(number, return_index=True)[1]]
+    return np.concatenate([np.full((1, values.shape[1]), np.nan), np.diff(at_stop, axis=0)])[number]

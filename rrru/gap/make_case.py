@@ -97,4 +97,5 @@ def _motion(measurements, mechanism, masses, actuators):
         good = np.flatnonzero(~lost)
         path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
     path_drive[told["path_index"]] = actuators
-    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, **told))
+    at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
+    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told))

@@ -78,6 +78,7 @@ class VirtualRobot:
             velocity_mm_s=np.concatenate([run.velocity_mm_s for run in plan.runs]),
             acceleration_mm_s2=np.concatenate([run.acceleration_mm_s2 for run in plan.runs]),
             payload_kg=np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
+            stops=not any(run.velocity_mm_s.any() for run in plan.runs),
         )
         return make_motion(self.mechanism, self.masses, course)
 

@@ -93,6 +93,10 @@ class AsRead(Robot):
         """The robot's own."""
         return self.robot.own_moments(*args)
 
+    def own_base_moment(self, *args):
+        """The robot's own."""
+        return self.robot.own_base_moment(*args)
+
 
 def _own(name):
     """A property that is the robot's own."""

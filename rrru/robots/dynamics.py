@@ -76,7 +76,7 @@ class Loads:
 
     drive (n, K): load on each drive in N mm or N, positive in the drive's sense; followers (n, f): on the joints that
     follow drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in their own
-    frames.
+    frames; base (n, 3): moments in N mm about the robot's origin.
     """
 
     member_n: np.ndarray
@@ -84,6 +84,7 @@ class Loads:
     drive: np.ndarray
     followers: np.ndarray
     across: np.ndarray
+    base: np.ndarray
 
 
 def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s2, payload_kg):
@@ -102,7 +103,8 @@ def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s
     numbers = {joint.name: joint.drive for joint in robot.legs.joints}
     followers = [numbers[one.site] for one in robot.parts.followers]
     across = _across(robot, at, force, motion)
-    return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers], across)
+    base = np.cross(at.point_mm, force) + robot.own_base_moment(motion, at.poses)
+    return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers], across, base)
 
 
 def _across(robot, at, force, motion):

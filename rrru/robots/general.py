@@ -17,7 +17,7 @@ from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import Legs, Parts
-from rrru.robots.lumps import driven_loads, moments
+from rrru.robots.lumps import base_moment, driven_loads, moments
 from rrru.robots.robot import Robot
 
 SETS = ("zero", "full")
@@ -222,6 +222,10 @@ class GeneralRobot(Robot):
     def own_moments(self, motion, poses, at_mm):
         """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
         return moments(self, motion, poses, gravity(self), at_mm) if self.lumps else 0.0
+
+    def own_base_moment(self, motion, poses):
+        """Moments (n, 3) in N mm of the robot's point masses about the origin."""
+        return base_moment(self, motion, poses, gravity(self)) if self.lumps else 0.0
 
     @property
     def workspace_lines(self):

@@ -103,6 +103,13 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     return result
 
 
+def base_moment(robot, motion, poses, gravity_mm_s2):
+    """Moments (n, 3) in N mm of a robot's masses about its origin; motion, poses as in `driven_loads`."""
+    robot, motion = _uncoupled(robot, motion)
+    force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
+    return np.cross(place, force).sum(axis=1)
+
+
 def _uncoupled(robot, motion):
     """The robot with all its driven values free, and a motion (values, rates, accelerations) of these."""
     motion = tuple(robot.legs.driven(part) for part in motion)

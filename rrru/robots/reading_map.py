@@ -21,11 +21,23 @@ class ReadingMap(TwistMap):
         super().__init__(robot.model, actuators, poses, twists, place_mm)
         self._robot, self._at, self._readings = robot, twists, readings
         self._world, self._tool = (robot.legs.site_numbers[site] for site in (WORLD, TOOL))
+        self._on_world = readings.on_world
+        if self._on_world is not None:
+            self.point_mm = np.where(self._on_world[:, None], place_mm, self.point_mm)
 
     @property
     def rows(self):
         """Pose (m,) of each row of what is read."""
         return self._readings.rows
+
+    @cached_property
+    def point(self):
+        """Motion (n, 3, rows) of the points that are read per unit of every constraint; see `TwistMap`."""
+        return self._of_platform(super().point)
+
+    def _of_platform(self, motion):
+        """Motion (n, 3, k) of the points, none of those that are fixed to the world."""
+        return motion if self._on_world is None else np.where(self._on_world[:, None, None], 0.0, motion)
 
     def response(self, site):
         """Motion (n, 3, 6) of the points that are read per twist at a site, in the site's frame."""
@@ -34,10 +46,13 @@ class ReadingMap(TwistMap):
             tool = self._at[:, self._tool, 3:]
             turning = np.cross(_EYE, turned_by(tool, lever)[:, None, :]).transpose(0, 2, 1)
             turn = self._in_world(self.poses.turn)
-            return np.concatenate([turn, turn @ turning @ self._own(self._tool, _EYE)], axis=2)
+            return self._of_platform(np.concatenate([turn, turn @ turning @ self._own(self._tool, _EYE)], axis=2))
         if site in self.closure.legs.reflectors:
             its = reflector_numbers(self.closure.legs, self._readings) == self.closure.legs.site_numbers[site]
-            turn = np.where(its[:, None, None], self._in_world(self.poses.turn), 0.0)
+            turn = self.poses.turn
+            if self._on_world is not None:
+                turn = np.where(self._on_world[:, None, None], _EYE, turn)
+            turn = np.where(its[:, None, None], self._in_world(turn), 0.0)
             return np.concatenate([turn, np.zeros_like(turn)], axis=2)
         return super().response(site)
 

@@ -21,7 +21,8 @@ class Readings:
 
     position_mm (n, 3); reflectors (n,): names of the sites of the reflectors read, and place_mm (n, 3): where on the
     platform they nominally sit, None where the tool itself was read; turn (n, 3, 3): orientations of the platform, NaN
-    where not read, None where none was; arm_mm: noise of the positions over that of the orientations, mm per rad.
+    where not read, None where none was; arm_mm: noise of the positions over that of the orientations, mm per rad;
+    on_world (n,): which reflectors are fixed to the world instead, with places in the robot's frame, None if none is.
     """
 
     position_mm: np.ndarray
@@ -29,6 +30,7 @@ class Readings:
     place_mm: np.ndarray | None = None
     turn: np.ndarray | None = None
     arm_mm: float = np.nan
+    on_world: np.ndarray | None = None
 
     def __len__(self):
         return len(self.position_mm)
@@ -55,14 +57,28 @@ class Readings:
 
 
 def place_on_platform(robot, twists, readings=None):
-    """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6)."""
+    """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
+
+    Of reflectors that are fixed to the world in the robot's.
+    """
     numbers, tool_mm = robot.legs.site_numbers, np.asarray(robot.tool_mm)
     tool = twists[:, numbers[TOOL]]
     if readings is None or readings.reflectors is None:
         return tool_mm + tool[:, :3]
     count = len(readings)
     own = np.broadcast_to(twists, (count, *twists.shape[1:]))[np.arange(count), reflector_numbers(robot.legs, readings)]
-    return tool_mm + turned_by(tool[:, 3:], readings.place_mm - tool_mm) + tool[:, :3] + own[:, :3]
+    on_tool = tool_mm + turned_by(tool[:, 3:], readings.place_mm - tool_mm) + tool[:, :3]
+    if readings.on_world is not None:
+        on_tool = np.where(readings.on_world[:, None], readings.place_mm, on_tool)
+    return on_tool + own[:, :3]
+
+
+def points_read(robot, poses, twists, readings=None):
+    """Positions (n, 3) of what is read at Poses, in the robot's frame, under twists (n or 1, sites, 6)."""
+    place = place_on_platform(robot, twists, readings)
+    if readings is None or readings.on_world is None:
+        return poses.point(place)
+    return np.where(readings.on_world[:, None], place, poses.point(place))
 
 
 def reflector_numbers(legs, readings):

@@ -14,7 +14,7 @@ from rrru.parameters import ParameterSet
 from rrru.robots.closure import Closure
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
-from rrru.robots.readings import place_on_platform, turned_by
+from rrru.robots.readings import place_on_platform, points_read, turned_by
 from rrru.robots.twist_map import TwistMap
 from rrru.robots.walk import Poses
 
@@ -122,7 +122,7 @@ class Robot(ABC):
 
         Of the tool, or of the reflectors of `rrru.robots.readings.Readings`.
         """
-        return into_frame(poses.point(place_on_platform(self, twists, readings)), twists[:, 0])
+        return into_frame(points_read(self, poses, twists, readings), twists[:, 0])
 
     def map(self, actuators, poses, twists=None, readings=None):
         """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6).
@@ -193,6 +193,10 @@ class Robot(ABC):
 
     def own_moments(self, motion, poses, at_mm):
         """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
+        return 0.0
+
+    def own_base_moment(self, motion, poses):
+        """Moments (n, 3) in N mm about the origin of all that moves but for the platform; none here."""
         return 0.0
 
     def drive_errors(self, twists):

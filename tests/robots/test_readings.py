@@ -24,15 +24,16 @@ def _poses(name, **reads):
     return robot.reading(Reads(tuple(_REFLECTORS), turned=True, **reads)), points, actuators
 
 
-def _predicted(robot, poses, twists, names, places):
+def _predicted(robot, poses, twists, names, places, on_world=None):
     """Positions (n, 3) and orientations (n, 3, 3), pose by pose in plain words."""
+    on_world = np.zeros(len(names), dtype=bool) if on_world is None else on_world
     numbers, positions, turns = robot.legs.site_numbers, [], []
     every = np.array(np.broadcast_to(twists, (len(names), *twists.shape[1:])))
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         world, tool, own = (every[k, numbers[site]] for site in (WORLD, TOOL, name))
         seat = np.asarray(robot.tool_mm)
         on_platform = seat + tool[:3] + Rotation.from_rotvec(tool[3:]).apply(place - seat) + own[:3]
-        in_base = poses.position_mm[k] + poses.turn[k] @ on_platform
+        in_base = place + own[:3] if on_world[k] else poses.position_mm[k] + poses.turn[k] @ on_platform
         positions.append(Rotation.from_rotvec(world[3:]).apply(in_base) + world[:3])
         turned = Rotation.from_rotvec(world[3:]) * Rotation.from_matrix(poses.turn[k]) * Rotation.from_rotvec(tool[3:])
         turns.append(turned.as_matrix())
@@ -47,22 +48,27 @@ def _reflectors(count):
 
 @pytest.fixture(params=["hexapod", "arm", "rrru3", "delta"])
 def setting(request):
-    """A robot, readings off by millimetres and milliradians at every other pose, actuator values, twists and poses."""
+    """A robot, readings off by millimetres and milliradians at every other pose, actuator values, twists and poses.
+
+    Ball c stands on the table.
+    """
     robot, points, actuators = _poses(request.param)
     generator = np.random.default_rng(2)
     twists = generator.normal(size=(len(points), len(robot.legs.sites), 6)) * np.repeat([0.3, 2e-3], 3)
     poses = robot.solve(actuators, points, twists)
     names, places = _reflectors(len(points))
-    position, turn = _predicted(robot, poses, twists, names, places)
+    table = names == "ball c"
+    position, turn = _predicted(robot, poses, twists, names, places, table)
     turn = Rotation.from_rotvec(generator.normal(size=(len(points), 3)) * 3e-3).as_matrix() @ turn
     turn[::2] = np.nan
-    readings = Readings(position + generator.normal(size=position.shape), names, places, turn, _ARM_MM)
+    readings = Readings(position + generator.normal(size=position.shape), names, places, turn, _ARM_MM, table)
     return robot, readings, actuators, twists, poses
 
 
 def test_what_is_lacking_is_read_minus_predicted(setting):
     robot, readings, _, twists, poses = setting
-    position, turn = _predicted(robot, poses, twists, readings.reflectors, readings.place_mm)
+    own = readings.reflectors, readings.place_mm, readings.on_world
+    position, turn = _predicted(robot, poses, twists, *own)
     result = lacking(robot, readings, poses, twists)
     np.testing.assert_allclose(result[:100], readings.position_mm - position, rtol=0.0, atol=1e-9)
     odd = np.arange(1, 100, 2)

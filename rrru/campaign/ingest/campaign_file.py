@@ -38,7 +38,8 @@ class IngestSpec:
     "inch"; speeds are mm/s, payloads kg). angle_unit: "rad" or "deg". frame: of the measured positions; "register"
     solves the six numbers between it and the robot frame from `registration_points`, pairs (run, point), none for all.
     extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
-    places of reflectors on the platform in mm, by name; others are found from the file.
+    places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
+    that stand beside the robot, their places in its frame.
     """
 
     path: str
@@ -50,6 +51,7 @@ class IngestSpec:
     extra_columns: str = "refuse"
     elbow: str = "out"
     targets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    world_targets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
@@ -71,7 +73,8 @@ class IngestSpec:
         given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
         points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
         places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
-        return cls(section["ingest"], registration_points=points, targets=places, **given)
+        beside = tuple(given.pop("world_targets", ()))
+        return cls(section["ingest"], registration_points=points, targets=places, world_targets=beside, **given)
 
 
 @dataclass(frozen=True)
@@ -175,7 +178,9 @@ def _table(
     """Frame in the form of the schema of measurements, and notes on what is strange and on outliers."""
     frame, drives = at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
-    notes, outlier = doubts(frame, sheet.mechanism), outliers(frame, digit_mm)
+    wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
+    blank = vector_columns("measured", np.where(wrong[:, None], np.nan, measured(frame)))
+    notes, outlier = doubts(frame, sheet.mechanism), outliers(frame.assign(**blank), digit_mm) | wrong
     told = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
         told |= turn_columns("command", sheet.poses.turn)
@@ -190,6 +195,6 @@ def _table(
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    extra = [name for name in (*TURNS["command"], *TURNS["measured"], "target", *TARGET) if name in frame]
+    extra = [name for name in (*TURNS["command"], *TURNS["measured"], "target", *TARGET, "target_on") if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes

@@ -35,6 +35,8 @@ def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> R
         sheet.note("registration", None, value, f"points of the file: runs 1 to {frame['run'].max():g}")
     sheet.problems.refuse()
     chosen = np.array([not wanted or pair in wanted for pair in pairs])
+    if mounted:
+        chosen &= mounted.framing
     try:
         first = register(seen[chosen], target[chosen])
         moved = frame.assign(**vector_columns("measured", first.apply(seen) - offset))
@@ -43,7 +45,7 @@ def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> R
     except FitError as error:
         value, _, allowed = str(error).partition("; allowed: ")
         sheet.refuse_now(None, f"registration points: {value}", allowed)
-    if mirrored := _off_as_mirrored(seen, target):
+    if mirrored := _off_as_mirrored(seen[chosen], target[chosen]):
         value = (
             f"positions in a left-handed frame ({mirrored:.6g} mm rms off when registered, a fifth of that if mirrored)"
         )

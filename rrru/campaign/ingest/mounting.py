@@ -1,11 +1,6 @@
-"""Where the reflectors of a file sit on the platform, stated or found from the file. Lengths in mm, angles in rad.
+"""Where the reflectors of a file sit on the platform or beside the robot, stated or found from the file.
 
-With the robot's nominal poses, centre p_i and orientation R_i, a reflector at c on the platform is read at m_i,
-
-    Q m_i + s = p_i + R_i c
-
-with the rotation Q and shift s of the instrument's frame (identity where it is the robot's). The equations are linear
-in s, c and, its orthogonality aside, Q; from that start c and the rigid motion are fitted in turn.
+The poses are the robot's nominal ones, or those of the zeros that its drives have lost. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass
@@ -14,13 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.registration import register
+from rrru.campaign.driven_path import stops
+from rrru.campaign.ingest.bodies import strays
+from rrru.campaign.ingest.frames import Frames
+from rrru.campaign.ingest.mastering import lost_zeros
 from rrru.campaign.ingest.sheet import TURNS, position_text
-from rrru.errors import FitError
+from rrru.robots.readings import Readings
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
-_TURNS, _STILL_MM = 300, 1e-9
 # orientations that differ by less are the same
 _NEVER_TURNS = 1e-6
 # ASSUME no platform is off by more than this where the file's frame is the robot's
@@ -29,19 +26,32 @@ _MOST_TURNED_RAD = 0.2
 
 @dataclass(frozen=True)
 class Mounting:
-    """names (n,) of the reflectors, place_mm (n, 3): theirs on the platform; offset_mm (n, 3): from the tool, in the
-    robot's frame; turn (3, 3): from the platform to what is read as its orientation; notes: what was found.
+    """names (n,) of the reflectors, None where the tool itself is read; place_mm (n, 3): theirs on the platform, or in
+    the robot's frame where on_world (n,) says so; offset_mm (n, 3): where they are as seen from the commanded position,
+    in the robot's frame, with the zeros that its drives were found to have; turn (3, 3): from the platform to what is
+    read as its orientation; strays (n,): rows that are no reading of that reflector; notes: what was found.
     """
 
-    names: np.ndarray
+    names: np.ndarray | None
     place_mm: np.ndarray
+    on_world: np.ndarray
     offset_mm: np.ndarray
     turn: np.ndarray
+    strays: np.ndarray
     notes: tuple
+
+    @property
+    def framing(self):
+        """Rows (n,) that tell where the instrument stands."""
+        return ~self.strays & ~self.on_world
 
     def columns(self, frame, rotation):
         """Columns of a measurement table; rotation (3, 3): of the instrument's frame into the robot's."""
+        if self.names is None:
+            return {}
         result = {"target": self.names.astype(str), **rows.vector_columns("target", self.place_mm)}
+        if self.on_world.any():
+            result["target_on"] = np.where(self.on_world, rows.ON_WORLD, rows.ON_PLATFORM)
         if set(TURNS["measured"]) <= set(frame):
             turns = rotation @ rows.turns(frame, "measured") @ self.turn.T
             result |= rows.turn_columns("measured", turns)
@@ -49,21 +59,28 @@ class Mounting:
 
 
 def mounting(sheet):
-    """The Mounting of a sheet without problems, None where the tool itself is read in the robot's frame."""
+    """The Mounting of a sheet without problems, None where the tool itself is read of a robot that knows its zeros."""
     frame, registered = sheet.frame, sheet.spec.frame == "register"
-    turned = set(TURNS["measured"]) <= set(frame)
-    if "target" not in frame and not (turned and registered):
+    turned, told = set(TURNS["measured"]) <= set(frame), set(sheet.drives) <= set(frame)
+    named = "target" in frame or (turned and registered)
+    if not named and not (told and registered):
         return None
-    names = frame["target"].to_numpy() if "target" in frame else np.full(len(frame), _UNNAMED)
-    poses, seen = sheet.poses, rows.measured(frame)
+    poses, command = sheet.poses, rows.command(frame)
     if not poses.closed.all():
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
-    stated = _known(sheet, names)
-    rotation, place = _fitted(poses, seen, names, stated, registered)
-    if registered and np.isnan(stated).all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
+    frames, notes = _frames(sheet, named)
+    zeros = _zeros(sheet, frames, command) if told else np.zeros(len(sheet.drives))
+    if zeros.any():
+        poses = sheet.mechanism.solve(sheet.actuators(command) + zeros, command)
+        notes += (_in_words(sheet.mechanism.parts, zeros),)
+    elif not named:
+        return None
+    rotation, place = frames.fitted(poses)
+    free = ~frames.known & ~frames.on_world
+    if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
         # a platform that never turns does not tell them from the frame's shift: they lie about the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
-    turn, notes = np.eye(3), _found(sheet, names, place)
+    turn, notes = np.eye(3), notes + (_found(sheet, frames, place) if named else ())
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         if registered:
@@ -72,8 +89,43 @@ def mounting(sheet):
         else:
             _check_turned(sheet, turn)
             turn = np.eye(3)
-    tool = poses.point(np.asarray(sheet.mechanism.tool_mm))
-    return Mounting(names, place, poses.point(place) - tool, turn, notes)
+    seen_from = poses.point(np.asarray(sheet.mechanism.tool_mm)) if not zeros.any() else command
+    offset = frames.carriers(poses).point(place) - seen_from
+    return Mounting(frames.names if named else None, place, frames.on_world, offset, turn, ~frames.right, notes)
+
+
+def _frames(sheet, named):
+    """The Frames of a sheet, and notes on readings that are none of their reflector."""
+    frame, seen = sheet.frame, rows.measured(sheet.frame)
+    names = frame["target"].to_numpy() if "target" in frame else np.full(len(frame), _UNNAMED)
+    on_world, right, notes = np.isin(names, sheet.spec.world_targets), np.ones(len(frame), dtype=bool), ()
+    if "target" in frame:
+        wrong, texts = strays(seen, stops(frame), names, on_world)
+        right = ~wrong
+        at = frame[["run", "point"]].to_numpy()
+        notes = tuple(f"run {at[k, 0]:g} point {at[k, 1]:g}: {text}" for k, text in texts.items())
+    stated = (
+        _known(sheet, names) if named else np.tile(np.asarray(sheet.mechanism.tool_mm, dtype=float), (len(frame), 1))
+    )
+    return Frames(seen, names, stated, on_world, right, sheet.spec.frame == "register"), notes
+
+
+def _zeros(sheet, frames, command):
+    """Zeros (K,) that the drives have lost, see `rrru.campaign.ingest.mastering`."""
+    chosen = frames.telling
+    seen = Readings(frames.seen_mm, frames.names, frames.place_mm, on_world=frames.on_world).of(chosen)
+    told = frames.of(chosen)
+    return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, told.framed)
+
+
+def _in_words(parts, zeros):
+    """A note on zeros (K,) of the drives."""
+    sizes = {"rad": "{:.3g} degrees", "mm": "{:.3g} mm"}
+    shown = [np.degrees(zero) if unit == "rad" else zero for zero, unit in zip(zeros, parts.units, strict=True)]
+    worst = int(np.argmax(np.abs(zeros) / np.abs(zeros).max()))
+    most = sizes[parts.units[worst]].format(abs(shown[worst]))
+    drive = parts.columns[worst].rpartition("_")[0]
+    return f"zeros of the drives are lost, by {most} at {drive}: found with the frame, fitted by the calibration"
 
 
 def check_turned(sheet):
@@ -101,61 +153,15 @@ def _known(sheet, names):
     return np.array([stated.get(name, nowhere) for name in names], dtype=float)
 
 
-def _found(sheet, names, place):
+def _found(sheet, frames, place):
     """Notes on the places that were found."""
-    found = [name for name in dict.fromkeys(names.tolist()) if name not in sheet.spec.targets]
-    return tuple(
-        f"reflector {name} found at {position_text(place[names == name][0])} on the platform" for name in found
-    )
-
-
-def _fitted(poses, seen, names, place, registered):
-    """Rotation (3, 3) of the instrument's frame, and all places (n, 3)."""
-    known = np.isfinite(place).all(axis=1)
-    if not registered:
-        return np.eye(3), _placed(poses, seen, names, place, known)
-    rotation, shift, place = _linear(poses, seen, names, place, known)
-    for _ in range(_TURNS):
-        moved = _placed(poses, seen @ rotation.T + shift, names, place, known)
-        still = np.abs(moved - place).max() < _STILL_MM
-        place = moved
-        try:
-            found = register(seen, poses.point(place))
-        except FitError:
-            break
-        rotation, shift = found.rotation, found.translation
-        if still:
-            break
-    return rotation, place
-
-
-def _placed(poses, seen, names, place, known):
-    """Places (n, 3): those known, and of the others the medians of where they are seen, in the robot's frame."""
-    result = place.copy()
-    own = np.einsum("nji,nj->ni", poses.turn, seen - poses.position_mm)
-    for name in dict.fromkeys(names[~known].tolist()):
-        result[names == name] = np.median(own[names == name], axis=0)
-    return result
-
-
-def _linear(poses, seen, names, place, known):
-    """Start of `_fitted`: least squares of the linear equations, the matrix of them made a rotation."""
-    unknown = list(dict.fromkeys(names[~known].tolist()))
-    count = len(seen)
-    columns = np.zeros((count, 3, 12 + 3 * len(unknown)))
-    for axis in range(3):
-        columns[:, axis, 3 * axis : 3 * axis + 3], columns[:, axis, 9 + axis] = seen, 1.0
-    for k, name in enumerate(unknown):
-        columns[names == name, :, 12 + 3 * k : 15 + 3 * k] = -poses.turn[names == name]
-    aim = np.where(known[:, None], poses.point(np.nan_to_num(place)), poses.position_mm)
-    scale = np.abs(columns).max(axis=(0, 1)) + 1e-12
-    numbers = np.linalg.lstsq((columns / scale).reshape(3 * count, -1), aim.ravel(), rcond=1e-6)[0] / scale
-    u, _, vt = np.linalg.svd(numbers[:9].reshape(3, 3))
-    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    place = np.where(known[:, None], place, 0.0)
-    for k, name in enumerate(unknown):
-        place[names == name] = numbers[12 + 3 * k : 15 + 3 * k]
-    return rotation, (poses.point(place) - seen @ rotation.T).mean(axis=0), place
+    result = []
+    for name in dict.fromkeys(frames.names.tolist()):
+        k = int(np.argmax(frames.names == name))
+        where = "beside the robot" if frames.on_world[k] else "on the platform"
+        if name not in sheet.spec.targets:
+            result.append(f"reflector {name} found at {position_text(place[k])} {where}")
+    return tuple(result)
 
 
 def _between(poses, turns, rotation):

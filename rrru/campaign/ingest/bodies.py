@@ -1,0 +1,78 @@
+"""Reflectors that the instrument took for others: found by distances on one body, which need no kinematics.
+
+Reflectors on the tool keep their distances from each other, whatever the robot does; those on the table keep their
+places in the instrument's frame. A reflector that is off from most of its body's others was taken for another one, or
+was never there. Of two that disagree nobody can tell which one is right: both are marked. Lengths in mm.
+"""
+
+import numpy as np
+
+# ASSUME no body bends by a millimetre, and reflectors are further apart than that
+_FAR_MM = 1.0
+# a distance this many robust deviations off is wrong
+_OUTLYING = 8.0
+# a body on which more than this share is off is none: its reflectors move against each other
+_MOST = 0.2
+
+
+def strays(position_mm, stop, names, on_world):
+    """Which of n readings (n, 3) at stops (n,) are no reading of the reflector of that name, and what they are.
+
+    names (n,); on_world (n,): which reflectors are fixed to the world. Returns (marked (n,), texts by row's number),
+    such as "base3 lies 210 mm away, where base1 is".
+    """
+    every, number = np.unique(np.asarray(names, dtype=str), return_inverse=True)
+    at = np.unique(stop, return_inverse=True)[1]
+    grid = np.full((at.max() + 1, len(every), 3), np.nan)
+    grid[at, number] = position_mm
+    fixed = np.array([np.asarray(on_world)[number == k].any() for k in range(len(every))])
+    marked, places = np.zeros(len(at), dtype=bool), np.where(fixed[:, None], np.nanmedian(grid, axis=0), np.nan)
+    wrong = _moved(grid, places) | _apart(grid, np.flatnonzero(~fixed))
+    marked = wrong[at, number]
+    texts = {}
+    for row in np.flatnonzero(marked):
+        others = np.where(fixed[:, None], places, np.where(wrong[at[row], :, None], np.nan, grid[at[row]]))
+        texts[int(row)] = _text(every, number[row], position_mm[row], others, grid)
+    return marked, texts
+
+
+def _moved(grid, places):
+    """Readings (stops, r) that are not where their reflectors stand, places (r, 3), NaN where these move."""
+    off = np.linalg.norm(grid - places, axis=2)
+    wrong = np.zeros(off.shape, dtype=bool)
+    for k in np.flatnonzero(np.isfinite(places).all(axis=1)):
+        wrong[:, k] = _outlying(off[:, k])
+    return wrong
+
+
+def _apart(grid, body):
+    """Readings (stops, r) of the reflectors of a body, by number, that are off from most of its others."""
+    wrong = np.zeros(grid.shape[:2], dtype=bool)
+    if len(body) < 2:
+        return wrong
+    distance = np.linalg.norm(grid[:, body, None] - grid[:, None, body], axis=3)
+    off = np.abs(distance - np.nanmedian(distance, axis=0))
+    bad, seen = np.zeros(off.shape, dtype=bool), np.isfinite(off)
+    for first, second in zip(*np.triu_indices(len(body), 1), strict=True):
+        bad[:, first, second] = bad[:, second, first] = _outlying(off[:, first, second])
+    companions = seen.sum(axis=2) - seen[:, range(len(body)), range(len(body))]
+    wrong[:, body] = (companions > 0) & (2 * bad.sum(axis=2) > companions)
+    return wrong
+
+
+def _outlying(off):
+    """Which distances (stops,) from what is usual, NaN where not known, are gross; none where many are."""
+    wrong = off > max(_FAR_MM, _OUTLYING * 1.4826 * float(np.nanmedian(off)))
+    return wrong if wrong.mean() <= _MOST else np.zeros(len(off), dtype=bool)
+
+
+def _text(names, own, position, others, grid):
+    """What a reading of a reflector, by number, is; others (r, 3): where all reflectors are, NaN where unknown."""
+    away = np.linalg.norm(others - position, axis=1)
+    near = int(np.nanargmin(np.where(np.arange(len(names)) == own, np.inf, np.nan_to_num(away, nan=np.inf))))
+    if away[near] < _FAR_MM:
+        far = np.nanmedian(np.linalg.norm(grid[:, own] - grid[:, near], axis=1))
+        return f"{names[own]} lies {far:.3g} mm away, where {names[near]} is"
+    if np.isfinite(away[own]):
+        return f"{names[own]} lies {away[own]:.3g} mm away"
+    return f"{names[own]} does not keep its distance from the others"

@@ -1,0 +1,116 @@
+"""Where the instrument and the reflectors stand, from readings of known poses. Lengths in mm, angles in rad.
+
+With poses, centre p_i and orientation R_i of what carries a reflector, one at c on it is read at m_i,
+
+    Q m_i + s = p_i + R_i c
+
+with the rotation Q and shift s of the instrument's frame (identity where it is the robot's). The equations are linear
+in s, c and, its orthogonality aside, Q; from that start c and the rigid motion are fitted in turn. A reflector that is
+fixed to the world is carried by the robot's frame; where its place is not known it tells nothing of the instrument's.
+"""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from rrru.campaign.ingest.mastering import Framed
+from rrru.campaign.ingest.registration import register
+from rrru.errors import FitError
+
+_TURNS, _STILL_MM = 300, 1e-9
+
+
+@dataclass(frozen=True)
+class Frames:
+    """What is read, whatever the poses.
+
+    seen_mm (n, 3): readings in the instrument's frame; names (n,) of the reflectors; place_mm (n, 3): known places of
+    these, NaN where nobody knows; on_world (n,): which are fixed to the world; right (n,): which are readings at all;
+    registered: whether the instrument's frame is its own.
+    """
+
+    seen_mm: np.ndarray
+    names: np.ndarray
+    place_mm: np.ndarray
+    on_world: np.ndarray
+    right: np.ndarray
+    registered: bool
+
+    def of(self, rows):
+        """What is read in some rows."""
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Frames(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
+
+    @property
+    def known(self):
+        """Rows (n,) whose places are known."""
+        return np.isfinite(self.place_mm).all(axis=1)
+
+    @property
+    def telling(self):
+        """Rows (n,) that tell where the instrument stands."""
+        return self.right & (self.known | ~self.on_world)
+
+    def carriers(self, poses):
+        """Poses (n) of what carries each reflector."""
+        centre = np.where(self.on_world[:, None], 0.0, poses.position_mm)
+        return replace(poses, position_mm=centre, turn=np.where(self.on_world[:, None, None], np.eye(3), poses.turn))
+
+    def fitted(self, poses):
+        """Rotation (3, 3) of the instrument's frame, and all places (n, 3), from Poses (n)."""
+        carriers = self.carriers(poses)
+        if not self.registered:
+            return np.eye(3), self._placed(carriers, self.seen_mm)
+        rotation, shift = self._linear(carriers)
+        place, telling = np.full(self.seen_mm.shape, np.inf), self.telling
+        for _ in range(_TURNS):
+            moved = self._placed(carriers, self.seen_mm @ rotation.T + shift)
+            still = np.abs(moved - place).max() < _STILL_MM
+            place = moved
+            try:
+                found = register(self.seen_mm[telling], carriers.point(place)[telling])
+            except FitError:
+                break
+            rotation, shift = found.rotation, found.translation
+            if still:
+                break
+        return rotation, place
+
+    def framed(self, poses):
+        """The Framed of Poses (n), of the rows that tell something."""
+        rotation, place = self.fitted(poses)
+        model, turned, rows = self.carriers(poses).point(place), self.seen_mm @ rotation.T, self.telling
+        shift = np.median(model[rows] - turned[rows], axis=0) if self.registered else 0.0
+        unknown = tuple(dict.fromkeys(self.names[~self.known & rows].tolist()))
+        return Framed((turned + shift)[rows], model[rows], place[rows], unknown)
+
+    def _placed(self, carriers, seen_mm):
+        """Places (n, 3): those known, and of the others the medians of where they are seen, in the robot's frame."""
+        result, known = self.place_mm.copy(), self.known
+        own = np.einsum("nji,nj->ni", carriers.turn, seen_mm - carriers.position_mm)
+        for name in dict.fromkeys(self.names[~known].tolist()):
+            its = self.names == name
+            result[its] = np.median(own[its & self.right] if (its & self.right).any() else own[its], axis=0)
+        return result
+
+    def _linear(self, carriers):
+        """Start of `fitted`: least squares of the linear equations, the matrix of them made a rotation."""
+        rows = self.telling
+        carriers, seen, names, place = carriers.of(rows), self.seen_mm[rows], self.names[rows], self.place_mm[rows]
+        known = np.isfinite(place).all(axis=1)
+        unknown = list(dict.fromkeys(names[~known].tolist()))
+        count = len(seen)
+        columns = np.zeros((count, 3, 12 + 3 * len(unknown)))
+        for axis in range(3):
+            columns[:, axis, 3 * axis : 3 * axis + 3], columns[:, axis, 9 + axis] = seen, 1.0
+        for k, name in enumerate(unknown):
+            columns[names == name, :, 12 + 3 * k : 15 + 3 * k] = -carriers.turn[names == name]
+        aim = np.where(known[:, None], carriers.point(np.nan_to_num(place)), carriers.position_mm)
+        scale = np.abs(columns).max(axis=(0, 1)) + 1e-12
+        numbers = np.linalg.lstsq((columns / scale).reshape(3 * count, -1), aim.ravel(), rcond=1e-6)[0] / scale
+        u, _, vt = np.linalg.svd(numbers[:9].reshape(3, 3))
+        rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        place = np.where(known[:, None], place, 0.0)
+        for k, name in enumerate(unknown):
+            place[names == name] = numbers[12 + 3 * k : 15 + 3 * k]
+        return rotation, (carriers.point(place) - seen @ rotation.T).mean(axis=0)

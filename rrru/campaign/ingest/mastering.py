@@ -1,0 +1,108 @@
+"""Zeros of the drives that are lost: found together with frame and reflectors, where these alone leave far too much.
+
+A robot whose mastering is lost is off by tens of millimetres, so that a frame fitted with the nominal drives is wrong
+and good points look like outliers. Where frame and places of reflectors leave a large residual, the drives' zeros are
+fitted with them, from the nominal ones and, where that does not end well, from others; for each start the frame comes
+first. What a frame or a reflector imitates, such as the first drive of an arm, stays nominal. Lengths in mm, angles
+in rad.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, open_numbers
+from rrru.robots.readings import lacking
+
+# a residual above this share of the robot's size is none of its geometry; one this much smaller explains it
+LOST_SHARE, _EXPLAINED = 2e-3, 0.5
+# other starts, drawn so far from the nominal zeros; a fit this good needs no other
+_STARTS, _SPREAD, _ENOUGH = 16, {"rad": 0.4, "mm": 80.0}, 0.1
+# residual from which on a reading counts less
+_LOOSE_MM = 5.0
+# what counts where a pose is lost
+_LOST_MM = 1e4
+# share of a drive's zero that poses must leave beside frame and reflectors
+_LEAST = 1e-2
+
+
+def lost_zeros(robot, driven, seen, frames):
+    """Offsets (K,) of the actuator values that explain what frames leave; zero where they explain nothing.
+
+    driven: actuator values (n, K) and nominal positions (n, 3); seen: Readings in the instrument's frame; frames: from
+    Poses to a Framed.
+    """
+    units, nothing = robot.parts.units, np.zeros(len(robot.parts.drives))
+    least_mm, before = LOST_SHARE * robot.size_mm, _off(robot, driven, frames, nothing)
+    if before <= least_mm:
+        return nothing
+    generator, best, least = np.random.default_rng(0), nothing, before
+    spread = np.array([_SPREAD[unit] for unit in units])
+    for start in range(_STARTS):
+        first = nothing if start == 0 else spread * generator.uniform(-1.0, 1.0, len(units))
+        found = _fitted(robot, driven, seen, frames, first)
+        left = np.inf if found is None else _off(robot, driven, frames, found)
+        if left < least:
+            best, least = found, left
+        if least <= max(_ENOUGH * before, least_mm):
+            break
+    return best if least < _EXPLAINED * before else nothing
+
+
+@dataclass(frozen=True)
+class Framed:
+    """What a frame makes of poses: readings (n, 3) in the robot's frame, the model's (n, 3), places (n, 3) of what was
+    read, and names of the reflectors whose places are not known.
+    """
+
+    position_mm: np.ndarray
+    model_mm: np.ndarray
+    place_mm: np.ndarray
+    unknown: tuple
+
+    @property
+    def off_mm(self):
+        """Median distance of the readings from the model."""
+        return float(np.median(np.linalg.norm(self.position_mm - self.model_mm, axis=1)))
+
+
+def _off(robot, driven, frames, zeros):
+    """Median distance in mm that frames leave at other zeros (K,) of the drives; inf where a pose is lost."""
+    poses = robot.solve(driven[0] + zeros, driven[1])
+    return frames(poses).off_mm if poses.closed.all() else np.inf
+
+
+def _fitted(robot, driven, seen, frames, zeros):
+    """Zeros (K,) fitted with frame and reflectors from a start, None where a pose is lost."""
+    values, near = driven[0] + zeros, driven[1]
+    poses = robot.solve(values, near)
+    if not poses.closed.all():
+        return None
+    framed = frames(poses)
+    reads = Reads(tuple(dict.fromkeys(seen.reflectors.tolist())), framed.unknown, frame=True)
+    robot = robot.reading(reads)
+    readings = replace(seen, position_mm=framed.position_mm, place_mm=framed.place_mm)
+    # frame and reflectors first: the drives are what is left
+    opened = open_numbers(reads)
+    numbers = (*opened, *candidates_of(robot.legs, robot.parts)[: len(robot.parts.drives)])
+    scale = np.array([1.0 if one.unit == "mm" else 1.0 / robot.angle_arm_mm for one in numbers])
+    directions = scale * np.stack([direction(robot.legs, one) for one in numbers], axis=-1)
+    columns = robot.map(values, poses, robot.twists(), readings).columns(directions)
+    chosen, _ = choose(columns.reshape(-1, len(numbers)), [True] * len(numbers), _LEAST)
+    directions = directions[..., chosen]
+
+    def residual(sizes):
+        twists = (directions @ sizes)[None]
+        left = lacking(robot, readings, robot.solve(values, near, twists), twists)
+        return np.where(np.isfinite(left), left, _LOST_MM).ravel()
+
+    def slope(sizes):
+        twists = (directions @ sizes)[None]
+        at = robot.map(values, robot.solve(values, near, twists), twists, readings)
+        return -np.nan_to_num(at.columns(directions)).reshape(-1, len(chosen))
+
+    solution = least_squares(residual, np.zeros(len(chosen)), jac=slope, loss="soft_l1", f_scale=_LOOSE_MM)
+    sizes = np.zeros(len(numbers))
+    sizes[chosen] = solution.x * scale[chosen]
+    return zeros + sizes[len(opened) :]
