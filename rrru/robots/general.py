@@ -16,6 +16,7 @@ from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
+from rrru.robots.hands import ends_of, nearest_end
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import driven_loads, moments
 from rrru.robots.robot import Robot
@@ -108,7 +109,7 @@ class GeneralRobot(Robot):
             return actuators[known], position[known]
         low, high = np.asarray(self.drive_range, dtype=float).T
         actuators = low + (high - low) * generator.random((_POSES, len(low)))
-        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
+        return actuators, self.guess(actuators, [name for name, *_ in self.legs.hands] * _POSES)
 
     @cached_property
     def parameters(self):
@@ -245,8 +246,17 @@ class GeneralRobot(Robot):
         both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
         return int(position_rank), int(both - position_rank)
 
+    def guess(self, actuators, targets=None):
+        """See Robot; of several hands the first, or those that carry the targets, where they are."""
+        return ends_of(self, actuators, targets) if self.legs.hands else super().guess(actuators, targets)
+
     def near(self, position_mm, actuators):
-        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones."""
+        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones.
+
+        Of several hands the one that nominally is nearest.
+        """
+        if self.legs.hands:
+            return nearest_end(self, position_mm, np.asarray(actuators, dtype=float))
         for leg in self.legs.legs:
             if not leg.bar and not any(joint.passive for joint in leg.joints):
                 return end_of(self.legs, leg, np.asarray(actuators, dtype=float))
