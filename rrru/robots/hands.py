@@ -12,11 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.drive_step import end_of
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.walk import Poses, Twists, walk, walks
 
 _EYE = np.eye(6)
+# point masses of two arms' descriptions are the same within this
+_SAME_MM = 1e-6
 
 
 class Ends:
@@ -99,31 +100,48 @@ def with_hands(arms, shared, carried=None):
         raise ConfigError(f"robot {first.name}: targets {', '.join(every)}; allowed: one or more a hand, of their own")
     arms = {name: _apart(arm, name, shared) for name, arm in arms.items()}
     chains, order = _chains(arms, shared, first.name)
-    columns = list(dict.fromkeys(column for arm in arms.values() for column in arm.parts.columns))
-    owners = [next((arm, arm.parts.columns.index(c)) for arm in arms.values() if c in arm.parts.columns) for c in columns]
-    drives = []
-    for column in columns:
-        same = [one for arm in arms.values() for one in arm.parts.drives if one.column == column]
-        drives.append(replace(same[0], others={site: by for one in same for site, by in one.others.items()}))
+    drives, ranges, home = _drives(arms.values())
     followers = {one.site: one for arm in arms.values() for one in arm.parts.followers}
-    trunk, lumps = _names(first)[:shared], []
-    for arm in arms.values():
-        lumps += [lump for lump in arm.lumps if not lumps or lump.joint not in trunk]
-    legs = Legs(
-        chains,
-        np.array([arm.legs.home_drives[k] for arm, k in owners]),
-        first.legs.home_mm,
-        first.legs.home_turn,
-        coupling=_coupling(arms, order, columns),
-        hands=hands,
-    )
+    coupling = _coupling(arms.values(), order, list(drives))
     return replace(
         first,
-        legs=legs,
-        parts=Parts(drives=tuple(drives), followers=tuple(followers.values())),
-        drive_range=np.array([arm.drive_range[k] for arm, k in owners]),
-        lumps=tuple(lumps),
+        legs=Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
+        parts=Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
+        drive_range=ranges,
+        lumps=_lumps([*arms.values()], shared),
     )
+
+
+def _drives(arms):
+    """Drives by column of all arms, with all that follows them in any, their ranges (K, 2) and home values (K,)."""
+    drives, ranges, homes = {}, {}, {}
+    for arm in arms:
+        for drive, own, home in zip(arm.parts.drives, arm.drive_range, arm.legs.home_drives, strict=True):
+            known = drives.get(drive.column, drive)
+            drives[drive.column] = replace(known, others=known.others | drive.others)
+            ranges.setdefault(drive.column, own)
+            homes.setdefault(drive.column, home)
+    return drives, np.array([*ranges.values()]), np.array([*homes.values()])
+
+
+def shared_joints(arms):
+    """Number of joints up to which arms by name have the same names, the base's frame among them."""
+    chains = zip(*(_names(arm) for arm in arms.values()), strict=False)
+    return next((number for number, names in enumerate(chains) if len(set(names)) > 1), 0)
+
+
+def _lumps(arms, shared):
+    """The point masses of arms: of the trunk those that all have there, as one may count another arm to its trunk."""
+    first, *others = arms
+    trunk = set(_names(first)[:shared])
+    common = [one for one in first.lumps if one.joint in trunk and all(_has(arm, one) for arm in others)]
+    return (*common, *(lump for arm in arms for lump in arm.lumps if lump.joint not in trunk))
+
+
+def _has(arm, lump):
+    """Whether an arm has a point mass."""
+    alike = (one for one in arm.lumps if (one.joint, one.mass_kg) == (lump.joint, lump.mass_kg))
+    return any(np.allclose(one.at_mm, lump.at_mm, rtol=0.0, atol=_SAME_MM) for one in alike)
 
 
 def _names(arm):
@@ -163,7 +181,7 @@ def _chains(arms, shared, robot):
 def _coupling(arms, joints, columns):
     """Driven values (D, K) of joints per drive, each told by the arms that have it; None where they are the same."""
     result = np.zeros((len(joints), len(columns)))
-    for arm in arms.values():
+    for arm in arms:
         own = {joint.drive: joint.name for joint in arm.legs.joints if joint.drive is not None}
         matrix = np.eye(len(own)) if arm.legs.coupling is None else arm.legs.coupling
         for (row, number), factor in np.ndenumerate(matrix):

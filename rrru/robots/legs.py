@@ -3,8 +3,8 @@
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
-by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk are
-legs that end apart: each has an end of its own, its hand, see `rrru.robots.hands`.
+by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk
+are legs that end apart: each has an end of its own, its hand, see `rrru.robots.hands`.
 
 Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
 (the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
