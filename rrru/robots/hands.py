@@ -13,6 +13,7 @@ import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.robots.legs import Legs, Parts
+from rrru.robots.lumps import PLATFORM
 from rrru.robots.walk import Poses, Twists, walk, walks
 
 _EYE = np.eye(6)
@@ -150,9 +151,10 @@ def _names(arm):
 
 
 def _apart(arm, hand, shared):
-    """An arm whose fixed frames behind the shared joints are called by the hand as well."""
+    """An arm whose fixed frames behind the shared joints are called by the hand as well; the last one is the hand."""
     (leg,) = arm.legs.legs
     new = {joint.name: f"{hand} {joint.name}" for joint in leg.joints[shared:] if joint.kind == "fixed"}
+    new[PLATFORM] = new.get(leg.joints[-1].name, leg.joints[-1].name)
     joints = tuple(replace(joint, name=new.get(joint.name, joint.name)) for joint in leg.joints)
     lumps = tuple(replace(lump, joint=new.get(lump.joint, lump.joint)) for lump in arm.lumps)
     return replace(arm, legs=replace(arm.legs, legs=(replace(leg, name=hand, joints=joints),)), lumps=lumps)

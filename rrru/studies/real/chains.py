@@ -18,27 +18,38 @@ HANDS = ("right", "left")
 _RANGE_DEG = [-180.0, 180.0]
 
 
-def robot_section(chain):
-    """The `robots:` entry of a chain's mapping, the columns of its drives those of the data set's file."""
+def robot_section(chain, follows=True):
+    """The `robots:` entry of a chain's mapping, the columns of its drives those of the data set's file.
+
+    follows: whether a joint that follows others passes its load on to them, as rods do; else it is a drive of its own,
+    whose values `sheet` adds.
+    """
     masses = chain["masses"]
     trunk = [_frame(chain["base_to_torso"])]
-    for row, value, mass in zip(chain["torso"], chain["torso_q"], masses["torso"], strict=True):
-        trunk.append(_row(row, mass, f"joint_{len(trunk)}", value))
+    for number, (row, mass) in enumerate(zip(chain["torso"], masses["torso"], strict=True)):
+        name, drives = _joint(chain, number)
+        own = {"name": name, "drives": drives} if drives and follows else {"name": name, "range_deg": _RANGE_DEG}
+        trunk.append(own | _row(row, mass))
     head = _after(chain)
     trunk.append({"xyz_mm": [0.0, 0.0, 0.0], "mass_kg": masses["head"]["mass_kg"], "com_mm": head.tolist()})
     hands = {}
     for hand in HANDS:
         links = zip(chain[hand], masses[hand], strict=True)
-        rows = [_row(row, mass, f"q_{hand}{k}") for k, (row, mass) in enumerate(links)]
+        rows = [
+            {"name": f"q_{hand}{k}", "range_deg": _RANGE_DEG} | _row(row, mass) for k, (row, mass) in enumerate(links)
+        ]
         last = _frame(chain["wrist_to_hand"]) | _mass(masses["hand"])
         hands[hand] = [_frame(chain[f"torso_to_{hand}"]), *rows, last]
     return {"dh": trunk, "hands": hands, "convention": "modified"}
 
 
-def sheet(frame):
+def sheet(chain, frame):
     """One row per hand and pose of a data set's table (n), with columns as ingest knows them, positions in m."""
-    drives = [name for name in frame if name.startswith("q_") and "_head" not in name]
-    parts = []
+    joints = [_joint(chain, number) for number in range(len(chain["torso"]))]
+    joints += [(f"q_{hand}{k}", {}) for hand in HANDS for k in range(len(chain[hand]))]
+    followed = {name: sum(by * frame[f"{drive}_rad"] for drive, by in of.items()) for name, of in joints if of}
+    frame = frame.assign(**{f"{name}_rad": values for name, values in followed.items()})
+    drives, parts = [f"{name}_rad" for name, _ in joints], []
     for hand in HANDS:
         own = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
         read = {f"measured_{axis}_mm": frame[f"{hand}_{axis}_m"] for axis in "xyz"}
@@ -58,24 +69,25 @@ def _mass(link):
     return {"mass_kg": link["mass_kg"], "com_mm": (1e3 * np.asarray(link["com_m"], dtype=float)).tolist()}
 
 
-def _row(row, mass, name, value=None):
-    """A DH row with its link's mass; value: the joint's in words, by default that of a drive of the joint's name."""
-    drives = _drives(value) if value else {}
-    followed = len(drives) != 1 or set(drives.values()) != {1.0}
-    own = {"name": name, "drives": drives} if value and followed else {"range_deg": _RANGE_DEG}
-    if not followed or not value:
-        own["name"] = next(iter(drives), name)
+def _row(row, mass):
+    """A DH row's numbers and its link's mass."""
     lengths = {"a_mm": 1e3 * row["a"], "d_mm": 1e3 * row["d"]}
     angles = {"alpha_deg": np.degrees(row["alpha"]).item(), "theta_deg": np.degrees(row["theta0"]).item()}
-    return own | lengths | angles | _mass(mass)
+    return lengths | angles | _mass(mass)
 
 
-def _drives(value):
-    """Factors by drive of a joint's value in words: one drive, or minus a sum in brackets."""
-    found = re.fullmatch(r"(-)?\(?(\w+(?: \+ \w+)*)\)?", value)
+def _joint(chain, number):
+    """Name of a joint of the trunk, and of one that follows others the factors by drive of its value in words.
+
+    Raises ConfigError for words that are neither a drive nor minus a sum of drives in brackets.
+    """
+    value = chain["torso_q"][number]
+    if value.isidentifier():
+        return value, {}
+    found = re.fullmatch(r"-\((\w+(?: \+ \w+)*)\)", value)
     if not found:
         raise ConfigError(f"chain: a joint's value is {value!r}; allowed: a drive, or -(one + other)")
-    return dict.fromkeys(found[2].split(" + "), -1.0 if found[1] else 1.0)
+    return f"q_follows{number}", dict.fromkeys(found[1].split(" + "), -1.0)
 
 
 def _after(chain):
