@@ -115,11 +115,17 @@ def _across(robot, at, force, motion):
     turns, places = (
         np.stack(parts, axis=1) for parts in zip(*(at.frames[robot.legs.site_numbers[n]] for n in names), strict=True)
     )
-    moment = np.cross(at.point_mm[:, None] - places, force[:, None])
+    moment = np.cross(at.point_mm[:, None] - places, force[:, None]) * _carrying(robot.legs, at.poses, names)
     moment = moment + robot.own_moments(motion, at.poses, places)
     axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in names])
     own = np.einsum("njab,nja->njb", turns, moment)
     return own - (own * axes).sum(axis=-1, keepdims=True) * axes
+
+
+def _carrying(legs, poses, names):
+    """1 where the arm of some joints carries the platform of n poses, 0 where that is another arm's: (n, J, 1)."""
+    on = np.array([[name in {joint.name for joint in leg.joints} for name in names] for leg in legs.legs], dtype=float)
+    return on[np.zeros(len(poses.closed), dtype=int) if poses.leg is None else poses.leg][:, :, None]
 
 
 def _along_members(robot, at, load):

@@ -1,8 +1,9 @@
 """A robot that has no file of its own: legs from a description, everything else by the general model.
 
-Its parameters are directions at sites. "zero" are its drives' offsets; "full" is every geometric number that positions
-can tell, drives first, then lengths, then angles: a number that those before it imitate over the workspace is left out,
-and `gauge` says what stands for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
+Its parameters are directions at sites. "frame" is what a campaign's readings leave open alone, frame and reflectors;
+"zero" are its drives' offsets beside it; "full" is every geometric number that positions can tell, drives first, then
+lengths, then angles: a number that those before it imitate over the workspace is left out, and `gauge` says what stands
+for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -16,11 +17,12 @@ from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
+from rrru.robots.hands import ends_of, nearest_end
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import base_moment, driven_loads, moments
 from rrru.robots.robot import Robot
 
-SETS = ("zero", "full")
+SETS = ("frame", "zero", "full")
 # poses over which a number has to be told from the others, their tilt, and the share of it that must be left
 _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
 _STEPS, _REACHED_MM = 60, 1e-9
@@ -68,7 +70,7 @@ class GeneralRobot(Robot):
     def _chosen(self):
         """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
         wanted = self._wanted
-        if self.parameter_set == "zero" and not self.sample:
+        if self.parameter_set != "full" and not self.sample:
             return wanted, {}
         actuators, position, readings = self.sample or (*self._workspace(), None)
         poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
@@ -92,8 +94,10 @@ class GeneralRobot(Robot):
     @cached_property
     def _wanted(self):
         """The Candidates that the set is chosen from."""
-        drives = self.candidates[: len(self.parts.drives)]
-        return (*drives, *open_numbers(self.reads)) if self.parameter_set == "zero" else self.candidates
+        if self.parameter_set == "full":
+            return self.candidates
+        drives = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else ()
+        return (*drives, *open_numbers(self.reads))
 
     def _workspace(self):
         """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
@@ -108,7 +112,7 @@ class GeneralRobot(Robot):
             return actuators[known], position[known]
         low, high = np.asarray(self.drive_range, dtype=float).T
         actuators = low + (high - low) * generator.random((_POSES, len(low)))
-        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
+        return actuators, self.guess(actuators, [name for name, *_ in self.legs.hands] * _POSES)
 
     @cached_property
     def parameters(self):
@@ -249,8 +253,17 @@ class GeneralRobot(Robot):
         both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
         return int(position_rank), int(both - position_rank)
 
+    def guess(self, actuators, targets=None):
+        """See Robot; of several hands the first, or those that carry the targets, where they are."""
+        return ends_of(self, actuators, targets) if self.legs.hands else super().guess(actuators, targets)
+
     def near(self, position_mm, actuators):
-        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones."""
+        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones.
+
+        Of several hands the one that nominally is nearest.
+        """
+        if self.legs.hands:
+            return nearest_end(self, position_mm, np.asarray(actuators, dtype=float))
         for leg in self.legs.legs:
             if not leg.bar and not any(joint.passive for joint in leg.joints):
                 return end_of(self.legs, leg, np.asarray(actuators, dtype=float))

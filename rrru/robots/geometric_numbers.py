@@ -66,7 +66,9 @@ def candidates_of(legs, parts, reads=None):
             bar, end = leg.bar_sites
             lengths.append((bar, 0))
             shifts += [(end, k) for k in range(3)]
-    own = [(TOOL, k) for k in range(6 if reads.turned or reads.reflectors else 3)] + [(WORLD, k) for k in range(6)]
+    # of several hands the last frame of each is its tool
+    tool = () if legs.hands else range(6 if reads.turned or reads.reflectors else 3)
+    own = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
     numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
     every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in own)]
     return tuple({one.name: one for one in every}.values())

@@ -3,7 +3,8 @@
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
-by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint.
+by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk
+are legs that end apart: each has an end of its own, its hand, see `rrru.robots.hands`.
 
 Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
 (the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
@@ -88,7 +89,8 @@ class Legs:
 
     home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
     reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured; coupling
-    (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same.
+    (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same;
+    hands: of legs that end apart the names of the targets that each carries, empty where all hold one platform.
     """
 
     legs: tuple[Leg, ...]
@@ -97,6 +99,7 @@ class Legs:
     home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
     reflectors: tuple[str, ...] = ()
     coupling: np.ndarray | None = None
+    hands: tuple[tuple[str, ...], ...] = ()
 
     def __post_init__(self):
         owner = {}
@@ -111,10 +114,20 @@ class Legs:
 
     @property
     def arm_joints(self):
-        """Names of the turning joints of an arm, a single leg without a bar; none of a robot with more legs."""
-        if len(self.legs) > 1 or self.legs[0].bar:
+        """Names of the turning joints of an arm, a single leg without a bar, or of arms that end apart; else none."""
+        if (len(self.legs) > 1 and not self.hands) or self.legs[0].bar:
             return ()
-        return tuple(joint.name for joint in self.legs[0].joints if joint.kind == "R")
+        return tuple(joint.name for joint in self.joints if joint.kind == "R")
+
+    @cached_property
+    def behind(self):
+        """By joint's name the set of names of it and of all joints behind it, in every leg that has it."""
+        result = {}
+        for leg in self.legs:
+            names = [joint.name for joint in leg.joints]
+            for number, name in enumerate(names):
+                result.setdefault(name, set()).update(names[number:])
+        return result
 
     @cached_property
     def joints(self):

@@ -92,12 +92,10 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     """
     robot, motion = _uncoupled(robot, motion)
     force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
-    (leg,) = robot.legs.legs
-    order = [*(joint.name for joint in leg.joints), PLATFORM]
-    holder = np.array([order.index(lump.joint) for lump in robot.lumps])
+    behind = robot.legs.behind
     result = np.empty(at_mm.shape)
     for k, name in enumerate(robot.legs.arm_joints):
-        carried = holder >= order.index(name)
+        carried = [lump.joint in (*behind[name], PLATFORM) for lump in robot.lumps]
         lever = place[:, carried] - at_mm[:, k, None]
         result[:, k] = np.cross(lever, force[:, carried]).sum(axis=1)
     return result

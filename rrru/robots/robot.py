@@ -12,6 +12,7 @@ import numpy as np
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
 from rrru.robots.closure import Closure
+from rrru.robots.hands import Ends
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
 from rrru.robots.readings import place_on_platform, points_read, turned_by
@@ -56,7 +57,7 @@ class Robot(ABC):
     @cached_property
     def model(self):
         """The legs, closed."""
-        return Closure(self.legs)
+        return Ends(self.legs) if self.legs.hands else Closure(self.legs)
 
     def reading(self, reads):
         """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""
@@ -140,20 +141,27 @@ class Robot(ABC):
         twists = self.twists(deviations)
         return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
 
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) from which to look for poses at actuator values (n, K): the home position's.
+
+        targets (n,): names of what is read, which of several hands tell the one that carries it.
+        """
+        return np.tile(self.legs.home_mm, (len(actuators), 1))
+
     def forward(self, actuators, deviations=None, guess_mm=None):
         """Positions (n, 3) of the tool at actuator values (n, K); NaN where the legs do not close near guess_mm (n, 3).
 
-        Without a guess near the home position.
+        Without a guess near that of `guess`.
         """
         twists = self.twists(deviations)
-        guess = np.tile(self.legs.home_mm, (len(actuators), 1)) if guess_mm is None else guess_mm
+        guess = self.guess(actuators) if guess_mm is None else guess_mm
         return self.measured(self.solve(actuators, guess, twists), twists)
 
     def forward_batch(self, actuators, deviations, guess_mm=None):
         """Positions (m, n, 3) at n actuator values under m vectors of deviations (m, p); see `forward`."""
         deviations, count = np.asarray(deviations, dtype=float), len(actuators)
         twists = np.repeat(np.einsum("scp,mp->msc", self.directions, deviations), count, axis=0)
-        guess = np.tile(self.legs.home_mm, (count, 1)) if guess_mm is None else guess_mm
+        guess = self.guess(actuators) if guess_mm is None else guess_mm
         every, near = np.tile(actuators, (len(deviations), 1)), np.tile(guess, (len(deviations), 1))
         return self.measured(self.solve(every, near, twists), twists).reshape(len(deviations), count, 3)
 

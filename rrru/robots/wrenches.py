@@ -16,7 +16,9 @@ SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
 
 
 def groups_of(legs):
-    """Numbers of the legs of each group."""
+    """Numbers of the legs of each group; legs that end apart are one."""
+    if legs.hands:
+        return (tuple(range(len(legs.legs))),)
     result = []
     for number, leg in enumerate(legs.legs):
         own = {joint.name for joint in leg.joints if joint.passive}

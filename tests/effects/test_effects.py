@@ -73,7 +73,7 @@ def _under(effect, coordinates, shape=None):
 def test_the_library_holds_the_robots_effects_in_their_order():
     assert tuple(EFFECTS) == _NAMES
     assert tuple(name for name in NAMES if name in EFFECTS) == _NAMES
-    assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset"}
+    assert set(NAMES) - set(EFFECTS) - set(SLIDER_EFFECTS) == {"tool_offset", "cross_compliance"}
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -148,7 +148,8 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
 def _sent_to(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> np.ndarray:
     """Positions (n, 3) of the nominal robot at the file's actuator values, NaN where one is noted."""
     drives = mechanism.parts.columns
-    position = mechanism.forward(frame[[*drives]].to_numpy(dtype=float))
+    values = frame[[*drives]].to_numpy(dtype=float)
+    position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
     for i in np.flatnonzero(np.isnan(position).any(axis=1)):
         value = ", ".join(f"{one:.6g}" for one in frame[[*drives]].iloc[i])
         allowed = "values at which the nominal robot closes near its home pose, or commanded positions beside them"

@@ -1,0 +1,102 @@
+"""Robots and sheets of data sets that describe their chains in a file of their own: elastic torsos with two arms.
+
+A chain's file has DH rows after Craig in m and rad for the trunk and each arm, fixed frames as matrices (4, 4) between
+them, masses, and in `torso_q` the joints' values in words, "-(q_torso1 + q_torso2)" for one that follows others. A
+robot is an entry of `robots:` for `rrru.robots.catalogue.make_mechanism`. Lengths in mm, angles in degrees there.
+"""
+
+import re
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+
+HANDS = ("right", "left")
+# files state no ranges of joints; home poses and workspaces are looked for in these
+_RANGE_DEG = [-180.0, 180.0]
+
+
+def robot_section(chain, follows=True):
+    """The `robots:` entry of a chain's mapping, the columns of its drives those of the data set's file.
+
+    follows: whether a joint that follows others passes its load on to them, as rods do; else it is a drive of its own,
+    whose values `sheet` adds.
+    """
+    masses = chain["masses"]
+    trunk = [_frame(chain["base_to_torso"])]
+    for number, (row, mass) in enumerate(zip(chain["torso"], masses["torso"], strict=True)):
+        name, drives = _joint(chain, number)
+        own = {"name": name, "drives": drives} if drives and follows else {"name": name, "range_deg": _RANGE_DEG}
+        trunk.append(own | _row(row, mass))
+    head = _after(chain)
+    trunk.append({"xyz_mm": [0.0, 0.0, 0.0], "mass_kg": masses["head"]["mass_kg"], "com_mm": head.tolist()})
+    hands = {}
+    for hand in HANDS:
+        links = zip(chain[hand], masses[hand], strict=True)
+        rows = [
+            {"name": f"q_{hand}{k}", "range_deg": _RANGE_DEG} | _row(row, mass) for k, (row, mass) in enumerate(links)
+        ]
+        last = _frame(chain["wrist_to_hand"]) | _mass(masses["hand"])
+        hands[hand] = [_frame(chain[f"torso_to_{hand}"]), *rows, last]
+    return {"dh": trunk, "hands": hands, "convention": "modified"}
+
+
+def sheet(chain, frame):
+    """One row per hand and pose of a data set's table (n), with columns as ingest knows them, positions in m."""
+    joints = [_joint(chain, number) for number in range(len(chain["torso"]))]
+    joints += [(f"q_{hand}{k}", {}) for hand in HANDS for k in range(len(chain[hand]))]
+    followed = {name: sum(by * frame[f"{drive}_rad"] for drive, by in of.items()) for name, of in joints if of}
+    frame = frame.assign(**{f"{name}_rad": values for name, values in followed.items()})
+    drives, parts = [f"{name}_rad" for name, _ in joints], []
+    for hand in HANDS:
+        own = frame[["row", "held_out", *drives]].assign(trajectory="poses", target=hand)
+        read = {f"measured_{axis}_mm": frame[f"{hand}_{axis}_m"] for axis in "xyz"}
+        parts.append(own.assign(**read))
+    return pd.concat(parts).sort_values("row", kind="stable").reset_index(drop=True)
+
+
+def _frame(matrix):
+    """The row of a fixed frame from a placement (4, 4) in m."""
+    placement = np.asarray(matrix, dtype=float)
+    turn = Rotation.from_matrix(placement[:3, :3]).as_euler("xyz", degrees=True)
+    return {"xyz_mm": (1e3 * placement[:3, 3]).tolist(), "rpy_deg": turn.tolist()}
+
+
+def _mass(link):
+    """The keys of a link's mass."""
+    return {"mass_kg": link["mass_kg"], "com_mm": (1e3 * np.asarray(link["com_m"], dtype=float)).tolist()}
+
+
+def _row(row, mass):
+    """A DH row's numbers and its link's mass."""
+    lengths = {"a_mm": 1e3 * row["a"], "d_mm": 1e3 * row["d"]}
+    angles = {"alpha_deg": np.degrees(row["alpha"]).item(), "theta_deg": np.degrees(row["theta0"]).item()}
+    return lengths | angles | _mass(mass)
+
+
+def _joint(chain, number):
+    """Name of a joint of the trunk, and of one that follows others the factors by drive of its value in words.
+
+    Raises ConfigError for words that are neither a drive nor minus a sum of drives in brackets.
+    """
+    value = chain["torso_q"][number]
+    if value.isidentifier():
+        return value, {}
+    found = re.fullmatch(r"-\((\w+(?: \+ \w+)*)\)", value)
+    if not found:
+        raise ConfigError(f"chain: a joint's value is {value!r}; allowed: a drive, or -(one + other)")
+    return f"q_follows{number}", dict.fromkeys(found[1].split(" + "), -1.0)
+
+
+def _after(chain):
+    """Centre (3,) of the head's mass in mm in the trunk's last frame, both head joints at zero."""
+    here = np.asarray(chain["torso_to_head"], dtype=float)
+    for row in chain["head"]:
+        tilt, turn = (Rotation.from_euler(*one).as_matrix() for one in (("x", row["alpha"]), ("z", row["theta0"])))
+        placement = np.eye(4)
+        placement[:3, :3] = tilt @ turn
+        placement[:3, 3] = np.array([row["a"], 0.0, 0.0]) + tilt @ np.array([0.0, 0.0, row["d"]])
+        here = here @ placement
+    return 1e3 * (here @ [*chain["masses"]["head"]["com_m"], 1.0])[:3]
