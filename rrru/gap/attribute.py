@@ -157,6 +157,8 @@ def _rounds(case, calibrated, prior, stated):
         case, added = with_orders(case, linear, terms)
         case, found = with_spectra(case, linear, terms)
         added = [*added, *found]
+        kept = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+        linear = replace(linear, columns=kept)
         if added:
             linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
         if stated == KNOWN:
