@@ -197,7 +197,8 @@ def plain_coordinates(
 class Effect:
     """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: fields of Motion without which the law says nothing.
+    needs: fields of Motion without which the law says nothing; spoils: of a law about the measuring and not about the
+    robot, why a calibration that leaves it out is wrong.
     """
 
     name: str
@@ -205,6 +206,7 @@ class Effect:
     coordinates: Coordinates
     law: Callable[[Motion, np.ndarray], Contribution]
     needs: tuple[str, ...] = ()
+    spoils: str = ""
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""
