@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-
 # an assembly sets zeros better than this, in rad and in mm
 _LARGE = {"rad": 5e-3, "mm": 2.0}
 
