@@ -34,6 +34,7 @@ BY_NAME_ONLY = True
 _SHARE = ("1", -0.05, 0.05)
 _SOURCE = "share of a move that is left, size assumed"
 _EXPONENT = Parameter("exponent", "1", 0.0, 0.0, 1.0, "how a move comes to rest: 0 settling, 1 limited speed")
+_SPOILS = "the drives were read, or told, before the arm stood still"
 _STARTS = (0.0, 0.5, 1.0)
 _TYPICAL = 1e-3
 # a move of each unit that takes as long as one of 1 rad
@@ -47,9 +48,8 @@ def for_robot(robot):
     shares = leg_parameters(_SOURCE, ("share", *_SHARE), count=len(robot.parts.drives))
     parameters = ParameterSet((*shares, _EXPONENT))
     shapes = tuple({"exponent": start} for start in _STARTS)
-    return Effect(
-        "read_before_rest", parameters, plain_coordinates(parameters, _TYPICAL, shapes), _short, ("last_move",)
-    )
+    coordinates = plain_coordinates(parameters, _TYPICAL, shapes)
+    return Effect("read_before_rest", parameters, coordinates, _short, ("last_move",), _SPOILS)
 
 
 def _short(motion, values):

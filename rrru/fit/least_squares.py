@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
+from rrru.fit.start import start_of
 from rrru.parameters import ParameterSet
 from rrru.robots.readings import Readings
 
@@ -109,14 +110,15 @@ def minimise(residuals: "Residuals", loss: str = "linear", loss_scale_mm: float 
     """Deviations (p,) within the bounds of the least sum of squares, and how many evaluations the search took.
 
     loss: one of LOSSES, with the residual size `loss_scale_mm` at which a robust loss begins to bend. The search moves
-    only along directions that the points see; the others keep their nominal value. Raises FitError, carrying scipy's
-    result, where there are fewer equations than parameters or the search fails.
+    only along directions that the points see; the others keep the start's value, see `rrru.fit.start`. Raises
+    FitError, carrying scipy's result, where there are fewer equations than parameters or the search fails.
     """
     parameters = residuals.mechanism.parameters
     equations = residuals.residual(parameters.nominal).size
     if equations < len(parameters):
         raise FitError(f"{len(residuals)} points give {equations} equations; allowed: at least {len(parameters)}")
-    start = analyse(residuals.mechanism, residuals.jacobian(parameters.nominal))
+    origin, evaluations = start_of(residuals)
+    start = analyse(residuals.mechanism, residuals.jacobian(origin))
     seen = (start.directions[: start.rank] * start.scale).T
     linear = loss == "linear"
     options = {"loss": loss, "f_scale": 1.0 if linear else loss_scale_mm}
@@ -124,9 +126,9 @@ def minimise(residuals: "Residuals", loss: str = "linear", loss_scale_mm: float 
     # direction is seen
     scale = start.singular_values[0] / start.singular_values[: start.rank]
     solution = _search(
-        residuals, parameters.nominal, seen, np.zeros(start.rank), scale, method="lm" if linear else "trf", **options
+        residuals, origin, seen, np.zeros(start.rank), scale, method="lm" if linear else "trf", **options
     )
-    deviations, evaluations = parameters.nominal + seen @ solution.x, int(solution.nfev)
+    deviations, evaluations = origin + seen @ solution.x, evaluations + int(solution.nfev)
     if start.rank == len(parameters) and not parameters.hold(deviations):
         inside, bounds = parameters.inside(deviations), (parameters.low, parameters.high)
         solution = _search(residuals, 0.0, np.eye(len(parameters)), inside, start.scale, bounds=bounds, **options)

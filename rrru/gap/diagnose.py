@@ -9,10 +9,12 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.errors import FitError
+from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
+from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
-from rrru.gap.case import Case, State
+from rrru.gap.case import State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
@@ -104,8 +106,11 @@ def diagnose(
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
-def _notes(case: Case, stated_mm: float | None) -> Iterator[str]:
-    """What the data lack for a better answer, and whether they contradict the stated noise."""
+def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
+    """What the data lack for a better answer, what they contradict, and what a user has to know of the robot."""
+    case = attribution.case
+    yield from mastering_notes(attribution.state, case.mechanism)
+    yield from bias_notes(attribution)
     if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
         worse = "the robot does not repeat, or the instrument is worse"
         yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"
@@ -143,7 +148,7 @@ def _row(
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join(_notes(case, stated_mm)),
+        "notes": "; ".join(_notes(attribution, stated_mm)),
     }
 
 

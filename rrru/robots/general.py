@@ -18,7 +18,7 @@ from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.hands import ends_of, nearest_end
-from rrru.robots.legs import Legs, Parts
+from rrru.robots.legs import TOOL, WORLD, Legs, Parts
 from rrru.robots.lumps import base_moment, driven_loads, moments
 from rrru.robots.robot import Robot
 
@@ -28,6 +28,8 @@ _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
 _STEPS, _REACHED_MM = 60, 1e-9
 # longest step of an inverse as a share of the drives' ranges; singular values below this share are none
 _LONGEST_STEP, _SEEN = 0.3, 1e-6
+# so far off may be a drive whose zero is lost, in rad and in mm
+_LOST = {"rad": 0.6, "mm": 100.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ class GeneralRobot(Robot):
     def parameters(self):
         """The parameters of the chosen set, nominally zero."""
         limits = {"mm": self.length_limit_mm, "rad": self.angle_limit_rad}
-        bounds = ((one, limits[one.unit]) for one in self._chosen[0])
+        bounds = ((one, max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0)) for one in self._chosen[0])
         return ParameterSet(
             tuple(Parameter(one.name, one.unit, 0.0, -most, most, "bounds assumed", one.leg) for one, most in bounds)
         )
@@ -127,6 +129,13 @@ class GeneralRobot(Robot):
     def gauge(self):
         """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
         return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
+
+    @property
+    def stages(self):
+        """Frame, tool and reflectors, and then with them the drives."""
+        outside = {WORLD, TOOL, *self.legs.reflectors}
+        frames = np.array([outside.issuperset(one.twists) for one in self._chosen[0]])
+        return frames, frames | np.array([one.leg > 0 for one in self._chosen[0]])
 
     @cached_property
     def directions(self):

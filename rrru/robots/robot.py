@@ -79,6 +79,11 @@ class Robot(ABC):
         return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
 
     @property
+    def stages(self):
+        """Which parameters (p,) a search finds first where the nominal robot is far off, in turn."""
+        return ()
+
+    @property
     def gauge(self):
         """By number that is no parameter in words what stands for it; none of a fixed set."""
         return {}

@@ -71,7 +71,9 @@ def _text(names, own, position, others, grid):
     away = np.linalg.norm(others - position, axis=1)
     near = int(np.nanargmin(np.where(np.arange(len(names)) == own, np.inf, np.nan_to_num(away, nan=np.inf))))
     if away[near] < _FAR_MM:
-        far = np.nanmedian(np.linalg.norm(grid[:, own] - grid[:, near], axis=1))
+        # on one body the two keep their distance
+        usual = np.nanmedian(np.linalg.norm(grid[:, own] - grid[:, near], axis=1))
+        far = away[own] if np.isfinite(away[own]) else usual
         return f"{names[own]} lies {far:.3g} mm away, where {names[near]} is"
     if np.isfinite(away[own]):
         return f"{names[own]} lies {away[own]:.3g} mm away"
