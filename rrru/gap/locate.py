@@ -123,9 +123,9 @@ def _leg_rows(case, residual_mm, drive, resampled):
     errors, number = drive_errors(residual_mm, drive), np.flatnonzero(case.used)
     resampled = np.searchsorted(number, case.at[resampled])
     # in units of each drive's own noise, so that poses of a large Jacobian do not drown the others
-    spread = (np.linalg.pinv(drive) ** 2).sum(axis=-1)
-    # no drive moves what is fixed to the world
-    scaled = np.where(spread > 0.0, errors**2 / (case.noise_mm**2 * np.where(spread > 0.0, spread, 1.0)), 0.0)
+    own = case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
+    # a drive of another arm than the one that is read moves nothing, none what is fixed to the world
+    scaled = np.divide(errors**2, own, out=np.zeros_like(own), where=own > 0.0)
     whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
     for leg, unit in enumerate(case.mechanism.parts.units):
         moved = np.linalg.norm(drive[:, :3, leg] * errors[:, leg, None], axis=1)

@@ -125,7 +125,7 @@ def _across(robot, at, force, motion):
 def _carrying(legs, poses, names):
     """1 where the arm of some joints carries the platform of n poses, 0 where that is another arm's: (n, J, 1)."""
     on = np.array([[name in {joint.name for joint in leg.joints} for name in names] for leg in legs.legs], dtype=float)
-    return on[np.zeros(len(poses.closed), dtype=int) if poses.leg is None else poses.leg][:, :, None]
+    return on[poses.leg if legs.hands else np.zeros(len(poses.closed), dtype=int)][:, :, None]
 
 
 def _along_members(robot, at, load):

@@ -11,22 +11,22 @@ _VALUES = ("range_deg", "range_mm", "home_deg", "home_mm")
 _CONVENTIONS = ("standard", "modified")
 
 
-def from_dh(rows, convention="standard", name="arm", hands=None, targets=None, **options):
+def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, **options):
     """The GeneralRobot of rows as `serial` takes them, with a_mm, d_mm, alpha_deg, theta_deg and rpy_deg.
 
     A row whose joint has a drive of its own states its range_deg, or range_mm where it slides, and may state home_deg
     or home_mm, by default the range's middle. convention: "standard" or "modified". hands: the rows of each of several
-    arms, by the name of its hand, behind a trunk of the rows; targets: names of what each hand carries, by default its
-    own. Raises ConfigError for unknown keys and missing ranges.
+    arms, by the name of its hand, behind a trunk of the rows; carries: names of the targets that each hand carries, by
+    default its own. Raises ConfigError for unknown keys and missing ranges.
     """
     if convention not in _CONVENTIONS:
         raise ConfigError(f"robot {name}: convention is {convention!r}; allowed: {', '.join(_CONVENTIONS)}")
-    if hands is None and targets is None:
+    if hands is None and carries is None:
         return _chain(rows, convention, name, options)
     if not hands or len(hands) < 2:
         raise ConfigError(f"robot {name}: hands {', '.join(hands or ()) or 'none'}; allowed: two or more")
     arms = {hand: _chain([*rows, *more], convention, name, options) for hand, more in hands.items()}
-    return with_hands(arms, 1 + len(rows), targets)
+    return with_hands(arms, 1 + len(rows), carries)
 
 
 def _chain(rows, convention, name, options):

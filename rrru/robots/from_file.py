@@ -37,20 +37,20 @@ _UNITS = {"R": "rad", "P": "mm"}
 _TRN = mujoco.mjtTrn
 
 
-def from_urdf(path, base=None, tip=None, home=None, tips=None, targets=None, **options):
+def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **options):
     """The GeneralRobot of a URDF's chain from the link base, by default the root, to the link tip, the only last one.
 
     All joints between them are driven, but for those that mimic others. home: values by driven joint of the home pose
     in rad or mm, by default 0, or the middle of a range without it; tips: instead of tip the links of several hands by
-    name, targets: what each carries, see `rrru.robots.hands`; options: of GeneralRobot. The frames are the links'.
+    name, carries: the targets of each, see `rrru.robots.hands`; options: of GeneralRobot. The frames are the links'.
     Raises ConfigError for what cannot be read.
     """
     file = _existing(path)
-    if tips or targets:
+    if tips or carries:
         if not tips or len(tips) < 2 or tip:
             raise ConfigError(f"{file}: tips {', '.join(tips or ()) or 'none'}; allowed: two or more, and no tip")
         arms = {hand: from_urdf(path, base, link, home, **options) for hand, link in tips.items()}
-        return with_hands(arms, shared_joints(arms), targets)
+        return with_hands(arms, shared_joints(arms), carries)
     urdf = urdf_files.read(file)
     model, known = urdf.model, {urdf.model.joint(j).name: j for j in range(urdf.model.njnt)}
     first, last = (model.body(name).id for name in urdf_files.ends(urdf, base, tip, file))

@@ -7,7 +7,7 @@ pose is of follows from the position near which it is looked for: that of the ha
 of all arms load the trunk. Lengths in mm, angles in rad.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,13 @@ from rrru.robots.walk import Poses, Twists, walk, walks
 _EYE = np.eye(6)
 # point masses of two arms' descriptions are the same within this
 _SAME_MM = 1e-6
+
+
+@dataclass(frozen=True)
+class HandPoses(Poses):
+    """Poses of hands; leg (n,): number of the leg whose end each is."""
+
+    leg: np.ndarray
 
 
 class Ends:
@@ -42,13 +49,13 @@ class Ends:
         return np.broadcast_to(_EYE, wrenches[0].shape)
 
     def solve(self, actuators, start, twists=None):
-        """Poses (n) of the hands of the Poses `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
+        """HandPoses (n) of the hands of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
         every, own = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
         rows = np.arange(len(own))
         position, turn = (np.stack(part)[own, rows] for part in zip(*every, strict=True))
         known = np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         position[~known], turn[~known] = np.nan, np.nan
-        return Poses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
+        return HandPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
 
 
 def ends(legs, actuators, twists):
@@ -58,11 +65,11 @@ def ends(legs, actuators, twists):
 
 
 def nearest_end(robot, position_mm, actuators):
-    """Poses (n) of the hands whose tools are nearest to positions (n, 3), at actuator values (n, K)."""
+    """HandPoses (n) of those whose tools are nearest to positions (n, 3), at actuator values (n, K)."""
     tools = _tools(robot, actuators)
     leg = np.linalg.norm(np.nan_to_num(tools - np.asarray(position_mm)), axis=2).argmin(axis=0)
     none = np.zeros((len(actuators), 0))
-    return robot.model.solve(actuators, Poses(None, None, none, None, None, leg))
+    return robot.model.solve(actuators, HandPoses(None, None, none, None, None, leg))
 
 
 def ends_of(robot, actuators, targets=None):
@@ -84,18 +91,18 @@ def _tools(robot, actuators):
     return np.stack([place + turn @ np.asarray(robot.tool_mm) for place, turn in every])
 
 
-def with_hands(arms, shared, carried=None):
+def with_hands(arms, shared, carries=None):
     """The robot with several hands that arms by name, robots of one leg of driven joints each, make.
 
     shared: number of joints, the base's frame among them, from the base to where the arms part, alike in all of them;
-    carried: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
+    carries: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
     shared are the first arm's; fixed frames of the arms get the hand's name before theirs. Raises ConfigError for
     joints of two arms with one name.
     """
-    first, carried = next(iter(arms.values())), carried or {}
-    if unknown := [name for name in carried if name not in arms]:
+    first, carries = next(iter(arms.values())), carries or {}
+    if unknown := [name for name in carries if name not in arms]:
         raise ConfigError(f"robot {first.name}: targets of {unknown[0]!r}; allowed: {', '.join(arms)}")
-    hands = tuple(tuple(carried.get(name, (name,))) for name in arms)
+    hands = tuple(tuple(carries.get(name, (name,))) for name in arms)
     every = [target for hand in hands for target in hand]
     if len(set(every)) < len(every) or not all(hands):
         raise ConfigError(f"robot {first.name}: targets {', '.join(every)}; allowed: one or more a hand, of their own")

@@ -16,8 +16,7 @@ from rrru.robots.legs import turn_about
 class Poses:
     """Platform poses at n points: position_mm (n, 3), turn (n, 3, 3), passive values (n, k), closed (n,).
 
-    residual_mm (n,): what the closure lacks, angles counted at an arm of 500 mm; leg (n,): number of the leg whose end
-    it is, None where all legs hold one platform.
+    residual_mm (n,): what the closure lacks, angles counted at an arm of 500 mm.
     """
 
     position_mm: np.ndarray
@@ -25,7 +24,6 @@ class Poses:
     passive: np.ndarray
     residual_mm: np.ndarray
     closed: np.ndarray
-    leg: np.ndarray | None = None
 
     def turned_from(self, turn):
         """Rotation vectors (n, 3) of the platform against orientations (n, 3, 3)."""
@@ -42,8 +40,7 @@ class Poses:
 
     def of(self, rows):
         """The poses of some rows."""
-        parts = (getattr(self, name) for name in self.__dataclass_fields__)
-        return Poses(*(None if part is None else part[rows] for part in parts))
+        return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
 
 @dataclass(frozen=True)

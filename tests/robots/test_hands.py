@@ -201,8 +201,8 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
     assert sum(lump.mass_kg for lump in robot.lumps) == pytest.approx(sum(mass for _, (mass, _) in two_arms.masses()))
 
 
-def test_targets_say_what_a_hand_carries():
-    robot = make_mechanism("two_arms", two_arms.section(targets={"right": ["r1", "r2"]}))
+def test_a_key_says_what_a_hand_carries():
+    robot = make_mechanism("two_arms", two_arms.section(carries={"right": ["r1", "r2"]}))
     assert robot.legs.hands == (("r1", "r2"), ("left",))
     np.testing.assert_allclose(
         robot.guess(DRIVES[:2], ["r2", "left"]), [two_arms.seen(DRIVES[0], "right"), two_arms.seen(DRIVES[1], "left")]
@@ -216,10 +216,10 @@ def _without(section, key):
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        (two_arms.section(targets={"third": ["r1"]}), "targets of 'third'; allowed: right, left"),
-        (two_arms.section(targets={"right": ["left"]}), "targets left, left; allowed: one or more a hand"),
+        (two_arms.section(carries={"third": ["r1"]}), "targets of 'third'; allowed: right, left"),
+        (two_arms.section(carries={"right": ["left"]}), "targets left, left; allowed: one or more a hand"),
         (two_arms.section(hands={"right": two_arms.section()["hands"]["right"]}), "hands right; allowed: two or more"),
-        (_without(two_arms.section(targets={"right": ["r"]}), "hands"), "hands none; allowed: two or more"),
+        (_without(two_arms.section(carries={"right": ["r"]}), "hands"), "hands none; allowed: two or more"),
         (
             two_arms.section(hands=dict.fromkeys(two_arms.HANDS, two_arms.section()["hands"]["right"])),
             "two arms have a joint 'right",

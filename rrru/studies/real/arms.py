@@ -15,7 +15,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
-from rrru.gap.attribute import calibrate, with_arm
+from rrru.gap.attribute import with_arm
 from rrru.gap.case import Case, State
 from rrru.gap.diagnose import Diagnosis, MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
@@ -109,4 +109,4 @@ def _reference(
     case = make_case(measurements, nominal, _NO_MASSES, noise[0] or 1.0, library, True, arm_mm)
     if rows.has_turns(measurements):
         case = with_arm(case, *noise)
-    return steps(case, calibrate(case))
+    return steps(case)

@@ -38,7 +38,9 @@ class Series:
         lacking = [name for name in ([names] if isinstance(names, str) else names) if name not in frame]
         if lacking:
             known = ", ".join(frame.columns)
-            raise ConfigError(f"real.sets.{self.dataset}.{key}: no column {lacking[0]!r} in {self.file}, which has {known}")
+            raise ConfigError(
+                f"real.sets.{self.dataset}.{key}: no column {lacking[0]!r} in {self.file}, which has {known}"
+            )
         return frame[names]
 
 

@@ -43,7 +43,8 @@ def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float
     result = []
     for key, scales, unit in (("position_std", MM, "unit"), ("rotation_std", RAD, "rotation_unit")):
         axes = [
-            scales[reading.get(unit, "mm" if scales is MM else "rad")] * _numbers(series, raw, f"readings.{target}", name)
+            scales[reading.get(unit, "mm" if scales is MM else "rad")]
+            * _numbers(series, raw, f"readings.{target}", name)
             for target, reading in series.section["readings"].items()
             for name in reading.get(key, ())
         ]
@@ -51,7 +52,9 @@ def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float
     return result[0], result[1]
 
 
-def _read(series: Series, raw: pd.DataFrame, target: str, reading: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
+def _read(
+    series: Series, raw: pd.DataFrame, target: str, reading: Mapping[str, Any]
+) -> Iterator[tuple[str, np.ndarray]]:
     """Columns of what was read of one target."""
     key = f"readings.{target}"
     for ours, theirs in zip(MEASURED, reading["position"], strict=True):

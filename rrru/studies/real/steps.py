@@ -1,6 +1,7 @@
 """Model after model on one real series: what each adds, and what it leaves on rows that no fit has seen.
 
-(a) frames, (b) + geometry, (c) + drive compliance, (c2) + flexible links, (d) + the first two harmonics of every drive,
+(a) frames, (b) + geometry, (c) + drive compliance, (c2) + flexible links, (c3) + cross
+compliance, (d) + the first two harmonics of every drive,
 (e) + a drift of the base, linear in the order of the rows: plain least squares, nothing chosen. They are the reference
 for what the diagnosis names. Lengths in mm, angles in rad.
 """
@@ -15,15 +16,25 @@ from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.gap.case import Case, State
+from rrru.gap.fit_effects import fit_effects
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.geometric_numbers import direction, open_numbers
 from rrru.robots.legs import WORLD
 from rrru.robots.robot import Robot
 
-_ROUNDS, _HALVINGS, _ENOUGH = 12, 6, 1e-6
-# a combination of numbers that moves the readings by less than this share of the best seen one is not identified
-_SEEN = 1e-6
+_ROUNDS, _ENOUGH = 30, 1e-9
+# shares of the best seen combination of numbers below which one is not seen
+_SEEN = 1e-9
 FRAMES, _HARMONICS, _DRIFT = "frames", "harmonics", "drift"
+# letter, what it adds in words, the effect that does
+_MODELS = (
+    ("b", "geometry", ""),
+    ("c", "drive compliance", "drive_compliance"),
+    ("c2", "compliance across the joints", "link_flexure"),
+    ("c3", "cross compliance of a trunk", "cross_compliance"),
+    ("d", "first and second harmonic of the drives", _HARMONICS),
+    ("e", "drift of the base with the rows", _DRIFT),
+)
 
 
 @dataclass(frozen=True)
@@ -69,89 +80,48 @@ def trained_mm(case: Case, state: State) -> np.ndarray:
     return np.linalg.norm(case.residual(state)[case.positions], axis=1)
 
 
-def steps(case: Case, start: State) -> tuple[Step, ...]:
-    """The models one after another; start: a calibration of all numbers.
-
-    A model whose effects the robot does not have is left out.
-    """
+def steps(case: Case) -> tuple[Step, ...]:
+    """The models one after another; one whose effects the robot does not have is left out."""
     library = dict(case.library) | _own(case)
-    case, every = replace(case, library=library), np.ones(len(start.deviations), dtype=bool)
-    kinds = [("a", "frames", ~every, ((FRAMES, 0),)), ("b", "geometry", every, ())]
-    for model, adds, effect in (
-        ("c", "drive compliance", "drive_compliance"),
-        ("c2", "compliance across the joints", "link_flexure"),
-        ("d", "first and second harmonic of the drives", _HARMONICS),
-        ("e", "drift of the base with the rows", _DRIFT),
-    ):
-        if effect in library:
-            kinds.append((model, adds, every, (*kinds[-1][3], (effect, 0))))
-    result, state = [], start
-    for model, adds, free, keys in kinds:
-        began = time.perf_counter()
-        first = State(0.0 * start.deviations, {}) if model == "a" else state
-        fit, rank = fitted(case, first, free, keys)
-        state = start if model == "a" else fit
-        count = int(free.sum()) + sum(len(library[name].coordinates) for name, _ in keys)
-        left = trained_mm(case, fit), held_out_mm(case, fit)
-        result.append(Step(model, adds, fit, count, rank, time.perf_counter() - began, *left))
+    case, began = replace(case, library=library), time.perf_counter()
+    none = State(np.zeros(len(case.mechanism.parameters)), {})
+    state = placed(case, none)
+    count = len(library[FRAMES].coordinates)
+    result = [Step("a", "frames", state, count, count, time.perf_counter() - began, *_left(case, state))]
+    names: tuple[str, ...] = ()
+    for model, adds, effect in _MODELS:
+        if effect and effect not in library:
+            continue
+        began, names = time.perf_counter(), (*names, effect) if effect else names
+        fit = fit_effects(case, names)
+        numbers = fit.numbers, fit.identifiable, time.perf_counter() - began
+        result.append(Step(model, adds, fit.state, *numbers, *_left(case, fit.state)))
     return tuple(result)
 
 
-def fitted(case: Case, start: State, free: np.ndarray, keys: tuple) -> tuple[State, int]:
-    """State of least squares over some deviations (p,) and all coordinates of effects, and how many are identified.
+def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """`trained_mm` and `held_out_mm` of a state."""
+    return trained_mm(case, state), held_out_mm(case, state)
 
-    Gauss-Newton from a start, steps halved where they make it worse. Raises FitError where it has no pose.
+
+def placed(case: Case, state: State) -> State:
+    """A state with frames fitted to the used points of a case whose library has `frames`; all else of it stays.
+
+    Gauss-Newton. Raises FitError where the steps do not end.
     """
-    effects = {key: start.effects.get(key, np.zeros(len(case.library[key[0]].coordinates))) for key in keys}
-    state, cost = State(start.deviations, effects), np.inf
-    rank = 0
+    key, last = (FRAMES, 0), np.inf
+    state = replace(state, effects=dict(state.effects) | {key: np.zeros(len(case.library[FRAMES].coordinates))})
     for _ in range(_ROUNDS):
-        linear, last = case.linearise(state, list(keys)), cost
-        cost = _cost(case, state) if not np.isfinite(cost) else cost
-        columns = np.concatenate([linear.base[..., free], *(linear.columns[key] for key in keys)], axis=-1)
-        flat = columns.reshape(-1, columns.shape[-1])
-        size = np.linalg.norm(flat, axis=0)
-        size[size == 0.0] = np.inf
-        # the data hold the effects' own part, not that of the deviations
-        answer, _, rank, _ = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=_SEEN)
-        answer = answer / size
-        target = _target(state, answer, free, keys)
+        columns = case.linearise(state, [key]).columns[key]
+        flat, left = columns.reshape(-1, columns.shape[-1]), case.residual(state)
+        size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        step = np.linalg.lstsq(flat / size, left.ravel(), rcond=_SEEN)[0] / size
+        state = replace(state, effects=dict(state.effects) | {key: state.effects[key] + step})
+        cost = float((case.residual(state) ** 2).sum())
+        if abs(last - cost) < _ENOUGH * cost:
+            return state
         last = cost
-        for halving in range(_HALVINGS):
-            trial = _between(state, target, 0.5**halving)
-            trial_cost = _cost(case, trial)
-            if trial_cost < cost:
-                state, cost = trial, trial_cost
-                break
-        if not cost < last * (1.0 - _ENOUGH):
-            break
-    if not np.isfinite(cost):
-        raise FitError("the model has no pose at a point of the series")
-    return state, int(rank)
-
-
-def _target(state: State, answer: np.ndarray, free: np.ndarray, keys: tuple) -> State:
-    """The state that a linearisation's answer asks for."""
-    deviations, first = state.deviations.copy(), int(free.sum())
-    deviations[free] += answer[:first]
-    effects = {}
-    for key in keys:
-        count = len(state.effects[key])
-        effects[key] = answer[first : first + count]
-        first += count
-    return State(deviations, effects)
-
-
-def _between(first: State, second: State, share: float) -> State:
-    """The state at a share of the way from one to another with the same effects."""
-    effects = {key: own + share * (second.effects[key] - own) for key, own in first.effects.items()}
-    return State(first.deviations + share * (second.deviations - first.deviations), effects)
-
-
-def _cost(case: Case, state: State) -> float:
-    """Sum of squares that a state leaves; inf where it has no pose."""
-    cost = float((case.residual(state) ** 2).sum())
-    return cost if np.isfinite(cost) else np.inf
+    raise FitError(f"frames are not found: {cost:.6g} mm^2 left")
 
 
 def _own(case: Case) -> dict[str, Effect]:
@@ -192,4 +162,3 @@ def _drift(case: Case) -> Effect:
         return motion.at({WORLD: np.concatenate([share[:, None] * values, np.zeros((len(share), 3))], axis=1)})
 
     return Effect(_DRIFT, parameters, plain_coordinates(parameters, 0.05), shift)
-
