@@ -25,6 +25,8 @@ from rrru.gap.unknown import UNKNOWN
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
+# many columns take long to be projected out: the noise is found again so many times
+_BROAD_LOOKS = 2
 # more columns than this share of the numbers read leave too little to tell the noise by
 _MOST_FITTED = 0.5
 _NO_COVARIANCE = np.zeros((0, 0))
@@ -137,7 +139,8 @@ def with_effects(attribution, effects):
         before = attribution.hypothesis
         chosen = [k for k, term in enumerate(before.terms) if term.effect in effects]
         terms = tuple(before.terms[k] for k in chosen)
-        found, _ = attribution.evidence.independent(terms, range(len(LEVELS)))
+        found, levels = np.full(len(LEVELS), -np.inf), attribution.evidence.levels
+        found[levels], _ = attribution.evidence.independent(terms, levels)
         known = Hypothesis(terms, found, before.strengths[:, chosen]), attribution.level
     hypothesis, level = known
     state, covariance = attribution.calibrated, _NO_COVARIANCE
@@ -150,7 +153,7 @@ def with_effects(attribution, effects):
 
 def _rounds(case, calibrated, prior, stated):
     """Search and refinement in turn until the best hypothesis repeats itself."""
-    state, covariance, last, stated_mm = calibrated, _NO_COVARIANCE, None, case.noise_mm
+    state, covariance, last, stated_mm, looks = calibrated, _NO_COVARIANCE, None, case.noise_mm, []
 
     def seen(case, state, terms=()):
         linear = case.linearise(state)
@@ -163,7 +166,10 @@ def _rounds(case, calibrated, prior, stated):
             linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
         if stated == KNOWN:
             return case, linear, "given"
+        if len(looks) >= _BROAD_LOOKS and any(effect.coordinates.broad for effect in case.library.values()):
+            return case, linear, looks[-1]
         under, source = with_noise(case, linear, stated_mm if stated == STATED else None)
+        looks.append(source)
         return under, linear, source
 
     case, linear, source = seen(case, state)

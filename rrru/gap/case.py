@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import follows_path
 from rrru.campaign.noise import reading_series
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
@@ -104,6 +105,11 @@ class Case:
         return np.flatnonzero(self.used[points])
 
     @cached_property
+    def _along_paths(self):
+        """Whether the points lie along paths, not in any order."""
+        return follows_path(rows.command(self.measurements), self.measurements["run"].to_numpy())
+
+    @cached_property
     def at(self):
         """Number (m,) of the point that each row was read at."""
         return self._kept if self._readings is None else self._readings.rows[self._kept]
@@ -148,7 +154,8 @@ class Case:
 
     def evidence(self, linear):
         """The ModelEvidence on a linearisation."""
-        return ModelEvidence(self.library, linear, self.series, self.noise or NoiseModel.white(self.noise_mm))
+        noise = self.noise or NoiseModel.white(self.noise_mm)
+        return ModelEvidence(self.library, linear, self.series, noise, self._along_paths)
 
     def without(self, dropped):
         """The case without the used points of the rows flagged in (m,)."""

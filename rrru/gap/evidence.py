@@ -85,13 +85,15 @@ class Projected:
 class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
-    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel.
+    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel;
+    smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is.
     """
 
     library: dict
     linear: object
     run: np.ndarray
     noise: NoiseModel
+    smooth: bool = True
 
     def __len__(self):
         return len(self.run)
@@ -159,9 +161,16 @@ class ModelEvidence:
         return self._made[level]
 
     @property
+    def levels(self):
+        """Levels (l,), as indices, that there may be."""
+        return np.arange(len(LEVELS)) if self.smooth else np.zeros(1, dtype=int)
+
+    @cached_property
     def none(self):
-        """Log evidence (levels,) of no effect at all."""
-        return np.array([self._gram(level)[2] for level in range(len(LEVELS))])
+        """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
+        result = np.full(len(LEVELS), -np.inf)
+        result[self.levels] = [self._gram(level)[2] for level in self.levels]
+        return result
 
     @cached_property
     def _priors(self):
@@ -185,26 +194,26 @@ class ModelEvidence:
             self._priors[term] = _Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
         return self._priors[term]
 
-    def projected(self, terms, levels=slice(None)):
+    def projected(self, terms, levels):
         """The projected problem of a set of terms at discrepancy levels (indices)."""
         priors = [self._prior(term) for term in terms]
         priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
         owner = np.repeat(np.minimum(np.arange(len(priors)), len(terms)), [len(prior.index) for prior in priors])
         index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
-        grams = [self._gram(level) for level in np.arange(len(LEVELS))[levels]]
+        grams = [self._gram(level) for level in levels]
         gram, moment = (
             np.array(part) for part in zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True)
         )
         return Projected(gram, moment, *rest, owner, index)
 
-    def over_strengths(self, terms, strengths=None, levels=slice(None)):
+    def over_strengths(self, terms, strengths=None, levels=None):
         """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
 
-        strengths: grids, one per term, by default STRENGTHS for each.
+        strengths: grids, one per term, by default STRENGTHS for each; levels (l,): indices, by default all that may be.
         """
         grids = tuple(strengths or (STRENGTHS,) * len(terms))
         combinations = np.array(list(product(*grids)))
-        levels = np.arange(len(LEVELS))[levels]
+        levels = self.levels if levels is None else levels
         broad = self._broadest(terms)
         if broad is None:
             none = np.array([self._gram(level)[2] for level in levels])

@@ -57,8 +57,10 @@ def with_orders(case, linear, terms):
     linear: about the state that terms of a hypothesis, fitted beside the waves, have led to.
     """
     library, added = dict(case.library), []
+    # a rough function of the drives' values holds all waves
+    broad = any(case.library[term.effect].coordinates.broad for term in terms)
     for name, effect in case.library.items():
-        if effect.coordinates.searched is not None:
+        if effect.coordinates.searched is not None and not broad:
             # an unknown function would take what is looked for
             others = [term for term in terms if term.effect != name and term.effect not in UNKNOWN]
             library[name] = _found(case, linear, effect, others)

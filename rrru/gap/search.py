@@ -124,7 +124,7 @@ class _Tried:
             best[level] = grid[value[0].argmax()]
             if full[level] < highest - _HOPELESS:
                 return Hypothesis(terms, full, best)
-        levels = np.arange(len(LEVELS)) if levels is None else levels
+        levels = self.evidence.levels if levels is None else levels
         value, grid = self.evidence.over_strengths(terms, strengths, levels)
         full[levels] = averaged(value, len(terms))
         best[levels] = grid[value.argmax(axis=1)]
@@ -168,7 +168,7 @@ class _Tried:
     def near_levels(self):
         """Indices of the discrepancy levels next to the best hypothesis' own, and none at all."""
         best = self.best.evidence.argmax()
-        return np.unique([0, 1, *(np.clip([best - 1, best, best + 1], 0, len(LEVELS) - 1))])
+        return np.intersect1d([0, 1, best - 1, best, best + 1], self.evidence.levels)
 
     def best_of_size(self, size):
         """The best hypotheses of a size, one per set of effects, best first."""

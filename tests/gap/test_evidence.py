@@ -247,7 +247,7 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     linear = Linear(data, 1e-9 + 0.0 * columns[..., :1] + np.eye(3)[0][:, None], {("pair", 0): columns}, {}, {}, None)
     evidence = ModelEvidence(PULLS, linear, RUN, NoiseModel.white(NOISE_MM))
     mean, _ = evidence.coefficients((Term("pair"),), [100.0], 0)
-    problem = evidence.projected((Term("pair"),))
+    problem = evidence.projected((Term("pair"),), evidence.levels)
     gram, moment = problem.gram, problem.moment
     precision = gram[0] + np.diag(evidence.scales((Term("pair"),), [100.0]) ** -2.0)
     grid = np.stack(np.meshgrid(*(np.linspace(0.0, 2.0, 401),) * 2), axis=-1).reshape(-1, 2)
