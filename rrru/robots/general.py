@@ -17,7 +17,6 @@ from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
-from rrru.robots.hands import ends_of, nearest_end
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
 from rrru.robots.lumps import base_moment, driven_loads, moments
 from rrru.robots.robot import Robot
@@ -114,7 +113,7 @@ class GeneralRobot(Robot):
             return actuators[known], position[known]
         low, high = np.asarray(self.drive_range, dtype=float).T
         actuators = low + (high - low) * generator.random((_POSES, len(low)))
-        return actuators, self.guess(actuators, [name for name, *_ in self.legs.hands] * _POSES)
+        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
 
     @cached_property
     def parameters(self):
@@ -140,7 +139,8 @@ class GeneralRobot(Robot):
     @cached_property
     def directions(self):
         """Twists (sites, 6, p) that a unit of each parameter makes."""
-        return np.stack([direction(self.legs, one) for one in self._chosen[0]], axis=-1)
+        each = [direction(self.legs, one)[..., None] for one in self._chosen[0]]
+        return np.concatenate([np.zeros((len(self.legs.sites), 6, 0)), *each], axis=-1)
 
     @property
     def deviation_names(self):
@@ -262,17 +262,8 @@ class GeneralRobot(Robot):
         both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
         return int(position_rank), int(both - position_rank)
 
-    def guess(self, actuators, targets=None):
-        """See Robot; of several hands the first, or those that carry the targets, where they are."""
-        return ends_of(self, actuators, targets) if self.legs.hands else super().guess(actuators, targets)
-
     def near(self, position_mm, actuators):
-        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones.
-
-        Of several hands the one that nominally is nearest.
-        """
-        if self.legs.hands:
-            return nearest_end(self, position_mm, np.asarray(actuators, dtype=float))
+        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones."""
         for leg in self.legs.legs:
             if not leg.bar and not any(joint.passive for joint in leg.joints):
                 return end_of(self.legs, leg, np.asarray(actuators, dtype=float))

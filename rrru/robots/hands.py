@@ -7,11 +7,14 @@ pose is of follows from the position near which it is looked for: that of the ha
 of all arms load the trunk. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from itertools import cycle, islice
 
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import PLATFORM
 from rrru.robots.walk import Poses, Twists, walk, walks
@@ -64,35 +67,47 @@ def ends(legs, actuators, twists):
     return [(way.place, way.turn) for way in (walk(legs, leg, actuators, passive, twists) for leg in legs.legs)]
 
 
-def nearest_end(robot, position_mm, actuators):
-    """HandPoses (n) of those whose tools are nearest to positions (n, 3), at actuator values (n, K)."""
-    tools = _tools(robot, actuators)
-    leg = np.linalg.norm(np.nan_to_num(tools - np.asarray(position_mm)), axis=2).argmin(axis=0)
-    none = np.zeros((len(actuators), 0))
-    return robot.model.solve(actuators, HandPoses(None, None, none, None, None, leg))
+@dataclass(frozen=True, eq=False)
+class HandedRobot(GeneralRobot):
+    """A GeneralRobot of several hands. Its inverse is that of the first one."""
 
+    @cached_property
+    def model(self):
+        """The ends of the legs."""
+        return Ends(self.legs)
 
-def ends_of(robot, actuators, targets=None):
-    """Positions (n, 3) of the tools of the hands that carry targets (n,), by default of the first hand.
+    def near(self, position_mm, actuators):
+        """HandPoses (n) of those whose tools nominally are nearest to positions (n, 3), at actuator values (n, K)."""
+        actuators = np.asarray(actuators, dtype=float)
+        off = np.nan_to_num(self._tools(actuators) - np.asarray(position_mm))
+        none, leg = np.zeros((len(actuators), 0)), np.linalg.norm(off, axis=2).argmin(axis=0)
+        return self.model.solve(actuators, HandPoses(None, None, none, None, None, leg))
 
-    Raises ConfigError for a target that no hand carries.
-    """
-    owner = {target: number for number, hand in enumerate(robot.legs.hands) for target in hand}
-    wanted = [robot.legs.hands[0][0]] * len(actuators) if targets is None else list(targets)[: len(actuators)]
-    if unknown := [target for target in wanted if target not in owner]:
-        allowed = ", ".join(owner)
-        raise ConfigError(f"robot {robot.name}: no hand carries the target {unknown[0]!r}; allowed: {allowed}")
-    return _tools(robot, actuators)[[owner[target] for target in wanted], np.arange(len(actuators))]
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) of the tools of the hands that carry targets (n,), by default of the first hand.
 
+        Raises ConfigError for a target that no hand carries.
+        """
+        owner = {target: number for number, hand in enumerate(self.legs.hands) for target in hand}
+        wanted = [self.legs.hands[0][0]] * len(actuators) if targets is None else list(targets)
+        if unknown := [target for target in wanted if target not in owner]:
+            allowed = ", ".join(owner)
+            raise ConfigError(f"robot {self.name}: no hand carries the target {unknown[0]!r}; allowed: {allowed}")
+        return self._tools(actuators)[[owner[target] for target in wanted], np.arange(len(wanted))]
 
-def _tools(robot, actuators):
-    """Nominal positions (hands, n, 3) of the tools of all hands at actuator values (n, K)."""
-    every = ends(robot.legs, np.asarray(actuators, dtype=float), Twists(robot.legs))
-    return np.stack([place + turn @ np.asarray(robot.tool_mm) for place, turn in every])
+    def _tools(self, actuators):
+        """Nominal positions (hands, n, 3) of the tools of all hands at actuator values (n, K)."""
+        every = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs))
+        return np.stack([place + turn @ np.asarray(self.tool_mm) for place, turn in every])
+
+    def _workspace(self):
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) of the hands in turn."""
+        actuators, _ = super()._workspace()
+        return actuators, self.guess(actuators, list(islice(cycle(h for h, *_ in self.legs.hands), len(actuators))))
 
 
 def with_hands(arms, shared, carries=None):
-    """The robot with several hands that arms by name, robots of one leg of driven joints each, make.
+    """The HandedRobot that arms by name, robots of one leg of driven joints each, make.
 
     shared: number of joints, the base's frame among them, from the base to where the arms part, alike in all of them;
     carries: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
@@ -111,13 +126,14 @@ def with_hands(arms, shared, carries=None):
     drives, ranges, home = _drives(arms.values())
     followers = {one.site: one for arm in arms.values() for one in arm.parts.followers}
     coupling = _coupling(arms.values(), order, list(drives))
-    return replace(
-        first,
-        legs=Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
-        parts=Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
-        drive_range=ranges,
-        lumps=_lumps([*arms.values()], shared),
-    )
+    options = {one.name: getattr(first, one.name) for one in fields(first)}
+    own = {
+        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
+        "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
+        "drive_range": ranges,
+        "lumps": _lumps([*arms.values()], shared),
+    }
+    return HandedRobot(**options | own)
 
 
 def _drives(arms):

@@ -120,16 +120,6 @@ class Legs:
         return tuple(joint.name for joint in self.joints if joint.kind == "R")
 
     @cached_property
-    def behind(self):
-        """By joint's name the set of names of it and of all joints behind it, in every leg that has it."""
-        result = {}
-        for leg in self.legs:
-            names = [joint.name for joint in leg.joints]
-            for number, name in enumerate(names):
-                result.setdefault(name, set()).update(names[number:])
-        return result
-
-    @cached_property
     def joints(self):
         """All joints, each once, in the order of the legs."""
         return tuple({joint.name: joint for leg in self.legs for joint in leg.joints}.values())

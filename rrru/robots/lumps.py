@@ -92,7 +92,7 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     """
     robot, motion = _uncoupled(robot, motion)
     force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
-    behind = robot.legs.behind
+    behind = _behind(robot.legs)
     result = np.empty(at_mm.shape)
     for k, name in enumerate(robot.legs.arm_joints):
         carried = [lump.joint in (*behind[name], PLATFORM) for lump in robot.lumps]
@@ -106,6 +106,16 @@ def base_moment(robot, motion, poses, gravity_mm_s2):
     robot, motion = _uncoupled(robot, motion)
     force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
     return np.cross(place, force).sum(axis=1)
+
+
+def _behind(legs):
+    """By joint's name the names of it and of all joints behind it, in every leg that has it."""
+    result = {}
+    for leg in legs.legs:
+        names = [joint.name for joint in leg.joints]
+        for number, name in enumerate(names):
+            result.setdefault(name, set()).update(names[number:])
+    return result
 
 
 def _uncoupled(robot, motion):

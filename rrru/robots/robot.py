@@ -12,7 +12,6 @@ import numpy as np
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
 from rrru.robots.closure import Closure
-from rrru.robots.hands import Ends
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
 from rrru.robots.readings import place_on_platform, points_read, turned_by
@@ -57,7 +56,7 @@ class Robot(ABC):
     @cached_property
     def model(self):
         """The legs, closed."""
-        return Ends(self.legs) if self.legs.hands else Closure(self.legs)
+        return Closure(self.legs)
 
     def reading(self, reads):
         """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""

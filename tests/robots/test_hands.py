@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from scipy.spatial.transform import Rotation
 
 from rrru.effects.library import library
@@ -15,6 +16,7 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
 from rrru.robots.geometric_numbers import Reads
 from rrru.robots.readings import Readings, lacking
+from tests.places import ROOT
 from tests.robots import two_arms
 from tests.robots.mjcf import file_of
 
@@ -70,7 +72,7 @@ def test_what_nobody_knows_is_no_pose():
 
 def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_read():
     """Against central differences through the exact chains, with finite twists at all sites."""
-    robot, generator = ROBOT.reading(Reads(tuple(SITES.values()), tuple(SITES.values()), frame=True)), None
+    robot = ROBOT.reading(Reads(tuple(SITES.values()), tuple(SITES.values()), frame=True))
     generator = np.random.default_rng(4)
     twists = generator.normal(size=(COUNT, len(robot.legs.sites), 6)) * np.repeat([0.5, 5e-3], 3)
     poses, readings = robot.solve(DRIVES, _own(), twists), _readings(_own())
@@ -207,6 +209,18 @@ def test_a_key_says_what_a_hand_carries():
     np.testing.assert_allclose(
         robot.guess(DRIVES[:2], ["r2", "left"]), [two_arms.seen(DRIVES[0], "right"), two_arms.seen(DRIVES[1], "left")]
     )
+
+
+def test_the_schema_of_the_configuration_knows_hands():
+    from snakemake.utils import validate
+
+    config = yaml.safe_load((ROOT / "config.yaml").read_text())
+    tips = {"urdf": "two_arms.urdf", "tips": {"right": "r", "left": "l"}}
+    config["robots"] |= {"mine": two_arms.section(carries={"right": ["r1"]}), "tree": tips}
+    validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
+    config["robots"]["mine"]["hands"]["left"][1]["nothing"] = 1.0
+    with pytest.raises(Exception, match="nothing"):
+        validate(config, str(ROOT / "workflow/schemas/config.schema.yaml"))
 
 
 def _without(section, key):
