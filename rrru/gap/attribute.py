@@ -25,8 +25,6 @@ from rrru.gap.unknown import UNKNOWN
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
 # a gap of fewer times the noise is linear in everything that can cause it
 _SMALL = 10.0
-# many columns take long to be projected out: the noise is found again so many times
-_BROAD_LOOKS = 2
 # more columns than this share of the numbers read leave too little to tell the noise by
 _MOST_FITTED = 0.5
 _NO_COVARIANCE = np.zeros((0, 0))
@@ -166,7 +164,8 @@ def _rounds(case, calibrated, prior, stated):
             linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
         if stated == KNOWN:
             return case, linear, "given"
-        if len(looks) >= _BROAD_LOOKS and any(effect.coordinates.broad for effect in case.library.values()):
+        # many columns take long to be projected out, and leave the same wherever they are taken
+        if looks and any(effect.coordinates.broad for effect in case.library.values()):
             return case, linear, looks[-1]
         under, source = with_noise(case, linear, stated_mm if stated == STATED else None)
         looks.append(source)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import follows_path
+from rrru.campaign.driven_path import follows_path, stops
 from rrru.campaign.noise import reading_series
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import FitError
@@ -113,6 +113,11 @@ class Case:
     def at(self):
         """Number (m,) of the point that each row was read at."""
         return self._kept if self._readings is None else self._readings.rows[self._kept]
+
+    @cached_property
+    def stop(self):
+        """Number (m,) of the stop that each row was read at: several reflectors may be seen at one."""
+        return stops(self.measurements)[self.at]
 
     @cached_property
     def positions(self):

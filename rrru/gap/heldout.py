@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import cho_solve
@@ -10,7 +11,8 @@ from rrru.campaign.noise import along_runs
 from rrru.gap.case import Case
 from rrru.gap.evidence import LEVELS, ModelEvidence, spectrum
 from rrru.gap.noise_model import lengths
-from rrru.gap.terms import signatures
+from rrru.gap.terms import EACH, signatures
+from rrru.gap.terms import spread as spread_of
 
 # where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
 # so-manieth is left out
@@ -60,7 +62,7 @@ class HeldOut:
         frame, run = self.case.points, self.case.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
             return np.unique(run, return_inverse=True)[1]
-        result = (within(run, self.case.at) // _STRETCH + run) % _FOLDS
+        result = (within(run, self.case.stop) // _STRETCH + run) % _FOLDS
         return np.unique(result, return_inverse=True)[1]
 
     def predict(self, terms, strengths, level, uncertain=True):
@@ -70,46 +72,78 @@ class HeldOut:
         laws as they are. uncertain: tell the prediction's spread, too.
         """
         evidence, linear = self.evidence, self.evidence.linear
-        columns = np.concatenate([linear.base, *signatures(evidence.library, linear, terms)], axis=-1)
+        blocks = [linear.base, *signatures(evidence.library, linear, terms)]
         penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
-        weights, transformed, data = self._weighted(columns, level)
-        root = np.sqrt(weights)
-        white, target = root[..., None] * transformed, root * data
-        grams, moments = {}, {}
-        for number in np.unique(self.fold):
-            own = white[self.fold == number].reshape(-1, columns.shape[-1])
-            grams[number], moments[number] = own.T @ own, own.T @ target[self.fold == number].ravel()
-        total, total_moment = sum(grams.values()), sum(moments.values())
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(total) + penalty, 1e-300))
+        grams = {number: self._chosen(gram, terms) for number, gram in self._sums(level).items()}
+        total = sum(grams.values())
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(total)[:-1] + penalty, 1e-300))
         residual = np.empty_like(linear.data)
-        spread = np.empty((len(self.case), 3, columns.shape[-1] if uncertain else 0))
-        for number in grams:
-            out = self.fold == number
-            precision = total - grams[number] + np.diag(penalty)
-            factor = np.linalg.cholesky(unit[:, None] * precision * unit + 1e-12 * np.eye(len(unit)))
-            mean = unit * cho_solve((factor, True), unit * (total_moment - moments[number]))
-            residual[out] = linear.data[out] - columns[out] @ mean
+        spread = np.empty((len(self.case), 3, len(unit) if uncertain else 0))
+        for number, gram in grams.items():
+            out, rest = self.fold == number, total - gram
+            precision = unit[:, None] * (rest[:-1, :-1] + np.diag(penalty)) * unit
+            factor = np.linalg.cholesky(precision + 1e-12 * np.eye(len(unit)))
+            mean = unit * cho_solve((factor, True), unit * rest[:-1, -1])
+            parts = np.split(mean, np.cumsum([block.shape[-1] for block in blocks])[:-1])
+            residual[out] = linear.data[out] - sum(b[out] @ part for b, part in zip(blocks, parts, strict=True))
             if uncertain:
                 half = unit[:, None] * np.linalg.inv(factor).T
-                spread[out] = columns[out] @ half
+                spread[out] = np.concatenate([block[out] for block in blocks], axis=-1) @ half
         return Prediction(residual, spread, self.case.noise_mm)
 
-    def _weighted(self, columns, level):
-        """Weights (n, 3), columns and data in which the fit is an ordinary weighted one.
+    def _sums(self, level):
+        """Sums of squares and products (K + 1, K + 1) of all columns and the data, by fold, at a level (an index)."""
+        if level not in self._made:
+            weights, together = self._weighted(level)
+            white = np.sqrt(weights)[..., None] * together
+            self._made[level] = {}
+            for number in np.unique(self.fold):
+                own = white[self.fold == number].reshape(-1, white.shape[-1])
+                self._made[level][number] = own.T @ own
+        return self._made[level]
+
+    def _chosen(self, gram, terms):
+        """Of sums (K + 1, K + 1) those (k + 1, k + 1) of calibration, terms and data."""
+        made = [(slice(0, self.evidence.linear.base.shape[-1]), None)]
+        for term in terms:
+            matrix = None if term.legs == EACH else spread_of(self.evidence.library[term.effect].coordinates, term.legs)
+            made.append((self._places[term.effect, term.shape], matrix))
+
+        def columns(whole):
+            """Of columns (r, K + 1) the chosen ones."""
+            parts = [whole[:, at] if matrix is None else whole[:, at] @ matrix for at, matrix in made]
+            return np.concatenate([*parts, whole[:, -1:]], axis=1)
+
+        return columns(columns(gram).T)
+
+    @cached_property
+    def _made(self):
+        """Sums of the levels that have been asked for."""
+        return {}
+
+    @cached_property
+    def _places(self):
+        """Which columns of `_weighted` an effect (name, shape) has."""
+        linear = self.evidence.linear
+        ends = np.cumsum([linear.base.shape[-1], *(columns.shape[-1] for columns in linear.columns.values())])
+        return {key: slice(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
+
+    def _weighted(self, level):
+        """Weights (n, 3) and all columns with the data (n, 3, K + 1) in which a fit is an ordinary weighted one.
 
         Where folds are whole runs they are along these runs' cosines.
         """
-        data, run, noise = self.evidence.linear.data, self.case.series, self.evidence.noise
+        linear, run, noise = self.evidence.linear, self.case.series, self.evidence.noise
+        together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
         size, misfit = noise.axis_mm**2 * (1.0 + noise.offset), (noise.mean_mm * LEVELS[level]) ** 2
         if not all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run)):
-            return np.broadcast_to(1.0 / (size + misfit), data.shape), columns, data
-        together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), run)
-        weights = 1.0 / (noise.variance(wave, lengths(run)) + misfit * spectrum(wave)[:, None])
-        return weights, together[..., :-1], together[..., -1]
+            return np.broadcast_to(1.0 / (size + misfit), linear.data.shape), together
+        together, wave = along_runs(together, run)
+        return 1.0 / (noise.variance(wave, lengths(run)) + misfit * spectrum(wave)[:, None]), together
 
 
 def within(run, at):
-    """Number (m,) from 0 on of the point in its run (m,); at (m,): of which point of the campaign each row is."""
+    """Number (m,) from 0 on of the stop in its run (m,); at (m,): at which stop of the campaign each row was read."""
     result = np.empty(len(run), dtype=int)
     for label in np.unique(run):
         result[run == label] = np.unique(at[run == label], return_inverse=True)[1]
@@ -120,7 +154,7 @@ def resampled_rows(case, generator, draws):
     """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
     block = run = case.run
     if len(np.unique(run)) < _ENOUGH_RUNS:
-        block = run * (len(run) + 1) + within(run, case.at) // _STRETCH
+        block = run * (len(run) + 1) + within(run, case.stop) // _STRETCH
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

@@ -35,6 +35,8 @@ CONTRADICTED = 1.3
 # offsets of a smaller share of the noise's variance are none
 _NO_OFFSET, _INTERVAL = 0.05, (0.025, 0.975)
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
+# of more columns than this the squares tell the rank, to fewer digits
+_MANY, _RANK_OF_SQUARES = 400, 1e-12
 # of longer runs the spectrum is that of endless ones
 _LONG = 400
 
@@ -119,9 +121,14 @@ def _left(data, columns):
     if not columns.size:
         return data, np.ones(len(data))
     size = np.linalg.norm(columns, axis=0)
-    basis, triangle, _ = qr(columns / np.where(size > 0.0, size, 1.0), mode="economic", pivoting=True)
-    rank = int((np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])).sum())
-    basis = basis[:, :rank]
+    unit = columns / np.where(size > 0.0, size, 1.0)
+    if columns.shape[1] > _MANY:
+        value, turned = np.linalg.eigh(unit.T @ unit)
+        kept = value > _RANK_OF_SQUARES * value[-1]
+        basis = unit @ (turned[:, kept] / np.sqrt(value[kept]))
+    else:
+        basis, triangle, _ = qr(unit, mode="economic", pivoting=True)
+        basis = basis[:, np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])]
     return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
 
 

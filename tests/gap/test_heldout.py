@@ -114,7 +114,7 @@ def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full)
 
 def _of_runs(run):
     """What is asked of a case whose points were driven in runs (n,)."""
-    return SimpleNamespace(run=run, at=np.arange(len(run)))
+    return SimpleNamespace(run=run, stop=np.arange(len(run)))
 
 
 def test_rows_are_resampled_by_runs_or_by_stretches():
