@@ -23,7 +23,7 @@ from scipy import linalg
 from rrru.fit.lengths_model import LengthModel
 from rrru.fit.lengths_start import starts as length_starts
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import LengthCase, frame_columns, ways
+from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, frame_columns, ways_of
 from rrru.studies.real.lengths_section import MM, Section, held_out, numbers, row_numbers
 
 MISSING, SCALE = "missing_length", "length_scale"
@@ -87,7 +87,7 @@ def _missing(bare, belts):
     told = [("all belts alike", "a common missing length", starts.sum(axis=1, keepdims=True), _ALIKE)]
     told += [(belt, f"a missing length of {belt}", starts[:, [k]], _SINGLE / count) for k, belt in enumerate(belts)]
     told += [(", ".join(belts), "a missing length per belt", starts, _EACH)]
-    return ways(MISSING, told, lambda columns: np.full(columns.shape[1], span))
+    return ways_of(MISSING, told, lambda columns: np.full(columns.shape[1], span))
 
 
 def _scale(bare):
@@ -95,7 +95,7 @@ def _scale(bare):
     count = bare.counted.shape[1]
     factors = np.eye(len(bare.origin))[:, -count:] @ linalg.null_space(np.ones((1, count)))
     told = [("each belt its own", "a scale per belt", factors, _SCALED)]
-    return ways(SCALE, told, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
+    return ways_of(SCALE, told, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
 
 
 def _starts(model):
@@ -184,12 +184,14 @@ def _words(case, verdict, belts):
     elif case.probability_of(lambda laws: SCALE in [law.effect for law in laws]) > 0.1:
         notes.append("A scale of its own for each belt is possible, these rows do not settle it.")
         rivals.append(SCALE)
-    if effects[-1:] == ("unexplained",):
+    if UNEXPLAINED in effects:
         notes.append(
             f"{chosen.evidence.smooth_mm:.1f} mm are left that follow the place smoothly and that no law here explains"
             " (tension, arms that swing and heights are not measured)."
         )
     next_runs = "one tape measurement between two anchors: lengths alone do not tell a scale that all belts share"
+    if {SCALE, UNEXPLAINED} & set(effects):
+        next_runs += "; the same places once more with the belts pulled harder: stretch changes, scales do not"
     return notes, ", ".join(where), next_runs, ", ".join(dict.fromkeys(rivals))
 
 
@@ -206,6 +208,8 @@ def _missing_words(case, chosen, law, belts):
     if law is case.laws[MISSING][0]:
         side = "longer" if missing[0] > 0.0 else "shorter"
         said = f"Every belt is {abs(missing[0]):.1f} +- {error[0]:.1f} mm {side} than counted"
+        smooth = _smooth_words(chosen)
+        said += f" ({smooth})" if smooth else ""
     else:
         said = "; ".join(
             f"Belt {belts[k]} is {abs(missing[k]):.1f} +- {error[k]:.1f} mm"
@@ -226,6 +230,8 @@ def _none_missing_words(case, chosen):
     if common is None:
         return "These rows are too few to tell whether a length misses."
     value, error = _first_missing(common.fit)
+    if not np.isfinite(error):
+        return "These rows do not tell whether a length misses."
     return f"No length misses: a common one would be {value:.1f} +- {error:.1f} mm."
 
 

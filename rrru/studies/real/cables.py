@@ -24,7 +24,7 @@ import pandas as pd
 
 from rrru.fit.lengths_model import LengthModel
 from rrru.studies.real import length_tables
-from rrru.studies.real.length_laws import LengthCase, ways
+from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, ways_of
 from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
 
 RADIUS = "drum_radius"
@@ -109,7 +109,7 @@ def _radii(bare, drums, radii):
     told += [(drum, f"the radius of {drum}", factors[:, [k]], _SINGLE / len(drums)) for k, drum in enumerate(drums)]
     told += [(", ".join(drums), "a radius per drum", factors, _EACH)]
     reach = _RADIUS_SHARE * radii.mean()
-    return ways(RADIUS, told, lambda columns: np.full(columns.shape[1], reach))
+    return ways_of(RADIUS, told, lambda columns: np.full(columns.shape[1], reach))
 
 
 def _starts(model):
@@ -177,6 +177,6 @@ def _words(case, verdict, drums):
             rivals.append(RADIUS)
             runs.append("the cable that ten turns of each drum take up, by a tape")
     notes.append("A scale error of the camera would act as a common factor of the radii.")
-    if effects[-1:] == ("unexplained",):
+    if UNEXPLAINED in effects:
         notes.append(f"{chosen.evidence.smooth_mm:.1f} mm are left that follow the place smoothly, by no law here.")
     return notes, where, "; ".join(runs), ", ".join(dict.fromkeys(rivals))

@@ -172,7 +172,7 @@ class LengthCase:
         return next((one for one in self.hypotheses[0] if one.laws == tuple(laws)), None)
 
 
-def ways(effect, told, reach):
+def ways_of(effect, told, reach):
     """Laws of an effect from (where, adds, columns, believed); reach(columns): how far its numbers may go, 1 sigma."""
     return tuple(
         Law(

@@ -69,8 +69,7 @@ def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
     """The row of real_verdicts but its notes; errors: of the steps, those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
     before, after = errors.get((), errors[chosen.laws]), errors[chosen.laws]
-    smooth = effects[-1:] == (UNEXPLAINED,)
-    noise = chosen.evidence.noise_mm if smooth else chosen.fit.noise_mm
+    noise = chosen.evidence.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
     gaps = [float(np.sqrt(max(rms(one) ** 2 - noise**2, 0.0))) for one in (before, after)]
     closed = share_closed(before, after, noise) if chosen.laws else (0.0, 0.0, 0.0)
     return {

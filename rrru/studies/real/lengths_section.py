@@ -26,7 +26,7 @@ class Section:
                 raise ConfigError(f"real.sets.{name}: got an unknown key {key!r}; allowed: {known}")
 
     def _of_kind(self, value, kind, place, allowed):
-        if not isinstance(value, kind) or isinstance(value, bool) or not (value or value == 0):
+        if not isinstance(value, kind) or not value:
             raise ConfigError(f"{place}: got {value!r}; allowed: {allowed}")
         return value
 
