@@ -1,0 +1,182 @@
+"""Cable robots whose drums turn by known angles and whose platform a camera sees: drum radii, anchors, start lengths.
+
+A set of `real: sets:`
+
+    kamal:
+      kind: cables
+      files: "planar_cables/*.csv"    # one calibration per file
+      drums: {drum1: {column: drum1_rad, radius_mm: 25.0}, drum2: {..}, drum3: {..}}
+      angle_unit: rad    # of the drums' columns: rad (default), deg
+      anchors: [a1, a2, a3, a4]
+      distances: [[1, 1, 0, 0], [1, 0, 2, 0], [0, 1, 0, 2]]    # a row per drum: how often its cable runs to each anchor
+      heights_mm: {a1: 0}    # of an anchor above the plane of the positions; absent: 0
+      position: [x_m, y_m]    # two or three columns of the platform's measured place
+      unit: m    # of the position: mm (default), m, inch
+      row: pose    # column that numbers the rows; absent: row, or from 1
+
+A cable is its length at the drum's zero plus radius times angle; it is also the sum of the distances that it runs. The
+camera's frame is the anchors'. Its places count as exact. A camera that sees everything larger by a factor acts as
+radii larger by this factor: lengths do not tell the two apart.
+"""
+
+import numpy as np
+import pandas as pd
+
+from rrru.fit.lengths_model import LengthModel
+from rrru.studies.real import length_tables
+from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, ways_of
+from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
+
+RADIUS = "drum_radius"
+_NEEDED = ("kind", "files", "drums", "anchors", "distances", "position")
+_OPTIONAL = ("angle_unit", "unit", "heights_mm", "row")
+# ASSUME radii are good to 4 %, 1 sigma; a camera scale, or cable as thick as not counted, changes all by one factor
+_RADIUS_SHARE, _COMMON, _SINGLE, _EACH = 0.04, 0.2, 0.15, 0.15
+# places to start anchors from, so many spans of the seen places off their middle at most
+_STARTS, _FAR, _SEED = 30, 6.0, 1
+
+
+def study(frame, section, name):
+    """Tables of one calibration: real_verdicts, real_steps, real_parameters, real_points.
+
+    frame: one row per pose; section: as above; name: of the set, for messages. Raises ConfigError and IngestError for
+    what is no such set, FitError where the poses tell no machine.
+    """
+    read = Section(section, name, _NEEDED, _OPTIONAL)
+    case, drums, anchors = cable_case(frame, read)
+    verdict = case.verdict()
+    chosen = verdict[2]
+    laws = case.laws[RADIUS]
+    chain = list(dict.fromkeys([(), (laws[0],), (laws[-1],), chosen.laws]))
+    steps, errors = length_tables.steps(case, chain, held_out(frame))
+    notes, where, next_runs, rivals = _words(case, verdict, drums)
+    row = length_tables.verdict_row(case, verdict, errors, where=where, confusable_with=rivals, next_runs=next_runs)
+    rows = row_numbers(frame, read)
+    row |= {"notes": " ".join([*notes, *length_tables.bad_words(case, drums, rows)])}
+    return {
+        "real_verdicts": pd.DataFrame([row]),
+        "real_steps": steps,
+        "real_parameters": pd.DataFrame(_parameters(case, chosen, drums, anchors)),
+        "real_points": length_tables.points(case, chosen, drums, rows),
+    }
+
+
+def cable_case(frame, read):
+    """The LengthCase of a set, and the names of its drums and anchors; read: its Section."""
+    drums, anchors, columns = read.mapping("drums"), read.texts("anchors"), read.texts("position")
+    if len(columns) not in (2, 3):
+        read.refuse("position", columns, "two or three columns")
+    for drum, entry in drums.items():
+        if not isinstance(entry, dict) or set(entry) != {"column", "radius_mm"}:
+            read.refuse(f"drums.{drum}", entry, "a mapping of column and radius_mm")
+    radii = [read.number(f"drums.{drum}.radius_mm", entry["radius_mm"], 1e-6) for drum, entry in drums.items()]
+    routing = _routing(read, tuple(drums), anchors)
+    least = -(-(len(anchors) * len(columns) + len(drums) + 1) // len(drums))
+    wanted = [entry["column"] for entry in drums.values()]
+    values = numbers(frame, [*wanted, *columns], read.given("files"), least)
+    angles = RAD[read.choice("angle_unit", "rad", tuple(RAD))] * values[:, : len(drums)]
+    places = MM[read.choice("unit", "mm", tuple(MM))] * values[:, len(drums) :]
+    free, count = len(anchors) * len(columns) + len(drums), len(drums)
+    origin = np.append(np.zeros(free), radii)
+    names = tuple(f"frame_{number}" for number in range(free))
+    heights = read.heights("heights_mm", anchors)
+    bare = LengthModel(angles, routing, heights, origin, np.eye(free + count)[:, :free], names, places)
+    return LengthCase(bare, {RADIUS: _radii(bare, tuple(drums), np.array(radii))}, _starts), tuple(drums), anchors
+
+
+def _routing(read, drums, anchors):
+    """Matrix (k, n) of how often a cable runs to an anchor."""
+    rows = read.given("distances")
+    shaped = isinstance(rows, list) and len(rows) == len(drums)
+    if not shaped or not all(isinstance(row, list) and len(row) == len(anchors) for row in rows):
+        read.refuse("distances", rows, f"{len(drums)} rows, one per drum, of {len(anchors)} numbers, one per anchor")
+    routing = np.array([[read.number("distances", value, 0.0) for value in row] for row in rows])
+    for drum, row in zip(drums, routing, strict=True):
+        if not row.any():
+            read.refuse("distances", row.tolist(), f"a distance at least for the cable of {drum}")
+    for anchor, column in zip(anchors, routing.T, strict=True):
+        if not column.any():
+            read.refuse("distances", column.tolist(), f"a cable at least that runs to {anchor}")
+    return routing
+
+
+def _radii(bare, drums, radii):
+    """Ways of radii to be off: all by one factor, one drum, each drum its own."""
+    factors = np.eye(len(bare.origin))[:, -len(drums) :]
+    told = [
+        ("all drums by one factor", "a common factor of the radii", factors @ radii[:, None] / radii.mean(), _COMMON)
+    ]
+    told += [(drum, f"the radius of {drum}", factors[:, [k]], _SINGLE / len(drums)) for k, drum in enumerate(drums)]
+    told += [(", ".join(drums), "a radius per drum", factors, _EACH)]
+    reach = _RADIUS_SHARE * radii.mean()
+    return ways_of(RADIUS, told, lambda columns: np.full(columns.shape[1], reach))
+
+
+def _starts(model):
+    """Starts (theta, places): anchors anywhere about the seen places, start lengths as these ask."""
+    generator, inverse = np.random.default_rng(_SEED), np.linalg.pinv(model.basis)
+    middle, span = model.places_mm.mean(axis=0), np.ptp(model.places_mm, axis=0).max()
+    readings, count = model.routing.shape
+    for _ in range(_STARTS):
+        anchors = middle + span * generator.uniform(-_FAR, _FAR, (count, model.dimensions)) * generator.uniform()
+        full = np.concatenate([anchors.ravel(), np.zeros(readings), model.origin[-readings:]])
+        left = model.residual(inverse @ (full - model.origin), model.places_mm)
+        full[-2 * readings : -readings] = -left.mean(axis=0)
+        yield inverse @ (full - model.origin), model.places_mm
+
+
+def _parameters(case, chosen, drums, anchors):
+    """Rows of real_parameters: anchors and start lengths under the verdict's laws, radii each free."""
+    fit = chosen.fit
+    parameter, start = length_tables.parameter, fit.model.numbers(fit.theta)[1]
+    start_errors = length_tables.split(fit, fit.standard_errors)[1]
+    rows = length_tables.anchors(case, chosen, anchors, "in the camera's frame")
+    rows += [
+        parameter(f"{drum}_start", "mm", start[k], start_errors[k], np.nan, "cable at the drum's zero")
+        for k, drum in enumerate(drums)
+    ]
+    free = case.hypothesis([case.laws[RADIUS][-1]])
+    if free is None:
+        return rows
+    note = "" if free is chosen else "with all radii free, which is not the verdict"
+    radius = free.fit.model.numbers(free.fit.theta)[2]
+    spread = length_tables.split(free.fit, free.fit.standard_errors)[2]
+    nominal = case.bare.origin[-len(drums) :]
+    return rows + [
+        parameter(f"{drum}_radius", "mm", radius[k], spread[k], nominal[k], note) for k, drum in enumerate(drums)
+    ]
+
+
+def _words(case, verdict, drums):
+    """Notes (sentences), where, next_runs and what is confusable, of a verdict."""
+    effects, _, chosen = verdict
+    possible, poses = case.laws[RADIUS], len(case.weight)
+    off = case.probability_of(lambda laws: bool(laws))
+    notes, where, rivals, runs = [], "", [], []
+    if RADIUS in effects:
+        law = chosen.laws[0]
+        settled = case.probability_of(lambda laws: law in laws) > 0.9 * off
+        where = law.where if settled else ""
+        changed = chosen.fit.model.numbers(chosen.fit.theta)[2] - case.bare.origin[-len(drums) :]
+        error = length_tables.split(chosen.fit, chosen.fit.standard_errors)[2]
+        said = [f"{drums[k]} by {changed[k]:+.2f} +- {error[k]:.2f} mm" for k in np.flatnonzero(error > 0.0)]
+        notes.append(f"The radii are off, likeliest {', '.join(said)}.")
+        if not settled:
+            named = [
+                way.adds for way in possible if case.probability_of(lambda laws, way=way: way in laws) > 0.05 * off
+            ]
+            notes.append(f"{poses} poses do not settle which radius is off (possible: {'; '.join(named)}).")
+            rivals += named
+            runs.append("the cable that ten turns of each drum take up, by a tape")
+        if case.probability_of(lambda laws: possible[0] in laws) > 0.05 * off:
+            rivals.append("camera_scale")
+            runs.append("a rule of known length before the camera")
+    else:
+        notes.append(f"No radius is shown to be off; that one is has probability {off:.2f}.")
+        if off > 0.1:
+            rivals.append(RADIUS)
+            runs.append("the cable that ten turns of each drum take up, by a tape")
+    notes.append("A scale error of the camera would act as a common factor of the radii.")
+    if UNEXPLAINED in effects:
+        notes.append(f"{chosen.evidence.smooth_mm:.1f} mm are left that follow the place smoothly, by no law here.")
+    return notes, where, "; ".join(runs), ", ".join(dict.fromkeys(rivals))

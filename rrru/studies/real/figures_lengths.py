@@ -1,0 +1,68 @@
+"""Machines of which only lengths are known on one page: the frame without and with what their count leaves out."""
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.figures import style
+
+_BARE = {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white"}
+_FOUND = {"color": style.BLUE, "marker": "s"}
+_PLACES = {"linestyle": "none", "markersize": 1.6, "markeredgewidth": 0.4}
+_COLOURS = (style.BLUE, style.ORANGE, style.VERMILION, style.SKY, style.BLACK, style.GREY)
+_MARKERS = ("o", "s", "^", "D", "v", "x")
+_ROW_MM = 68.0
+
+
+@style.printed
+def lengths(tables, options):
+    """Machines of which only lengths are known, one row each. Left: the frame and the places, without any further law
+    and with those of the verdict. Middle and right: what each length's model misses, without and with them; mind the
+    scales. Circles: readings left out.
+    """
+    points, parameters = tables["real_points"], tables["real_parameters"]
+    names = list(dict.fromkeys(points["dataset"])) if "dataset" in points else [""]
+    if points.empty:
+        raise ConfigError("lengths: table real_points has no row")
+    figure = style.new(style.DOUBLE_MM, 14.0 + _ROW_MM * len(names))
+    panels = figure.subplots(len(names), 3, squeeze=False, width_ratios=(1.3, 1.0, 1.0))
+    for name, (frame, bare, found) in zip(names, panels, strict=True):
+        own = [table[table["dataset"] == name] if name else table for table in (points, parameters)]
+        _draw_frame(frame, *own, name)
+        _draw_residuals(bare, own[0], "bare_residual_mm", "frame alone")
+        _draw_residuals(found, own[0], "residual_mm", "with the verdict's laws")
+    style.legend_above(figure, panels.ravel(), columns=8)
+    return figure
+
+
+def _draw_frame(axes, points, parameters, name):
+    """Anchors and places in m, without and with the verdict's laws."""
+    for prefix, look, label in (("bare_", _BARE, "frame alone"), ("", _FOUND, "with the verdict's laws")):
+        anchors = _anchors(parameters, prefix)
+        around = np.argsort(np.arctan2(*(anchors - anchors.mean(axis=0)).T[::-1]))
+        closed = anchors[np.append(around, around[0])] / 1000.0
+        axes.plot(closed[:, 0], closed[:, 1], linewidth=0.8, label=label, **look)
+        places = points[[f"{prefix}x_mm", f"{prefix}y_mm"]].to_numpy() / 1000.0
+        axes.plot(places[:, 0], places[:, 1], **(look | _PLACES))
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    axes.set_title(f"{name}: frame and places" if name else "frame and places")
+    axes.grid(True)
+
+
+def _anchors(parameters, prefix):
+    """Anchors (n, 2) in mm: x and y of every name with both."""
+    values = dict(zip(parameters["parameter"], parameters["value"], strict=True))
+    names = [name.removesuffix("_x") for name in values if name.endswith("_x") and not name.startswith("bare_")]
+    return np.array([[values[f"{prefix}{name}_{axis}"] for axis in "xy"] for name in names])
+
+
+def _draw_residuals(axes, points, column, title):
+    """Residual of every length over the rows."""
+    for k, (reading, own) in enumerate(points.groupby("reading", sort=False)):
+        look = {"color": _COLOURS[k % len(_COLOURS)], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 2.0}
+        axes.plot(own["row"], own[column], linewidth=0.5, label=reading, **look)
+        out = own[~own["used"]]
+        axes.plot(out["row"], out[column], "o", markersize=7.0, color=style.BLACK, markerfacecolor="none")
+    axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
+    axes.set(xlabel="row", ylabel="read less modelled length (mm)")
+    axes.set_title(title)
+    axes.grid(True)

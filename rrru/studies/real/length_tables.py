@@ -1,0 +1,118 @@
+"""Tables of machines of which lengths are known: real_steps, rows of real_verdicts and real_parameters, real_points."""
+
+import numpy as np
+import pandas as pd
+
+from rrru.studies.real.length_laws import UNEXPLAINED, foretold, rms, share_closed
+
+# rows that a note names
+_NAMED = 10
+
+
+def split(fit, values):
+    """Numbers (n d + 2 k,) of a machine as anchors (n, d), start lengths (k,) and factors (k,)."""
+    readings, anchors = fit.model.routing.shape
+    return values[: -2 * readings].reshape(anchors, -1), values[-2 * readings : -readings], values[-readings:]
+
+
+def parameter(name, unit, value, standard_error, nominal, note):
+    """One row of real_parameters."""
+    numbers = {"value": float(value), "standard_error": float(standard_error), "nominal": float(nominal)}
+    return {"parameter": name, "unit": unit, **numbers, "note": note}
+
+
+def anchors(case, chosen, names, note):
+    """Rows of real_parameters of the anchors under the verdict's laws, and of those of the frame alone (bare_)."""
+    rows = []
+    for prefix, hypothesis, said in (("", chosen, note), ("bare_", case.hypothesis(()), "without any further law")):
+        if hypothesis is None:
+            continue
+        fit = hypothesis.fit
+        values, errors = fit.model.numbers(fit.theta)[0], split(fit, fit.standard_errors)[0]
+        for name, place, error in zip(names, values, errors, strict=True):
+            coordinates = zip("xyz", place, error, strict=False)
+            rows += [
+                parameter(f"{prefix}{name}_{axis}", "mm", at, wide, np.nan, said) for axis, at, wide in coordinates
+            ]
+    return rows
+
+
+def steps(case, chain, held_out):
+    """Table real_steps of a chain of laws, and the errors (N, k) of each as the other rows foretell them.
+
+    Held-out columns: as `foretold` says, one value per reading.
+    """
+    rows, errors = [], {}
+    for laws in chain:
+        hypothesis = case.hypothesis(laws)
+        if hypothesis is None:
+            continue
+        fit = hypothesis.fit
+        errors[tuple(laws)] = wrong = foretold(fit, held_out)
+        adds = "anchors" + ("" if case.bare.places_mm is not None else " and the place of every row")
+        rows.append(
+            {
+                "model": " + ".join(["frame", *(law.adds for law in laws)]),
+                "adds": laws[-1].adds if laws else adds,
+                "parameters": len(fit.theta),
+                "identifiable": fit.identifiability.rank,
+                "train_rms_mm": fit.rms_mm,
+                "held_out_mean_mm": float(np.nanmean(np.abs(wrong))),
+                "held_out_rms_mm": rms(wrong),
+                "held_out_max_mm": float(np.nanmax(np.abs(wrong))),
+            }
+        )
+    return pd.DataFrame(rows), errors
+
+
+def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
+    """The row of real_verdicts but its notes; errors: of the steps, those of the bare frame and of the verdict."""
+    effects, probability, chosen = verdict
+    before, after = errors.get((), errors[chosen.laws]), errors[chosen.laws]
+    noise = chosen.evidence.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
+    gaps = [float(np.sqrt(max(rms(one) ** 2 - noise**2, 0.0))) for one in (before, after)]
+    closed = share_closed(before, after, noise) if chosen.laws else (0.0, 0.0, 0.0)
+    return {
+        "effects": "+".join(effects) or "none",
+        "probability": probability,
+        "where": where,
+        "confusable_with": confusable_with,
+        "noise_rms_mm": noise,
+        "gap_rms_mm": gaps[0],
+        "gap_after_rms_mm": gaps[1],
+        **dict(zip(("share_closed", "share_closed_low", "share_closed_high"), closed, strict=True)),
+        "next_runs": next_runs,
+        "points": len(case.weight),
+        "dropped_points": int((case.weight == 0.0).any(axis=1).sum()),
+    }
+
+
+def bad_words(case, readings, rows):
+    """Sentences that name the readings left out and those that stand out but stay; rows (N,): their numbers."""
+    said = []
+    for flags, words in (
+        (case.weight == 0.0, "Left out, since other lengths contradict them"),
+        (case.suspect, "These stand out from their neighbours, but not so far that they are left out"),
+    ):
+        named = [
+            f"row {rows[row]} ({', '.join(np.array(readings)[flags[row]])})"
+            for row in np.flatnonzero(flags.any(axis=1))
+        ]
+        more = f" and {len(named) - _NAMED} more rows" if len(named) > _NAMED else ""
+        said += [f"{words}: {'; '.join(named[:_NAMED])}{more}."] if named else []
+    return said
+
+
+def points(case, chosen, readings, rows):
+    """Table real_points: a row per reading, under the frame alone (bare_) and under the verdict's laws.
+
+    row, reading; the place in mm, z NaN in the plane; residuals, read less modelled length, in mm; used: whether it
+    was; stands_out: whether it is named though it was.
+    """
+    count, bare = len(readings), case.hypothesis(()) or chosen
+    columns = {"row": np.repeat(rows, count), "reading": list(readings) * len(rows)}
+    for prefix, fit in (("bare_", bare.fit), ("", chosen.fit)):
+        places = np.pad(fit.places, ((0, 0), (0, 3 - fit.places.shape[1])), constant_values=np.nan)
+        columns |= {f"{prefix}{axis}_mm": np.repeat(places[:, k], count) for k, axis in enumerate("xyz")}
+        columns |= {f"{prefix}residual_mm": fit.residual_mm.ravel()}
+    return pd.DataFrame(columns | {"used": case.weight.ravel() > 0.0, "stands_out": case.suspect.ravel()})
