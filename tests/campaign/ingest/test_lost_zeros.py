@@ -16,11 +16,17 @@ from tests.schemas import check_measurements
 
 _NOISE_MM = 0.02
 _QUARTER = 0.5 * np.pi
+_TURNED, _BACK = {"alpha": _QUARTER}, {"alpha": -_QUARTER}
 _ROWS = (
-    ({"d": 300.0, "alpha": -_QUARTER}, {"a": 280.0, "theta": -_QUARTER}, {"a": 70.0, "alpha": -_QUARTER})
-    + ({"d": 300.0, "alpha": _QUARTER}, {"alpha": -_QUARTER}, {"d": 80.0}),
-    ({"d": 150.0, "alpha": _QUARTER}, {"a": -400.0}, {"a": -380.0})
-    + ({"d": 130.0, "alpha": _QUARTER}, {"d": 100.0, "alpha": -_QUARTER}, {"d": 90.0}),
+    [
+        {"d": 300.0} | _BACK,
+        {"a": 280.0, "theta": -_QUARTER},
+        {"a": 70.0} | _BACK,
+        {"d": 300.0} | _TURNED,
+        _BACK,
+        {"d": 80.0},
+    ],
+    [{"d": 150.0} | _TURNED, {"a": -400.0}, {"a": -380.0}, {"d": 130.0} | _TURNED, {"d": 100.0} | _BACK, {"d": 90.0}],
 )
 
 
