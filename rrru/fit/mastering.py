@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-# an assembly sets zeros better than this, in rad and in mm
-_LARGE = {"rad": 5e-3, "mm": 2.0}
+from rrru.campaign.ingest.mastering import LARGE
 
 
 def mastering_notes(fit: Any, robot: Any) -> tuple[str, ...]:
@@ -17,7 +16,7 @@ def mastering_notes(fit: Any, robot: Any) -> tuple[str, ...]:
     notes = []
     for drive in robot.parts.drives:
         off = values.get(f"d{drive.column.rpartition('_')[0]}", 0.0)
-        if abs(off) > _LARGE[drive.unit]:
+        if abs(off) > LARGE[drive.unit]:
             size = f"{np.degrees(off):.3g} degrees" if drive.unit == "rad" else f"{off:.3g} mm"
             notes.append(f"{drive.site}: zero is off by {size}")
     return tuple(notes)

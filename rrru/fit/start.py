@@ -7,7 +7,7 @@ import numpy as np
 from rrru.fit.identifiability import parameter_scale
 
 # a median residual above this share of the robot's size is none that its geometry makes: zeros or frames are lost
-_FAR = 1e-2
+_FAR = 2e-3
 # residual from which on a reading counts less while these are found
 _LOOSE_MM = 5.0
 

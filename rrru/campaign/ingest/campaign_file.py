@@ -193,8 +193,7 @@ def _table(
     frame, drives = at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
     wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
-    blank = vector_columns("measured", np.where(wrong[:, None], np.nan, measured(frame)))
-    notes, outlier = doubts(frame, sheet.mechanism), outliers(frame.assign(**blank), digit_mm) | wrong
+    notes, outlier = doubts(frame[~wrong], sheet.mechanism), outliers(frame, digit_mm) | wrong
     told = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
         told |= turn_columns("command", sheet.poses.turn)

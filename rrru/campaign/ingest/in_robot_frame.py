@@ -16,10 +16,11 @@ from rrru.errors import FitError
 
 
 def at_tool(sheet: Sheet, mounted: Mounting | None) -> Sheet:
-    """The sheet with the positions of reflectors carried to the tool; its frame is the robot's."""
+    """The sheet with the positions of reflectors carried to the tool, NaN where that is none, in the robot's frame."""
     if mounted is None:
         return sheet
-    moved = vector_columns("measured", measured(sheet.frame) - mounted.offset_mm)
+    carried = np.where(mounted.strays[:, None], np.nan, measured(sheet.frame) - mounted.offset_mm)
+    moved = vector_columns("measured", carried)
     return replace(sheet, frame=sheet.frame.assign(**moved))
 
 

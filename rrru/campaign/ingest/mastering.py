@@ -15,8 +15,11 @@ from scipy.optimize import least_squares
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, open_numbers
 from rrru.robots.readings import lacking
 
-# a residual above this share of the robot's size is none of its geometry; one this much smaller explains it
-LOST_SHARE, _EXPLAINED = 2e-3, 0.5
+# shares of the robot's size: from the first on a residual may be one of zeros, above the second one of nothing else;
+# what leaves less than the third of it explains it
+_MAY_BE, _LOST, _EXPLAINED = 5e-4, 2e-3, 0.5
+# an assembly sets zeros better than this, in rad and in mm
+LARGE = {"rad": 5e-3, "mm": 2.0}
 # other starts, drawn so far from the nominal zeros; a fit this good needs no other
 _STARTS, _SPREAD, _ENOUGH = 16, {"rad": 0.4, "mm": 80.0}, 0.1
 # residual from which on a reading counts less
@@ -34,8 +37,8 @@ def lost_zeros(robot, driven, seen, frames):
     Poses to a Framed.
     """
     units, nothing = robot.parts.units, np.zeros(len(robot.parts.drives))
-    least_mm, before = LOST_SHARE * robot.size_mm, _off(robot, driven, frames, nothing)
-    if before <= least_mm:
+    before = _off(robot, driven, frames, nothing)
+    if before <= _MAY_BE * robot.size_mm:
         return nothing
     generator, best, least = np.random.default_rng(0), nothing, before
     spread = np.array([_SPREAD[unit] for unit in units])
@@ -45,7 +48,7 @@ def lost_zeros(robot, driven, seen, frames):
         left = np.inf if found is None else _off(robot, driven, frames, found)
         if left < least:
             best, least = found, left
-        if least <= max(_ENOUGH * before, least_mm):
+        if least <= max(_ENOUGH * before, _LOST * robot.size_mm):
             break
     return best if least < _EXPLAINED * before else nothing
 

@@ -12,7 +12,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import stops
 from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
-from rrru.campaign.ingest.mastering import lost_zeros
+from rrru.campaign.ingest.mastering import LARGE, lost_zeros
 from rrru.campaign.ingest.sheet import TURNS, position_text
 from rrru.robots.readings import Readings
 
@@ -72,7 +72,7 @@ def mounting(sheet):
     zeros = _zeros(sheet, frames, command) if told else np.zeros(len(sheet.drives))
     if zeros.any():
         poses = sheet.mechanism.solve(sheet.actuators(command) + zeros, command)
-        notes += (_in_words(sheet.mechanism.parts, zeros),)
+        notes += _in_words(sheet.mechanism.parts, zeros)
     elif not named:
         return None
     rotation, place = frames.fitted(poses)
@@ -119,13 +119,15 @@ def _zeros(sheet, frames, command):
 
 
 def _in_words(parts, zeros):
-    """A note on zeros (K,) of the drives."""
-    sizes = {"rad": "{:.3g} degrees", "mm": "{:.3g} mm"}
-    shown = [np.degrees(zero) if unit == "rad" else zero for zero, unit in zip(zeros, parts.units, strict=True)]
-    worst = int(np.argmax(np.abs(zeros) / np.abs(zeros).max()))
-    most = sizes[parts.units[worst]].format(abs(shown[worst]))
-    drive = parts.columns[worst].rpartition("_")[0]
-    return f"zeros of the drives are lost, by {most} at {drive}: found with the frame, fitted by the calibration"
+    """Notes on zeros (K,) of the drives that are far off."""
+    shares = np.abs(zeros) / [LARGE[unit] for unit in parts.units]
+    worst = int(shares.argmax())
+    if shares[worst] < 1.0:
+        return ()
+    drive = parts.drives[worst]
+    most = f"{np.degrees(zeros[worst]):.3g} degrees" if drive.unit == "rad" else f"{zeros[worst]:.3g} mm"
+    found = "found with the frame, fitted by the calibration"
+    return (f"zeros of {int((shares >= 1.0).sum())} drives are lost, by {most} at {drive.site}: {found}",)
 
 
 def check_turned(sheet):

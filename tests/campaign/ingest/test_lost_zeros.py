@@ -1,0 +1,121 @@
+"""Files of robots whose drives have lost their zeros, in an instrument's own frame: ingest, calibration, words."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.fit.campaign_fit import select
+from rrru.fit.least_squares import least_squares
+from rrru.fit.mastering import mastering_notes
+from rrru.robots.hexapod import hexapod
+from rrru.robots.serial import serial
+from tests.schemas import check_measurements
+
+_NOISE_MM = 0.02
+_QUARTER = 0.5 * np.pi
+_TURNED, _BACK = {"alpha": _QUARTER}, {"alpha": -_QUARTER}
+_ROWS = (
+    [
+        {"d": 300.0} | _BACK,
+        {"a": 280.0, "theta": -_QUARTER},
+        {"a": 70.0} | _BACK,
+        {"d": 300.0} | _TURNED,
+        _BACK,
+        {"d": 80.0},
+    ],
+    [{"d": 150.0} | _TURNED, {"a": -400.0}, {"a": -380.0}, {"d": 130.0} | _TURNED, {"d": 100.0} | _BACK, {"d": 90.0}],
+)
+
+
+def _arm(generator):
+    """One of two kinds of arms with links of random lengths, actuator values (n, 6) and positions (n, 3)."""
+    every = [
+        {key: value * generator.uniform(0.8, 1.2) if key in ("a", "d") else value for key, value in row.items()}
+        for row in _ROWS[generator.integers(2)]
+    ]
+    arm = serial(every, np.tile([-1.5, 1.5], (6, 1)), np.full(6, 0.3), parameter_set="full")
+    driven = generator.uniform(-1.5, 1.5, (50, 6))
+    return arm, driven, arm.forward(driven)
+
+
+def _hexapod(generator):
+    """A hexapod, actuator values (n, 6) and positions (n, 3)."""
+    angles = np.radians([10.0, 110.0, 130.0, 230.0, 250.0, 350.0])
+    base, plate = (
+        np.stack([size * np.cos(at), size * np.sin(at), 0.0 * at], axis=1)
+        for size, at in ((400.0, angles), (220.0, angles + np.radians([30.0, -30.0] * 3)))
+    )
+    robot = hexapod(base, plate, 500.0, parameter_set="full")
+    place = robot.legs.home_mm + generator.uniform(-60.0, 60.0, (60, 3))
+    turn = Rotation.from_rotvec(generator.uniform(-0.25, 0.25, (60, 3))).as_matrix()
+    driven = robot.inverse(place, turn=turn)
+    known = np.isfinite(driven).all(axis=1)
+    return robot, driven[known], place[known]
+
+
+def _file(folder, made, generator, zeros):
+    """A file of a robot of zeros (K,): three reflectors nobody knows, in a frame nobody knows."""
+    robot, driven, position = made
+    poses = robot.solve(driven + zeros, position)
+    assert poses.closed.all()
+    frame, shift = Rotation.random(random_state=generator), generator.uniform(-3000.0, 3000.0, 3)
+    parts = []
+    for name in ("a", "b", "c"):
+        seen = frame.apply(poses.point(generator.uniform(-100.0, 100.0, 3))) + shift
+        seen += _NOISE_MM * generator.standard_normal(seen.shape)
+        told = dict(zip(robot.parts.columns, driven.T, strict=True))
+        told |= rows.vector_columns("command", position) | rows.vector_columns("measured", seen)
+        parts.append(pd.DataFrame({"trajectory": "poses", "target": name, "stop": np.arange(len(seen)), **told}))
+    table = pd.concat(parts).sort_values(["stop", "target"]).drop(columns="stop")
+    table.to_csv(folder / "mine.csv", index=False)
+    return ingest(IngestSpec(str(folder / "mine.csv"), frame="register"), robot)
+
+
+def _calibrated(found, robot):
+    robot = robot.reading(rows.reads(found.measurements, (), True))
+    return least_squares(residuals := select(found.measurements, robot, ["*"])), residuals.mechanism
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lost_zeros_of_arms_are_found_with_frame_and_reflectors(seed, tmp_path):
+    generator = np.random.default_rng(seed)
+    made = _arm(generator)
+    zeros = generator.uniform(-0.06, 0.06, 6)
+    zeros[generator.choice(6, 2, replace=False)] = generator.uniform(-0.35, 0.35, 2)
+    found = _file(tmp_path, made, generator, zeros)
+    check_measurements(made[0], found.measurements)
+    assert (found.measurements["status"] == "ok").all()
+    fit, robot = _calibrated(found, made[0])
+    assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
+    # the frame imitates the first drive's zero, reflectors the last one's
+    values = dict(zip(fit.parameters.names, fit.deviations.tolist(), strict=True))
+    for k in (2, 3, 4, 5):
+        assert values[f"dq{k}"] == pytest.approx(zeros[k - 1], abs=2e-3)
+    noted = " ".join(mastering_notes(fit, robot))
+    for k in (2, 3, 4, 5):
+        assert (f"joint {k}: zero is off by " in noted) == (abs(values[f"dq{k}"]) > 5e-3)
+    if np.abs(zeros[1:5]).max() > 0.05:
+        assert any("drives are lost" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_path):
+    generator = np.random.default_rng(seed)
+    made = _hexapod(generator)
+    zeros = generator.uniform(-20.0, 20.0, 6)
+    zeros[generator.choice(6, 2, replace=False)] = generator.uniform(-60.0, 60.0, 2)
+    fit, robot = _calibrated(_file(tmp_path, made, generator, zeros), made[0])
+    assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
+    assert any(note.startswith("leg ") and note.endswith(" mm") for note in mastering_notes(fit, robot))
+
+
+def test_zeros_that_are_known_are_left_alone(tmp_path):
+    generator = np.random.default_rng(5)
+    made = _arm(generator)
+    found = _file(tmp_path, made, generator, np.zeros(6))
+    assert not any("lost" in note for note in found.notes)
+    fit, robot = _calibrated(found, made[0])
+    assert mastering_notes(fit, robot) == ()
