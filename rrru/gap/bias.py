@@ -22,12 +22,13 @@ def bias_notes(attribution):
     rest = (linear.data - sum(acting.values(), np.zeros(linear.data.shape))).ravel()
     notes = []
     for (name, _), change in acting.items():
-        if case.library[name].spoils:
+        # what follows an unknown function is no law
+        if name in case.effects and case.effects[name].spoils:
             left = rest + change.ravel()
             left = left - flat @ (inverse @ left / size)
             noise = np.sqrt((left**2).sum() / max(len(left) - flat.shape[1], 1))
             off = np.where(frame, 0.0, np.abs(inverse @ change.ravel()) / (noise * np.linalg.norm(inverse, axis=1)))
             worst = int(off.argmax())
             wrong = f"{robot.parameters.names[worst]} would be off by {off[worst]:.2g} standard errors"
-            notes.append(f"without {name} {wrong}: {case.library[name].spoils}")
+            notes.append(f"without {name} {wrong}: {case.effects[name].spoils}")
     return tuple(notes)

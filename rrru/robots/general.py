@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
-from rrru.parameters import Parameter, ParameterSet
+from rrru.robots import geometric_numbers
 from rrru.robots.drive_step import bar_lengths, drive_step, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
@@ -27,8 +27,6 @@ _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
 _STEPS, _REACHED_MM = 60, 1e-9
 # longest step of an inverse as a share of the drives' ranges; singular values below this share are none
 _LONGEST_STEP, _SEEN = 0.3, 1e-6
-# so far off may be a drive whose zero is lost, in rad and in mm
-_LOST = {"rad": 0.6, "mm": 100.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +116,7 @@ class GeneralRobot(Robot):
     @cached_property
     def parameters(self):
         """The parameters of the chosen set, nominally zero."""
-        limits = {"mm": self.length_limit_mm, "rad": self.angle_limit_rad}
-        bounds = ((one, max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0)) for one in self._chosen[0])
-        return ParameterSet(
-            tuple(Parameter(one.name, one.unit, 0.0, -most, most, "bounds assumed", one.leg) for one, most in bounds)
-        )
+        return geometric_numbers.bounded(self._chosen[0], {"mm": self.length_limit_mm, "rad": self.angle_limit_rad})
 
     @cached_property
     def gauge(self):
@@ -132,9 +126,7 @@ class GeneralRobot(Robot):
     @property
     def stages(self):
         """Frame, tool and reflectors, and then with them the drives."""
-        outside = {WORLD, TOOL, *self.legs.reflectors}
-        frames = np.array([outside.issuperset(one.twists) for one in self._chosen[0]])
-        return frames, frames | np.array([one.leg > 0 for one in self._chosen[0]])
+        return geometric_numbers.stages(self._chosen[0], {WORLD, TOOL, *self.legs.reflectors})
 
     @cached_property
     def directions(self):

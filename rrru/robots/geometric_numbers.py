@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.legs import TOOL, WORLD, unit_twist
 
+# so far off may be a drive whose zero is lost, in rad and in mm
+_LOST = {"rad": 0.6, "mm": 100.0}
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -78,6 +81,23 @@ def _at(site, component):
     """The Candidate of one component of a site's twist."""
     name = f"{site.replace(' ', '_')}_{_AXES[component]}"
     return Candidate(name, "mm" if component < 3 else "rad", 0, {site: unit_twist(component)})
+
+
+def bounded(candidates, limits):
+    """The ParameterSet of Candidates, nominally zero, bounded by their unit's limit, drives by what may be lost."""
+    most = (max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0) for one in candidates)
+    return ParameterSet(
+        tuple(
+            Parameter(one.name, one.unit, 0.0, -high, high, "bounds assumed", one.leg)
+            for one, high in zip(candidates, most, strict=True)
+        )
+    )
+
+
+def stages(candidates, outside):
+    """Which Candidates (p,) are of sites outside the robot, such as the frame, and which are these or drives."""
+    frames = np.array([outside.issuperset(one.twists) for one in candidates])
+    return frames, frames | np.array([one.leg > 0 for one in candidates])
 
 
 def direction(legs, candidate):

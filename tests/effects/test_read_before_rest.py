@@ -107,5 +107,6 @@ def test_the_diagnosis_names_it_and_not_backlash(exponent):
     names = ("backlash", "encoder_eccentricity", "transmission_error", "read_before_rest")
     found = diagnose(frame, robot, GapSettings(names, draws=10), details=False)
     assert found.verdict["effects"] == "read_before_rest"
+    assert "would be off by" in found.verdict["notes"] and "before the arm stood still" in found.verdict["notes"]
     values = next(iter(found.state.effects.values()))
     np.testing.assert_allclose(values, [*_SHARES.values()], atol=3e-4)
