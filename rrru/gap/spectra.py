@@ -13,6 +13,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import gammaln
 
 from rrru.effects.drive_error_function import waves
+from rrru.gap.case import State
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
 
@@ -91,6 +92,24 @@ def pursue(data, basis, drive_effect, drive):
         left = trial
     count = len(chosen)
     return tuple(atoms[k] for k in chosen), float(gammaln(count + 1) - count * np.log(max(resolved, 1.0)))
+
+
+def amplitudes(case, state, drive, orders):
+    """Amplitudes (g,) in rad of waves of orders (g,) of one drive that fit what a state leaves, one at a time.
+
+    The calibration's numbers are fitted beside each.
+    """
+    linear = case.linearise(State(state.deviations, {}), [])
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    made = waves(case.motion.drive[case.at, drive], orders)
+    columns = (linear.drive[:, :, drive, None] * made[:, None, :]).reshape(linear.data.size, -1)
+    columns, left = _without(columns, basis), case.residual(state).ravel()
+    pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
+    grams = np.einsum("mgi,mgj->gij", pairs, pairs)
+    # a wave that the calibration takes up has no amplitude
+    least = 1e-6 * np.trace(grams, axis1=1, axis2=2).max()
+    fitted = np.linalg.solve(grams + least * np.eye(2), moments[:, :, None])[:, :, 0]
+    return np.linalg.norm(fitted, axis=1)
 
 
 def _orders(reach):

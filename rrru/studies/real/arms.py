@@ -28,18 +28,20 @@ from rrru.studies.real.series import Series
 from rrru.studies.real.sheets import HELD_OUT, sheet, stated_noise
 from rrru.studies.real.steps import Step, held_out_mm, steps
 
-_NO_MASSES = Masses(0.0, 0.0, 0.0)
+# an arm's masses are those of its links
+NO_MASSES = Masses(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
 class Studied:
     """A series with all that was found of it.
 
-    measurements: of all rows; robot: with the numbers that its training rows tell; steps: the reference models;
-    diagnosis: of the training rows; held_out_mm (n,): what its named causes leave on the rows held out; notes.
+    rows: the sheet; measurements: of all its rows; robot: with the numbers that its training rows tell; steps: the
+    plain models; diagnosis: of the training rows; held_out_mm (n,): what its named causes leave on the rows held out.
     """
 
     series: Series
+    rows: pd.DataFrame
     measurements: pd.DataFrame
     robot: Robot
     steps: tuple[Step, ...]
@@ -47,6 +49,10 @@ class Studied:
     held_out_mm: np.ndarray
     seconds: Mapping[str, float]
     notes: tuple[str, ...]
+
+    def step(self, model: str) -> Step:
+        """The step of a model's letter."""
+        return next(step for step in self.steps if step.model == model)
 
     @property
     def case(self) -> Case:
@@ -81,11 +87,11 @@ def study(series: Series, robots: Mapping[str, Any], settings: GapSettings, shee
     made = _reference(measurements, robot, settings, (noise_mm, noise_rad))
     at |= {step.model: step.seconds for step in made}
     began = time.perf_counter()
-    measured = MeasuredRobot(robot, _NO_MASSES, noise_mm, series.name, noise_rad)
+    measured = MeasuredRobot(robot, NO_MASSES, noise_mm, series.name, noise_rad)
     found = diagnose(measurements, measured, settings)
     at["gap"] = time.perf_counter() - began
     left = held_out_mm(found.attribution.case, found.state)
-    return Studied(series, measurements, robot, made, found, left, at, ingested.notes)
+    return Studied(series, table, measurements, robot, made, found, left, at, ingested.notes)
 
 
 def nominal_robot(series: Series, robots: Mapping[str, Any]) -> dict:
@@ -106,7 +112,7 @@ def _reference(
     nominal = sim(robot)
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     library = settings.library(nominal)
-    case = make_case(measurements, nominal, _NO_MASSES, noise[0] or 1.0, library, True, arm_mm)
+    case = make_case(measurements, nominal, NO_MASSES, noise[0] or 1.0, library, True, arm_mm)
     if rows.has_turns(measurements):
         case = with_arm(case, *noise)
     return steps(case)

@@ -20,13 +20,13 @@ def lengths(tables, options):
     scales. Circles: readings left out.
     """
     points, parameters = tables["real_points"], tables["real_parameters"]
-    names = list(dict.fromkeys(points["dataset"])) if "dataset" in points else [""]
+    names = list(dict.fromkeys(points["campaign"])) if "campaign" in points else [""]
     if points.empty:
         raise ConfigError("lengths: table real_points has no row")
     figure = style.new(style.DOUBLE_MM, 14.0 + _ROW_MM * len(names))
     panels = figure.subplots(len(names), 3, squeeze=False, width_ratios=(1.3, 1.0, 1.0))
     for name, (frame, bare, found) in zip(names, panels, strict=True):
-        own = [table[table["dataset"] == name] if name else table for table in (points, parameters)]
+        own = [table[table["campaign"] == name] if name else table for table in (points, parameters)]
         _draw_frame(frame, *own, name)
         _draw_residuals(bare, own[0], "bare_residual_mm", "frame alone")
         _draw_residuals(found, own[0], "residual_mm", "with the verdict's laws")

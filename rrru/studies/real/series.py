@@ -16,10 +16,15 @@ VARIABLE = "RRRU_REAL_DATA"
 
 @dataclass(frozen=True)
 class Series:
-    """One measured series: its name, that of its data set, the file, and the set's section of the configuration."""
+    """One measured series: its name, that of its data set, the file, and the set's section of the configuration.
+
+    label: the name without the data set's; variant: which way of reading the file, "" where there is one.
+    """
 
     name: str
     dataset: str
+    label: str
+    variant: str
     file: Path
     section: Mapping[str, Any]
 
@@ -62,11 +67,33 @@ def found(section: Mapping[str, Any], name: str) -> tuple[Series, ...]:
     for folder in folders(section):
         for file in sorted(folder.glob(own["files"])):
             paths.setdefault(_label(own["files"], file), file)
-    return tuple(
-        Series("_".join(filter(None, (name, label, variant))), name, file, own | dict(changes))
-        for label, file in sorted(paths.items())
-        for variant, changes in variants.items()
-    )
+    result = []
+    for label in sorted(paths):
+        for variant, changes in variants.items():
+            both = "_".join(filter(None, (label, variant)))
+            called = "_".join(filter(None, (name, both)))
+            result.append(Series(called, name, both, variant, paths[label], own | dict(changes)))
+    return tuple(result)
+
+
+def check(config: Mapping[str, Any]) -> None:
+    """Raise ConfigError where a data set names a robot or a variant that does not exist, or no way to read it."""
+    for name, section in config["real"]["sets"].items():
+        where = f"real.sets.{name}"
+        if "kind" in section:
+            continue
+        if ("robot" in section) == ("chain" in section):
+            raise ConfigError(
+                f"{where}: got {'both' if 'robot' in section else 'no'} robot and chain; allowed: one of them"
+            )
+        if "robot" in section and section["robot"] not in config["robots"]:
+            known = ", ".join(config["robots"])
+            raise ConfigError(f"{where}.robot: robots has no {section['robot']!r}; known: {known}")
+        if "readings" not in section:
+            raise ConfigError(f"{where}: got no readings; allowed: at least one target with its position")
+        for target in section.get("world_targets", ()):
+            if target not in section["readings"]:
+                raise ConfigError(f"{where}.world_targets: readings has no {target!r}")
 
 
 def missing(section: Mapping[str, Any], name: str) -> str:

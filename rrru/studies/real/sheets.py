@@ -12,27 +12,34 @@ from rrru.campaign.ingest.sheet import MEASURED, QUATERNIONS
 from rrru.errors import ConfigError
 from rrru.studies.real.series import Series
 
-# flags of the rows that are kept out of every fit
-HELD_OUT = "held_out"
+# flags of the rows that are kept out of every fit, and the numbers of the rows in the file
+HELD_OUT, PLACE = "held_out", "row"
 
 
 def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
-    """Columns of a campaign file, rows in the order of the series' own, the targets of each together, and HELD_OUT.
+    """Columns of a campaign file, and HELD_OUT and PLACE; rows in the order driven, the targets of each together.
 
-    The set's section says which columns are what: joints, {actuator column: theirs}, in joint_unit; readings, {target:
-    {position, unit, rotation, sequence, rotation_unit}}; held_out. The number of the row stands for the time. Targets
-    that were not seen are left out. Raises ConfigError for a column that is not there or not of numbers.
+    The set's section says which columns are what: joints, {actuator column: theirs}, in joint_unit, absent where they
+    are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; held_out. The number
+    of the row stands for the time. Targets that were not seen are left out. Raises ConfigError for a column that is not
+    there or not of numbers.
     """
     section, parts = series.section, []
     common = {"trajectory": "poses", "time_s": np.arange(len(raw), dtype=float), HELD_OUT: _held_out(series, raw)}
-    for ours, theirs in section["joints"].items():
+    for ours, theirs in _joints(series, raw).items():
         scale = 1.0 if ours.endswith("_mm") else RAD[section.get("joint_unit", "rad")]
         common[ours] = scale * _numbers(series, raw, "joints", theirs)
     for target, reading in section["readings"].items():
         part = pd.DataFrame(common | dict(_read(series, raw, target, reading)))
-        parts.append(part.assign(target=target, place=np.arange(len(raw))))
-    whole = pd.concat(parts).sort_values("place", kind="stable").drop(columns="place")
+        parts.append(part.assign(target=target, **{PLACE: np.arange(1, len(raw) + 1)}))
+    whole = pd.concat(parts).sort_values(PLACE, kind="stable")
     return whole[whole[[*MEASURED]].notna().all(axis=1)].reset_index(drop=True)
+
+
+def _joints(series: Series, raw: pd.DataFrame) -> Mapping[str, str]:
+    """Our actuator columns to theirs; where the section names none, all of the file's that are called like ours."""
+    named = series.section.get("joints")
+    return named or {name: name for name in raw if name.startswith("q") and name.endswith(("_rad", "_mm"))}
 
 
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:

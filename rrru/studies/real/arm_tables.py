@@ -1,0 +1,154 @@
+"""Tables of one real series of an arm. Lengths in mm, angles in rad."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.effects.drive_error_function import ORDERS
+from rrru.fit.mastering import mastering_notes
+from rrru.gap.spectra import amplitudes
+from rrru.studies.real.arms import Studied
+from rrru.studies.real.sheets import PLACE
+
+MODELS = "abcde"
+_FUNCTION, _SHOWN = ("drive_error_function", 0), 40
+
+
+def tables(studied: Studied) -> dict[str, pd.DataFrame]:
+    """Frames by name, without the campaign."""
+    return {
+        "real_verdicts": pd.DataFrame([_verdict(studied)]),
+        "real_steps": _steps(studied),
+        "real_parameters": _parameters(studied),
+        "real_points": _points(studied),
+        "real_spectrum": _spectrum(studied),
+        "real_budget": studied.diagnosis.tables["gap_budget"],
+        "real_seconds": pd.DataFrame({"step": [*studied.seconds], "seconds": [*studied.seconds.values()]}),
+    }
+
+
+def _verdict(studied: Studied) -> dict:
+    """The row of `real_verdicts`."""
+    found, series, left = studied.diagnosis.verdict, studied.series, studied.held_out_mm
+    told = ("effects", "probability", "where", "confusable_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
+    told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
+    own = {name: found[name] for name in (*told, "dropped_points")}
+    before = studied.step("b").held_out_mm
+    notes = (found["notes"], *mastering_notes(studied.step("b").state, studied.robot), *studied.notes)
+    return own | {
+        "dataset": series.dataset,
+        "robot": series.section.get("robot", series.dataset),
+        "source": series.file.name,
+        "predicted_share": predicted_share(studied),
+        "held_out_share": float(1.0 - (left**2).mean() / (before**2).mean()),
+        "held_out_mean_mm": float(left.mean()),
+        "held_out_rms_mm": _rms(left),
+        "held_out_max_mm": float(left.max()),
+        **_by_model(studied, series.section.get("reference", {})),
+        "notes": "; ".join(filter(None, notes)),
+    }
+
+
+def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float]:
+    """Held-out rms of the models' letters, ours and others'; of the kinds of compliance that of the last."""
+    ours = {step.model[0]: _rms(step.held_out_mm) for step in studied.steps}
+    stated = reference.get(studied.series.label, {})
+    result = {f"held_out_{model}_rms_mm": ours.get(model, np.nan) for model in MODELS}
+    return result | {f"reference_{model}_rms_mm": float(stated.get(model, np.nan)) for model in MODELS}
+
+
+def predicted_share(studied: Studied) -> float:
+    """Share of the mean square of the calibrated model's misses that the causes take off, by folds of training rows."""
+    attribution = studied.diagnosis.attribution
+    hypothesis, level = attribution.hypothesis, attribution.level
+    at = studied.case.positions
+    misses = [
+        (attribution.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[at] ** 2).sum(axis=1).mean()
+        for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.strengths[level]))
+    ]
+    return float(1.0 - misses[1] / misses[0])
+
+
+def _steps(studied: Studied) -> pd.DataFrame:
+    """Rows of `real_steps`: the plain models, and that of the verdict."""
+    attribution, left = studied.diagnosis.attribution, studied.held_out_mm
+    fitted = len(studied.state.deviations) + sum(len(values) for values in studied.state.effects.values())
+    misses = np.linalg.norm(studied.case.residual(studied.state)[studied.case.positions], axis=1)
+    last = {
+        "model": "verdict",
+        "adds": "+".join(term.effect for term in attribution.hypothesis.terms) or "nothing",
+        "parameters": fitted,
+        "identifiable": fitted,
+        "train_rms_mm": _rms(misses),
+        "held_out_mean_mm": float(left.mean()),
+        "held_out_rms_mm": _rms(left),
+        "held_out_max_mm": float(left.max()),
+    }
+    result = pd.DataFrame([*(step.row for step in studied.steps), last])
+    return result.assign(number=np.arange(1, len(result) + 1))
+
+
+def _parameters(studied: Studied) -> pd.DataFrame:
+    """Rows of `real_parameters`; those of the error functions are in the spectrum."""
+    frame = studied.diagnosis.tables["gap_parameters"]
+    frame = frame[frame["effect"] != _FUNCTION[0]]
+    return frame[["effect", "parameter", "unit", "value", "standard_error"]].assign(nominal=0.0, note="")
+
+
+def _points(studied: Studied) -> pd.DataFrame:
+    """Rows of `real_points`."""
+    frame, case = studied.measurements, studied.case
+    count = len(frame)
+    bare, last = (
+        np.linalg.norm(case.left(state)[:count], axis=1) for state in (studied.step("b").state, studied.state)
+    )
+    places = dict(zip(("x_mm", "y_mm", "z_mm"), rows.measured(frame).T, strict=True))
+    empty = dict.fromkeys(("bare_x_mm", "bare_y_mm", "bare_z_mm"), np.nan)
+    used = np.zeros(count, dtype=bool)
+    used[case.at] = True
+    return pd.DataFrame(
+        {"row": studied.rows[PLACE], "reading": studied.rows["target"], **places, **empty}
+        | {"bare_residual_mm": bare, "residual_mm": last, "used": used}
+        | {"stands_out": (frame["status"] == "outlier").to_numpy()}
+    )
+
+
+def _spectrum(studied: Studied) -> pd.DataFrame:
+    """Rows of `real_spectrum`, of the joints that turn."""
+    case, robot = studied.case, studied.case.mechanism
+    orders, parts = np.arange(1, _SHOWN + 1), []
+    found = studied.state.effects.get(_FUNCTION)
+    errors = studied.diagnosis.tables["gap_parameters"]
+    errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
+    for number, (drive, unit) in enumerate(zip(robot.parts.drives, robot.parts.units, strict=True)):
+        if unit != "rad":
+            continue
+        made = [amplitudes(case, state, number, orders) for state in (studied.step("b").state, studied.state)]
+        sine, cosine, error = np.zeros((3, len(orders)))
+        if found is not None:
+            own = np.reshape(found, (-1, len(ORDERS), 2))[number, : len(orders)]
+            (sine, cosine), error = own.T, np.reshape(errors, (-1, len(ORDERS), 2))[number, : len(orders)].mean(axis=1)
+        reach = float(np.ptp(case.motion.drive[case.used][:, number]))
+        parts.append(
+            pd.DataFrame(
+                {
+                    "joint": drive.site,
+                    "order": orders,
+                    "resolution": 2.0 * np.pi / max(reach, 1e-9),
+                    "before_rad": made[0],
+                    "after_rad": made[1],
+                    "found_rad": np.hypot(sine, cosine),
+                    "found_phase_rad": np.arctan2(cosine, sine),
+                    "found_error_rad": error,
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
+
+
+def _rms(values: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt((values**2).mean()))
