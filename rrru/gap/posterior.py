@@ -1,6 +1,7 @@
 """From the evidence of hypotheses to probabilities: of effects, of sets of them, and of what no effect explains."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import comb
 
 import numpy as np
@@ -16,15 +17,20 @@ _NEGLIGIBLE = 25.0
 
 @dataclass(frozen=True)
 class Posterior:
-    """Hypotheses with weights (h, levels) that sum to one, and where these count as unexplained (h, levels)."""
+    """Hypotheses with logarithms (h, levels) of their weights up to a constant, and where they count as unexplained."""
 
     hypotheses: tuple
-    weights: np.ndarray
+    log_weights: np.ndarray
     unexplained: np.ndarray
+
+    @cached_property
+    def weights(self):
+        """Weights (h, levels) that sum to one."""
+        return np.exp(self.log_weights - log_sum_exp(self.log_weights.ravel()))
 
     def best(self):
         """The hypothesis of highest weight and its level (an index)."""
-        return self._best(range(len(self.hypotheses)), self.weights)
+        return self._best(range(len(self.hypotheses)), self.log_weights)
 
     def sets(self):
         """Probability by (frozenset of effects, unexplained), highest first."""
@@ -48,9 +54,8 @@ class Posterior:
     def without(self, effect):
         """The posterior with an effect ruled out."""
         keep = ~self._holding(effect)
-        weights = self.weights[keep]
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
-        return Posterior(kept, weights / max(weights.sum(), 1e-300), self.unexplained[keep])
+        return Posterior(kept, self.log_weights[keep], self.unexplained[keep])
 
     def legs(self, effect):
         """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
@@ -71,9 +76,9 @@ class Posterior:
         rows = [k for k, h in enumerate(self.hypotheses) if h.effects - hidden == effects]
         if not rows:
             return None
-        weights = self.weights[rows]
+        weights = self.log_weights[rows]
         if unexplained is not None:
-            weights = np.where(self.unexplained[rows] == unexplained, weights, -1.0)
+            weights = np.where(self.unexplained[rows] == unexplained, weights, -np.inf)
         return self._best(rows, weights)
 
     def _best(self, rows, weights):
@@ -100,7 +105,7 @@ def posterior(evidence, hypotheses, prior):
         tolerated = prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
         unexplained[row] = tolerated < np.maximum(LEVELS, evidence.explained(hypothesis, set(UNKNOWN)))
         log_weight[row] += log_prior.levels(unexplained[row])
-    return Posterior(kept, np.exp(log_weight - log_sum_exp(log_weight.ravel())), unexplained)
+    return Posterior(kept, log_weight, unexplained)
 
 
 class _LogPrior:

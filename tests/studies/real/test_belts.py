@@ -149,7 +149,7 @@ def test_places_that_are_all_alike_are_refused():
 def test_figure_draws_every_set():
     tables = [_verdict(seed, missing_mm=40.0) for seed in (1, 2)]
     joined = {
-        name: pd.concat([one[name].assign(dataset=f"run {k}") for k, one in enumerate(tables)]) for name in tables[0]
+        name: pd.concat([one[name].assign(campaign=f"run {k}") for k, one in enumerate(tables)]) for name in tables[0]
     }
     figure = figures_lengths.lengths(joined, {})
     assert len(figure.axes) == 6
