@@ -50,7 +50,11 @@ class Posterior:
         keep = ~self._holding(effect)
         weights = self.weights[keep]
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
-        return Posterior(kept, weights / max(weights.sum(), 1e-300), self.unexplained[keep])
+        if not weights.sum() > 0.0:
+            # what is left is too improbable to have a weight beside what was ruled out
+            evidence = np.array([h.evidence for h in kept])
+            weights = np.exp(evidence - evidence.max())
+        return Posterior(kept, weights / weights.sum(), self.unexplained[keep])
 
     def legs(self, effect):
         """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
