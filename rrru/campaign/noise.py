@@ -79,10 +79,11 @@ def reading_series(measurements, readings=None):
     return np.concatenate([number, number.max() + number[readings.turned]])
 
 
-def isolated(residual_mm, run, floor_mm):
+def isolated(residual_mm, run, floor_mm, kind=None):
     """Points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run (n,).
 
-    floor_mm: noise per axis below which no jump counts, 0 where nobody knows it. None where such jumps are frequent.
+    floor_mm: noise per axis below which no jump counts, 0 where nobody knows it; kind (n,): numbers of the targets,
+    each of which may jump as it usually does. None where such jumps are frequent.
     """
     jump, worst = np.zeros(len(residual_mm)), np.zeros(len(residual_mm), dtype=bool)
     for label in np.unique(run):
@@ -97,6 +98,8 @@ def isolated(residual_mm, run, floor_mm):
         jump[here] = far
         worst[here] = far >= np.max([beside[k : k + len(here)] for k in range(5)], axis=0)
     # the median of the largest of three absolute normal numbers is 1.55 times their deviation
-    scale = max(float(np.median(jump)) / 1.55, 1.2 * floor_mm)
+    kind = np.zeros(len(jump), dtype=int) if kind is None else kind
+    usual = {one: np.median(jump[kind == one]) / 1.55 for one in np.unique(kind)}
+    scale = np.maximum([usual[one] for one in kind], 1.2 * floor_mm)
     flagged = worst & (jump > _OUTLYING * scale)
     return flagged if flagged.mean() <= _MOST else np.zeros(len(jump), dtype=bool)

@@ -14,7 +14,7 @@ from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case, State
 from rrru.gap.evidence import LEVELS, ModelEvidence
 from rrru.gap.heldout import HeldOut
-from rrru.gap.noise_model import fit_noise
+from rrru.gap.noise_model import alike, fit_noise
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
@@ -89,6 +89,7 @@ def with_noise(case, linear, stated_mm):
         # too few points to fit everything: what the calibration leaves has to do
         columns = linear.base
     model = fit_noise(linear.data, columns, case.series, stated_mm)
+    model = replace(model, alike=alike(linear.data, columns, case.stop, case.kind))
     repeated, count = noise.repeat_noise(case.measurements[case.used])
     # what is correlated tells less
     count *= (1.0 - model.correlation**2) / (1.0 + model.correlation**2)
@@ -115,13 +116,13 @@ def attribute(case, prior, stated=KNOWN):
         calibrated = calibrate(case)
         if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
-            outliers = noise.isolated(case.residual(calibrated), case.series, 0.0)
+            outliers = noise.isolated(case.residual(calibrated), case.series, 0.0, case.kind)
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
         attribution = _rounds(case, calibrated, prior, stated)
         found = attribution.case
-        outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm)
+        outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
         if cleaning == _MOST_CLEANINGS or not outliers.any():
             break
         case = case.without(outliers)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from rrru.gap.noise_model import CONTRADICTED
+from rrru.gap.noise_model import CONTRADICTED, NoiseModel
 from rrru.gap.terms import signatures, spread
 from rrru.gap.unknown import UNKNOWN
 
@@ -77,7 +77,7 @@ def _drawn(attribution, generator, draws):
                 products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / len(case)
         if beliefs.unexplained[row, level] and _UNEXPLAINED not in parts:
             left = data[:, None] - sum(parts.values(), np.zeros((len(data), counts[number])))
-            spare = 3.0 * evidence.noise.mean_mm**2 * (1.0 - basis.shape[1] / len(data))
+            spare = 3.0 * case.noise_mm**2 * (1.0 - basis.shape[1] / len(data))
             squares[_UNEXPLAINED][some] = np.maximum((left**2).sum(axis=0) / len(case) - spare, 0.0)
     return squares, products
 
@@ -109,7 +109,8 @@ def _parts(evidence, hypothesis, level, basis, generator, count):
 
 def _noise_parts(attribution, stated_mm, generator, draws):
     """Draws (b,) of the instrument's mean square, and draws and probability of scatter and runs."""
-    model, case = attribution.evidence.noise, attribution.case
+    case = attribution.case
+    model = case.noise or NoiseModel.white(case.noise_mm)
     freedom = max(len(case) - attribution.evidence.linear.base.shape[-1], 1)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan

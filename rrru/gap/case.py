@@ -120,6 +120,14 @@ class Case:
         return stops(self.measurements)[self.at]
 
     @cached_property
+    def kind(self):
+        """Number (m,) of the target of each row, orientations apart."""
+        target = np.zeros(len(self), dtype=int)
+        if "target" in self.measurements:
+            target = np.unique(self.points["target"], return_inverse=True)[1]
+        return 2 * target + ~self.positions
+
+    @cached_property
     def positions(self):
         """Which rows (m,) are positions."""
         return self._kept < len(self.used)
@@ -159,7 +167,7 @@ class Case:
 
     def evidence(self, linear):
         """The ModelEvidence on a linearisation."""
-        noise = self.noise or NoiseModel.white(self.noise_mm)
+        noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
         return ModelEvidence(self.library, linear, self.series, noise, self._along_paths)
 
     def without(self, dropped):

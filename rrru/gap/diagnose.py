@@ -19,7 +19,9 @@ from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.noise_model import CONTRADICTED, NoiseModel
-from rrru.gap.settings import GapSettings
+from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
+from rrru.gap.search import search
+from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
@@ -90,7 +92,7 @@ def diagnose(
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
     generator = stream(settings.seed, "gap", robot.campaign)
-    verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated))
+    verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated), settings.prior)
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
     case = attribution.case
     residual = case.residual(attribution.calibrated)
@@ -152,22 +154,38 @@ def _row(
     }
 
 
-def _decide(attribution: Attribution) -> tuple[Verdict, Attribution, list]:
+def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attribution, list]:
     """Verdict, the attribution fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
-    verdict without it does, by more than chance, is ruled out and the rest decides again.
+    verdict without it does, by more than chance, is ruled out and the rest decides again. Beside something unexplained,
+    a part of which it may be, an effect has to make them better.
     """
+    ruled_out: set[str] = set()
     while True:
         verdict = decide(attribution, _shares(attribution))
         fitted = with_effects(attribution, verdict.effects)
-        worse = [name for name in verdict.effects if _gain(fitted, name) < -_VETO_NATS]
+        least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
+        worse = {name for name in verdict.effects if _gain(fitted, name) < least}
         if not worse:
             return verdict, fitted, order_by_share(fitted)
-        beliefs = attribution.posterior
-        for name in worse:
-            beliefs = beliefs.without(name)
-        attribution = attribution.believing(beliefs)
+        ruled_out |= worse
+        attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
+
+
+def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:
+    """The posterior without effects that have just been found worse, and all that have been ruled out.
+
+    Where every likely set holds one of them, others are looked for.
+    """
+    beliefs = attribution.posterior
+    rest = beliefs
+    for name in worse:
+        rest = rest.without(name)
+    if rest.height > beliefs.height - NEGLIGIBLE:
+        return rest
+    evidence = attribution.evidence
+    return posterior(evidence, search(evidence, without=ruled_out), prior)
 
 
 def _shares(attribution: Attribution) -> dict[str, float]:

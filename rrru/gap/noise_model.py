@@ -17,7 +17,7 @@ been projected out (Patterson and Thompson, Recovery of inter-block information 
 58, 1971), times their prior.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -45,7 +45,8 @@ _LONG = 400
 class NoiseModel:
     """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a.
 
-    offset_interval: 95 % of the offset; offset_probability: that it is more than a twentieth of the noise's variance.
+    offset_interval: 95 % of the offset; offset_probability: that it is more than a twentieth of the noise's variance;
+    alike: factor of the variance by which readings at one stop, which share the robot's errors, count as fewer.
     """
 
     axis_mm: np.ndarray
@@ -54,6 +55,7 @@ class NoiseModel:
     correlated: np.ndarray | float = 1.0
     offset_interval: tuple = (0.0, 0.0)
     offset_probability: float = 0.0
+    alike: float = 1.0
 
     @classmethod
     def white(cls, noise_mm):
@@ -64,6 +66,11 @@ class NoiseModel:
     def mean_mm(self):
         """Deviation per axis, offsets included, root mean square over the axes."""
         return float(np.sqrt((self.axis_mm**2).mean() * (1.0 + self.offset)))
+
+    @property
+    def counted(self):
+        """The model under which the readings count as independent."""
+        return replace(self, axis_mm=self.axis_mm * np.sqrt(self.alike), alike=1.0)
 
     def variance(self, wave, length):
         """Variances (m, 3) in mm^2 in the cosine basis, by half-wave number and length (m,) of the series."""
@@ -95,6 +102,29 @@ def fit_noise(data, columns, series, stated_mm=None):
         if np.allclose(*numbers, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
     return model
+
+
+def alike(data, columns, stop, kind):
+    """Factor by which readings at one stop count as fewer: 1 + (t - 1) r, t of them at a stop, of correlation r.
+
+    data (m, 3) of which columns (m, 3, k) may fit whatever they can; stop (m,): where each row was read; kind (m,): of
+    what, odd for orientations, which do not count. Source: Kish, Survey Sampling, 1965, section 5.4 (design effect).
+    """
+    counted = kind % 2 == 0
+    count = np.bincount(stop[counted], minlength=stop.max() + 1).astype(float)
+    if count.max() < 2.0:
+        return 1.0
+    left, _ = _left(data.ravel(), columns.reshape(data.size, -1))
+    left = left.reshape(-1, 3)
+    size = np.sqrt(np.bincount(kind, (left**2).sum(axis=1)) / np.maximum(np.bincount(kind), 1))
+    unit = left[counted] / np.maximum(size, 1e-300)[kind[counted], None]
+    sums = np.stack([np.bincount(stop[counted], axis, len(count)) for axis in unit.T], axis=1)
+    squares = np.bincount(stop[counted], (unit**2).sum(axis=1), len(count))
+    # dot products of pairs over what they were if all readings of a stop were one
+    pairs = ((sums**2).sum(axis=1) - squares).sum()
+    share = pairs / max(((count - 1.0) * squares).sum(), 1e-300)
+    mean = (count**2).sum() / count.sum()
+    return float(1.0 + (mean - 1.0) * np.clip(share, 0.0, 1.0))
 
 
 def _densities(correlation, wave, length):

@@ -12,7 +12,7 @@ from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
 
 # hypotheses further below the best than this carry nothing
-_NEGLIGIBLE = 25.0
+NEGLIGIBLE = 25.0
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,11 @@ class Posterior:
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
         return Posterior(kept, self.log_weights[keep], self.unexplained[keep])
 
+    @property
+    def height(self):
+        """Logarithm of the highest weight, up to the constant."""
+        return float(self.log_weights.max(initial=-np.inf))
+
     def legs(self, effect):
         """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
         result = {}
@@ -97,7 +102,7 @@ def posterior(evidence, hypotheses, prior):
     log_weight = np.array([h.evidence + log_prior.terms(h.terms) for h in hypotheses])
     # single effects stay, however improbable: tables show what each does alone
     single = np.array([len(h.terms) <= 1 for h in hypotheses])
-    worth = single | (log_weight.max(axis=1) > log_weight.max() - _NEGLIGIBLE)
+    worth = single | (log_weight.max(axis=1) > log_weight.max() - NEGLIGIBLE)
     kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
     log_weight = log_weight[worth]
     unexplained = np.zeros(log_weight.shape, dtype=bool)

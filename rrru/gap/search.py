@@ -42,9 +42,12 @@ class Hypothesis:
         return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
 
 
-def search(evidence, most=8):
-    """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones."""
-    library = evidence.library
+def search(evidence, most=8, without=()):
+    """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones.
+
+    without: names of effects that are ruled out.
+    """
+    library = {name: effect for name, effect in evidence.library.items() if name not in without}
     choices = {name: variants(effect) for name, effect in library.items()}
     tried = _Tried(evidence)
     for terms in ((), *((term,) for name in library for term in choices[name])):

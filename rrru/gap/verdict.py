@@ -7,8 +7,6 @@ from rrru.gap.terms import per_leg
 # a rival that is this many times less probable than the verdict is no longer named
 _RIVAL = 0.05
 _SURE, _HALF = 0.9, 0.5
-# share of the gap's mean square that an effect beside something unexplained has at least
-_MATTERS = 0.01
 _NOTHING = 0.2
 _NONE = (frozenset(), False)
 
@@ -54,8 +52,8 @@ def decide(attribution, shares):
     """Verdict of an attribution; shares: effect to the share of the gap that it explains, for the order.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Beside something unexplained effects are named only where they act with a probability of 0.9 each,
-    explain half of the gap together and a hundredth of it each; else they are what could be mistaken for a part of it.
+    matter. Beside something unexplained effects are named only where they act with a probability of 0.9 each and
+    explain half of the gap together; else they are what could be mistaken for a part of it.
     """
     beliefs = attribution.posterior
     unknown, sets = beliefs.probability_unexplained, beliefs.sets()
@@ -82,8 +80,7 @@ def decide(attribution, shares):
 def _beside_unexplained(sets, unknown, shares):
     """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained)."""
     within = {effects: p for (effects, flag), p in sets.items() if flag}
-    # what is too small to matter may be a part of what nothing explains
-    named = frozenset(name for name in _certain(within, unknown) if shares.get(name, 0.0) > _MATTERS)
+    named = _certain(within, unknown)
     if sum(shares.get(name, 0.0) for name in named) < _HALF:
         named = frozenset()
     # what imitates a part of the unknown, and what would do without it

@@ -136,7 +136,10 @@ def _decided(*entries, shares=None):
     for row, (_, probability, flag) in enumerate(entries):
         weights[row, int(flag)] = probability
     return decide(
-        SimpleNamespace(posterior=Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained), case=SimpleNamespace(library=EFFECTS)),
+        SimpleNamespace(
+            posterior=Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained),
+            case=SimpleNamespace(library=EFFECTS),
+        ),
         shares or {},
     )
 

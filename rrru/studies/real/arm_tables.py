@@ -8,7 +8,6 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.effects.drive_error_function import ORDERS
-from rrru.fit.mastering import mastering_notes
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.sheets import PLACE
@@ -37,7 +36,7 @@ def _verdict(studied: Studied) -> dict:
     told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
-    notes = (found["notes"], *mastering_notes(studied.step("b").state, studied.robot), *studied.notes)
+    notes = (found["notes"], *studied.notes)
     return own | {
         "dataset": series.dataset,
         "robot": series.section.get("robot", series.dataset),

@@ -12,7 +12,7 @@ _MICRORAD = 1e6
 
 @style.printed
 def steps(tables, options):
-    """Real robot, a row per series. Left: what model after model leaves on rows that no fit has seen, ours, others' fits
+    """Real robot, a row per series. Left: what model after model leaves on rows no fit has seen, ours, others' fits
     of the same model, and last the model of the named causes. Right: what the gap is made of.
     """
     verdicts, models, budget = (tables[name] for name in ("real_verdicts", "real_steps", "real_budget"))
