@@ -14,6 +14,8 @@ from rrru.gap.unknown import unknown_functions
 
 # an effect is tested where at least this share of the points has what it needs
 _ENOUGH = 0.8
+# more coordinates than this share of the numbers read tell nothing
+_MOST_BROAD = 0.5
 # nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
 _STANDS = {"rad": 1e-8, "mm": 1e-6}
 _NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
@@ -42,6 +44,9 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
+            continue
+        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * 3 * used.sum():
+            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for {used.sum()} readings"
             continue
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
         missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]

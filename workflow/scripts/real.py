@@ -49,8 +49,6 @@ def _lengths(series, study):
     for one in series:
         frames = study(one.read(), dict(one.section) | {"files": str(one.file)}, one.dataset)
         told = {"dataset": one.dataset, "robot": one.dataset, "source": one.file.name}
-        last = frames["real_steps"].iloc[-1]
-        told |= {name: last[name] for name in ("held_out_mean_mm", "held_out_rms_mm", "held_out_max_mm")}
         numbers = np.arange(1, len(frames["real_steps"]) + 1)
         frames["real_verdicts"] = frames["real_verdicts"].assign(**told)
         frames["real_steps"] = frames["real_steps"].assign(number=numbers)

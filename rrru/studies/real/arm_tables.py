@@ -11,9 +11,12 @@ from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.sheets import PLACE
+from rrru.studies.real.steps import counted, trained_mm
 
 MODELS = "abcde"
-_FUNCTION, _SHOWN = ("drive_error_function", 0), 40
+_FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders", 0), 40
+# what ingest says of every such series
+_USUAL = ("no column", "left out, as nobody declared them", "no commanded positions")
 
 
 def tables(studied: Studied) -> dict[str, pd.DataFrame]:
@@ -36,7 +39,7 @@ def _verdict(studied: Studied) -> dict:
     told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
-    notes = (found["notes"], *studied.notes)
+    notes = (found["notes"], _waves(studied), *(note for note in studied.notes if not note.startswith(_USUAL)))
     return own | {
         "dataset": series.dataset,
         "robot": series.section.get("robot", series.dataset),
@@ -51,6 +54,22 @@ def _verdict(studied: Studied) -> dict:
     }
 
 
+def _waves(studied: Studied) -> str:
+    """Whether a few sharp waves of single drives do, or a rough function of their angles, in words; "" if neither."""
+    attribution = studied.diagnosis.attribution
+    best = {}
+    for hypothesis in attribution.posterior.hypotheses:
+        if len(hypothesis.terms) == 1 and hypothesis.terms[0].effect in (_FUNCTION[0], _WAVES[0]):
+            best[hypothesis.terms[0].effect] = float(hypothesis.evidence.max())
+    if len(best) < 2 or best[_FUNCTION[0]] < attribution.evidence.none.max():
+        return ""
+    count = len(studied.case.library[_WAVES[0]].coordinates) // 2
+    ahead = best[_FUNCTION[0]] - best[_WAVES[0]]
+    said = f"a rough function of every drive's angle and {count} sharp waves of single drives both explain errors"
+    likelier = "the function" if ahead > 0.0 else "the waves"
+    return f"{said}; {likelier} by {abs(ahead):.0f} nats of evidence"
+
+
 def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float]:
     """Held-out rms of the models' letters, ours and others'; of the kinds of compliance that of the last."""
     ours = {step.model[0]: _rms(step.held_out_mm) for step in studied.steps}
@@ -63,7 +82,7 @@ def predicted_share(studied: Studied) -> float:
     """Share of the mean square of the calibrated model's misses that the causes take off, by folds of training rows."""
     attribution = studied.diagnosis.attribution
     hypothesis, level = attribution.hypothesis, attribution.level
-    at = studied.case.positions
+    at = counted(studied.case)
     misses = [
         (attribution.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[at] ** 2).sum(axis=1).mean()
         for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.strengths[level]))
@@ -75,7 +94,7 @@ def _steps(studied: Studied) -> pd.DataFrame:
     """Rows of `real_steps`: the plain models, and that of the verdict."""
     attribution, left = studied.diagnosis.attribution, studied.held_out_mm
     fitted = len(studied.state.deviations) + sum(len(values) for values in studied.state.effects.values())
-    misses = np.linalg.norm(studied.case.residual(studied.state)[studied.case.positions], axis=1)
+    misses = trained_mm(studied.case, studied.state)
     last = {
         "model": "verdict",
         "adds": "+".join(term.effect for term in attribution.hypothesis.terms) or "nothing",

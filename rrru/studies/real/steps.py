@@ -19,13 +19,12 @@ from rrru.gap.case import Case, State
 from rrru.gap.fit_effects import fit_effects
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.geometric_numbers import direction, open_numbers
-from rrru.robots.legs import WORLD
 from rrru.robots.robot import Robot
 
 _ROUNDS, _ENOUGH = 30, 1e-9
 # shares of the best seen combination of numbers below which one is not seen
 _SEEN = 1e-9
-FRAMES, _HARMONICS, _DRIFT = "frames", "harmonics", "drift"
+FRAMES, _HARMONICS = "frames", "harmonics"
 # letter, what it adds in words, the effect that does
 _MODELS = (
     ("b", "geometry", ""),
@@ -33,7 +32,7 @@ _MODELS = (
     ("c2", "compliance across the joints", "link_flexure"),
     ("c3", "cross compliance of a trunk", "cross_compliance"),
     ("d", "first and second harmonic of the drives", _HARMONICS),
-    ("e", "drift of the base with the rows", _DRIFT),
+    ("e", "drift of the base with the rows", "base_drift"),
 )
 
 
@@ -70,14 +69,25 @@ class Step:
 
 
 def held_out_mm(case: Case, state: State) -> np.ndarray:
-    """Distances (n,) by which a state misses the held-out rows; NaN where it has no pose."""
-    held = (case.measurements["status"] == rows.HELD_OUT).to_numpy()
+    """Distances (n,) by which a state misses the held-out rows of what the robot holds; NaN where it has no pose."""
+    held = (case.measurements["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(case)
     return np.linalg.norm(case.left(state)[: len(held)][held], axis=1)
 
 
 def trained_mm(case: Case, state: State) -> np.ndarray:
-    """Distances (n,) by which a state misses the rows that it was fitted on."""
-    return np.linalg.norm(case.residual(state)[case.positions], axis=1)
+    """Distances (n,) by which a state misses the rows that it was fitted on, of what the robot holds."""
+    return np.linalg.norm(case.residual(state)[counted(case)], axis=1)
+
+
+def held_by_robot(case: Case) -> np.ndarray:
+    """Which rows (n,) of a case's measurements are of what the robot holds, not of what stands beside it."""
+    beside = rows.on_the_world(case.measurements)
+    return np.ones(len(case.measurements), dtype=bool) if beside is None else ~beside
+
+
+def counted(case: Case) -> np.ndarray:
+    """Which rows (m,) of a case are positions of what the robot holds."""
+    return case.positions & held_by_robot(case)[case.at]
 
 
 def steps(case: Case) -> tuple[Step, ...]:
@@ -131,8 +141,9 @@ def _own(case: Case) -> dict[str, Effect]:
     if sharp is not None:
         pairs = tuple((drive, float(order)) for drive in range(len(robot.parts.drives)) for order in (1, 2))
         result[_HARMONICS] = replace(sharp.with_waves(pairs), name=_HARMONICS)
+    drift = find("base_drift", robot)
     if np.ptp(case.motion.time_s) > 0.0:
-        result[_DRIFT] = _drift(case)
+        result[drift.name] = drift
     return result
 
 
@@ -150,15 +161,3 @@ def frames(robot: Robot) -> Effect:
         return Contribution((directions @ values)[None])
 
     return Effect(FRAMES, parameters, plain_coordinates(parameters, typical), place)
-
-
-def _drift(case: Case) -> Effect:
-    """A shift of the world in proportion to the time, in mm from the first row to the last."""
-    parameters = ParameterSet(tuple(Parameter(f"drift_{axis}", "mm", 0.0, -10.0, 10.0, "assumed") for axis in "xyz"))
-
-    def shift(motion, values):
-        """The world's twist under shifts (3,)."""
-        share = (motion.time_s - motion.time_s[0]) / max(np.ptp(motion.time_s), 1e-9)
-        return motion.at({WORLD: np.concatenate([share[:, None] * values, np.zeros((len(share), 3))], axis=1)})
-
-    return Effect(_DRIFT, parameters, plain_coordinates(parameters, 0.05), shift)

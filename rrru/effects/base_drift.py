@@ -1,0 +1,39 @@
+"""Base drift: robot and instrument creep against each other while a campaign lasts.
+
+A tracker's stand settles, a floor warms, a base gives way: the world of the instrument shifts and turns against that of
+the robot, steadily with the time:
+
+    v = s (t - t_0),   w = r (t - t_0)
+
+with three speeds s and three rates r. It enters at the world. `thermal_growth` changes the robot's own lengths and ends
+at a limit; this law changes none.
+
+Assumptions: a constant speed, no temperature. Where a file has no times, the order of its rows has to stand for them.
+
+Source: ISO/TR 230-2 and ISO 9283 ask for a warmed-up robot and instrument for this reason; the size is assumed: some
+hundredths of a millimetre and microradians in an hour.
+"""
+
+import numpy as np
+
+from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.legs import WORLD
+
+# a law of a campaign's circumstances: it is tested where a configuration names it
+BY_NAME_ONLY = True
+
+_KINDS = (("speed", "mm/s", 0.01), ("rate", "rad/s", 1e-5))
+_TYPICAL = np.repeat([1e-5, 1e-8], 3)
+
+
+def for_robot(_robot):
+    """The law, for every robot."""
+    named = [(f"{kind}_{axis}", unit, most) for kind, unit, most in _KINDS for axis in "xyz"]
+    parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, -most, most, "assumed") for name, unit, most in named))
+    return Effect("base_drift", parameters, plain_coordinates(parameters, _TYPICAL), _creep, ("time_s",))
+
+
+def _creep(motion, values):
+    """The world's twist under speeds (3,) and rates (3,)."""
+    return motion.at({WORLD: np.outer(motion.time_s - np.nanmin(motion.time_s), values)})
