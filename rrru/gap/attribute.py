@@ -100,7 +100,8 @@ def with_noise(case, linear, stated_mm):
 
 def _rough(case, calibrated):
     """`rrru.campaign.noise.estimate` of a case with everything fitted that may be."""
-    linear = case.linearise(calibrated)
+    few = {name: effect for name, effect in case.library.items() if not effect.coordinates.broad}
+    linear = replace(case, library=few).linearise(calibrated)
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
     if columns.shape[-1] > len(case):
         # too few points to fit everything: what the calibration leaves has to do

@@ -166,7 +166,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         verdict = decide(attribution, _shares(attribution))
         fitted = with_effects(attribution, verdict.effects)
         least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
-        worse = {name for name in verdict.effects if _gain(fitted, name) < least}
+        worse = {name for name, gain in _gains(fitted, verdict.effects).items() if gain < least}
         if not worse:
             return verdict, fitted, order_by_share(fitted)
         ruled_out |= worse
@@ -198,12 +198,12 @@ def _shares(attribution: Attribution) -> dict[str, float]:
     return {term.effect: share for term, share in order_by_share(attribution)}
 
 
-def _gain(attribution: Attribution, name: str) -> float:
-    """Log predictive score that one effect of the hypothesis gains on left-out points over the others."""
-    hypothesis, level = attribution.hypothesis, attribution.level
-    others = tuple(term for term in hypothesis.terms if term.effect != name)
-    scores = [
-        attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level).log_score
-        for terms in (hypothesis.terms, others)
-    ]
-    return float((scores[0] - scores[1]).sum())
+def _gains(attribution: Attribution, names: Sequence[str]) -> dict[str, float]:
+    """Log predictive score that each effect of the hypothesis gains on left-out points over the others."""
+    hypothesis, level, held_out = attribution.hypothesis, attribution.level, attribution.held_out
+
+    def score(terms: tuple) -> float:
+        return float(held_out.predict(terms, hypothesis.strengths_of(terms, level), level).log_score.sum())
+
+    whole = score(hypothesis.terms) if names else 0.0
+    return {name: whole - score(tuple(t for t in hypothesis.terms if t.effect != name)) for name in names}

@@ -69,12 +69,12 @@ def shrink_steps(attribution, ordered, generator, draws):
     result = []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
-        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level)
+        last = count == len(ordered)
+        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
         shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * case.noise_mm**2
-        weight = attribution.posterior.probability_unexplained if count == len(ordered) else 1.0
+        weight = attribution.posterior.probability_unexplained if last else 1.0
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
-        moved = (prediction.spread.reshape(-1, numbers.shape[1]) @ numbers.T) ** 2
-        moved = moved.reshape(len(shown), 3, draws).sum(axis=1).T
+        moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
         drawn = weight * shown[picks] + (1.0 - weight) * moved
         added = terms[-1].effect if terms else ""

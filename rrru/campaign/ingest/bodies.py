@@ -51,7 +51,11 @@ def _apart(grid, body):
     if len(body) < 2:
         return wrong
     distance = np.linalg.norm(grid[:, body, None] - grid[:, None, body], axis=3)
-    off = np.abs(distance - np.nanmedian(distance, axis=0))
+    # pairs that were never seen together tell nothing
+    together = np.isfinite(distance).any(axis=0)
+    usual = np.zeros(together.shape)
+    usual[together] = np.nanmedian(distance[:, together], axis=0)
+    off = np.abs(distance - usual)
     bad, seen = np.zeros(off.shape, dtype=bool), np.isfinite(off)
     for first, second in zip(*np.triu_indices(len(body), 1), strict=True):
         bad[:, first, second] = bad[:, second, first] = _outlying(off[:, first, second])
@@ -62,6 +66,8 @@ def _apart(grid, body):
 
 def _outlying(off):
     """Which distances (stops,) from what is usual, NaN where not known, are gross; none where many are."""
+    if not np.isfinite(off).any():
+        return np.zeros(len(off), dtype=bool)
     wrong = off > max(_FAR_MM, _OUTLYING * 1.4826 * float(np.nanmedian(off)))
     return wrong if wrong.mean() <= _MOST else np.zeros(len(off), dtype=bool)
 
