@@ -41,12 +41,14 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
+    turned = rows.has_turns(measurements) and measurements["measured_rx_rad"].notna().to_numpy()
+    read = 3 * int(used.sum() + (used & turned).sum())
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
             continue
-        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * 3 * used.sum():
-            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for {used.sum()} readings"
+        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * read:
+            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {read} that were read"
             continue
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
         missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
