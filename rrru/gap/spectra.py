@@ -19,6 +19,8 @@ from rrru.gap.unknown import UNKNOWN
 
 # orders per resolved one; highest order; most waves that are still called few
 _DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
+# share of a wave's squares that the calibration has to leave
+_TOLD = 0.01
 _STRENGTHS, _ROUNDS = np.geomspace(0.1, 10.0, 5), 3
 
 
@@ -97,19 +99,19 @@ def pursue(data, basis, drive_effect, drive):
 def amplitudes(case, state, drive, orders):
     """Amplitudes (g,) in rad of waves of orders (g,) of one drive that fit what a state leaves, one at a time.
 
-    The calibration's numbers are fitted beside each.
+    The calibration's numbers are fitted beside each; NaN where they take up all but a hundredth of a wave.
     """
     linear = case.linearise(State(state.deviations, {}), [])
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     made = waves(case.motion.drive[case.at, drive], orders)
-    columns = (linear.drive[:, :, drive, None] * made[:, None, :]).reshape(linear.data.size, -1)
-    columns, left = _without(columns, basis), case.residual(state).ravel()
+    whole = (linear.drive[:, :, drive, None] * made[:, None, :]).reshape(linear.data.size, -1)
+    columns, left = _without(whole, basis), case.residual(state).ravel()
     pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
     grams = np.einsum("mgi,mgj->gij", pairs, pairs)
-    # a wave that the calibration takes up has no amplitude
-    least = 1e-6 * np.trace(grams, axis1=1, axis2=2).max()
-    fitted = np.linalg.solve(grams + least * np.eye(2), moments[:, :, None])[:, :, 0]
-    return np.linalg.norm(fitted, axis=1)
+    told = np.linalg.eigvalsh(grams)[:, 0] > _TOLD * (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
+    result = np.full(len(orders), np.nan)
+    result[told] = np.linalg.norm(np.linalg.solve(grams[told], moments[told, :, None])[:, :, 0], axis=1)
+    return result
 
 
 def _orders(reach):

@@ -98,8 +98,8 @@ campaign
 joint                  str    the drive
 order                  int    waves per turn
 resolution             float  difference of the orders that the joint's travel tells apart
-before_rad             float  amplitude beside the calibrated model
-after_rad              float  amplitude beside the model of the verdict
+before_rad             float? amplitude beside the calibrated model; null where this takes the wave up
+after_rad              float? amplitude beside the model of the verdict; null where that takes the wave up
 found_rad              float  amplitude in the verdict's error function of this joint; 0 where it has none
 found_phase_rad        float  its phase: found sin(order x angle + phase)
 found_error_rad        float  standard error of its sine and cosine
