@@ -41,11 +41,12 @@ def with_spectra(case, linear, terms):
     for effect in open_ones:
         if _waits(effect):
             found = pursue(data, basis, linear.drive, case.motion.drive[case.at])
-            # nothing stands out: there is nothing to test
-            library.pop(effect.name)
             if found[0]:
                 library[effect.name] = effect.with_waves(*found)
                 changed.append((effect.name, 0))
+            elif not len(effect.coordinates):
+                # nothing stands out: there is nothing to test
+                library.pop(effect.name)
             continue
         columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
         best = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
