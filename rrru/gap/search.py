@@ -42,7 +42,7 @@ class Hypothesis:
         return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
 
 
-def search(evidence, most=8, without=()):
+def search(evidence, most=12, without=()):
     """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones.
 
     without: names of effects that are ruled out.
