@@ -35,8 +35,10 @@ class State:
     def shape(self, library, key):
         """Values of the shape's parameters of one effect (name, shape) by name."""
         name, number = key
-        listed = library[name].coordinates.shapes[number]
-        return self.shape_values.get(name, listed) if key in self.effects else listed
+        if key in self.effects and name in self.shape_values:
+            # one that was searched may not be among those that a library lists
+            return self.shape_values[name]
+        return library[name].coordinates.shapes[number]
 
     def contribution(self, library, key, motion, coordinates=None, shape=None):
         """What one effect (name, shape) changes along a motion, at its own coordinates and shape or other ones."""
