@@ -121,7 +121,7 @@ def _orders(reach):
 def _waves_of(k, reach, drive_effect, drive):
     """Columns (3 n, 2 orders) of the waves of one drive."""
     made = waves(drive[:, k], _orders(reach))
-    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(-1, made.shape[1])
+    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(3 * len(drive), -1)
 
 
 def likeliest(data, columns, spectra, fitted):
