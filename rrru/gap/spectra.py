@@ -7,9 +7,11 @@ size and the noise chosen with it.
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
 from rrru.effects.drive_error_function import waves
@@ -75,26 +77,58 @@ def pursue(data, basis, drive_effect, drive):
     atoms = [(k, order) for k in range(drive.shape[1]) for order in _orders(reach[k])]
     if not atoms:
         return (), 0.0
-    columns = np.concatenate([_waves_of(k, reach[k], drive_effect, drive) for k in range(drive.shape[1])], axis=1)
-    columns = _without(columns, basis)
-    norm = np.sqrt((columns**2).sum(axis=0))
+
+    def columns(k, orders):
+        """Columns (m, 2 orders) of waves of a drive that the calibration leaves."""
+        return _without(_waves_of(drive_effect, drive, k, orders), basis)
+
+    every = np.concatenate([columns(k, _orders(reach[k])) for k in range(drive.shape[1])], axis=1)
     # what the calibration takes up is none
-    unit = columns / np.where(norm > 1e-3 * norm.max(), norm, np.inf)
-    resolved = sum(_HIGHEST * span / (2.0 * np.pi) for span in reach)
-    price = np.log(max(resolved, 1.0)) + np.log(len(data))
-    chosen, left = [], data
-    while len(chosen) < min(_MOST_WAVES, len(data) // 20):
+    least = 1e-3 * np.linalg.norm(every, axis=0).max()
+    unit = _unit(every, least)
+    resolved = max(sum(_HIGHEST * span / (2.0 * np.pi) for span in reach), 1.0)
+    price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
+    tried, found, had, left = [], [], np.zeros((len(data), 0)), data
+    while left.any() and len(found) < min(_MOST_WAVES, len(data) // 20):
         best = int((((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)).argmax())
-        if best in chosen:
+        if best in tried:
             break
-        index = np.array([2 * k + part for k in (*chosen, best) for part in (0, 1)])
-        trial = data - unit[:, index] @ np.linalg.lstsq(unit[:, index], data, rcond=1e-9)[0]
-        if 0.5 * len(data) * np.log((left @ left) / (trial @ trial)) < price:
+        k, middle = atoms[best]
+        wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
+        order = _sharpest(data, had, wave, middle, 2.0 * np.pi / reach[k] / _DENSITY)
+        had = np.concatenate([had, wave(order)], axis=1)
+        trial = _left(data, had)
+        if 0.5 * freedom * np.log((left @ left) / (trial @ trial)) < price:
             break
-        chosen.append(best)
+        tried.append(best)
+        found.append((k, order))
         left = trial
-    count = len(chosen)
-    return tuple(atoms[k] for k in chosen), float(gammaln(count + 1) - count * np.log(max(resolved, 1.0)))
+    return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
+
+
+def _sharpest(data, had, wave, middle, step):
+    """The order within a step of the middle whose wave, from orders to columns (m, 2), takes most off beside others.
+
+    A wave between two orders of the grid would else be taken for both of them.
+    """
+    bounds = max(middle - step, _DENSITY * step), min(middle + step, _HIGHEST)
+
+    def cost(order):
+        left = _left(data, np.concatenate([had, wave(order)], axis=1))
+        return left @ left
+
+    return float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
+
+
+def _left(data, columns):
+    """What columns (m, c) leave of data (m,)."""
+    return data - columns @ np.linalg.lstsq(columns, data, rcond=1e-9)[0]
+
+
+def _unit(columns, least):
+    """Columns (m, c) of unit length, those shorter than the least zero."""
+    norm = np.linalg.norm(columns, axis=0)
+    return columns / np.where(norm > least, norm, np.inf)
 
 
 def amplitudes(case, state, drive, orders):
@@ -121,10 +155,10 @@ def _orders(reach):
     return np.arange(step, _HIGHEST, step / _DENSITY) if step < _HIGHEST else np.zeros(0)
 
 
-def _waves_of(k, reach, drive_effect, drive):
+def _waves_of(drive_effect, drive, k, orders):
     """Columns (3 n, 2 orders) of the waves of one drive."""
-    made = waves(drive[:, k], _orders(reach))
-    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(-1, made.shape[1])
+    made = waves(drive[:, k], orders)
+    return (drive_effect[:, :, k, None] * made[:, None, :]).reshape(3 * len(drive), -1)
 
 
 def likeliest(data, columns, spectra, fitted):

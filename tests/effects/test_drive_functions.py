@@ -1,0 +1,169 @@
+"""Laws of many waves of the drives' own angles: their columns against differences, where they act, who has them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rrru.effects.drive_error_function import ORDERS
+from rrru.effects.library import find
+from rrru.effects.motion import Course, make_motion
+from rrru.gap.attribute import calibrate
+from rrru.gap.case import State
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.delta import Delta
+from rrru.robots.dynamics import Masses
+from rrru.robots.linear_delta import LinearDelta
+from rrru.robots.ptt3 import Ptt3
+from rrru.robots.rrru3 import Rrru3
+from tests.gap import arms
+from tests.robots import two_arms
+
+FUNCTION, SHARP = "drive_error_function", "transmission_orders"
+WAVES = ((0, 3.0), (4, 7.25), (0, 41.5), (5, 1.5))
+# numbers of coefficients of the function that are looked at: of several drives, sines and cosines, low and high orders
+_SOME = (0, 1, 2 * 6, 130, 128 + 2 * 30 + 1, 3 * 128 + 7, 6 * 128 - 1)
+
+
+def _law(name):
+    """The law of the arm, with its waves where these are to be found."""
+    effect = find(name, arms.ARM)
+    return effect.with_waves(WAVES) if name == SHARP else effect
+
+
+@pytest.fixture(scope="module")
+def frame():
+    return arms.measure(count=40)
+
+
+@pytest.fixture(scope="module")
+def motion(frame):
+    return arms.case_of(frame).motion
+
+
+def _expected(name, number, drive):
+    """Drive and function (n,) of one coefficient, by their definition."""
+    if name == FUNCTION:
+        joint, rest = divmod(number, 2 * 64)
+        order, cosine = rest // 2 + 1, rest % 2
+    else:
+        (joint, order), cosine = WAVES[number // 2], number % 2
+    return joint, (np.cos if cosine else np.sin)(order * drive[:, joint])
+
+
+@pytest.mark.parametrize("name", [FUNCTION, SHARP])
+def test_a_coefficient_turns_its_own_joint_by_its_wave(name, motion):
+    effect = _law(name)
+    count = len(effect.coordinates)
+    assert count == (6 * 2 * 64 if name == FUNCTION else 2 * len(WAVES))
+    for number in _SOME if name == FUNCTION else range(count):
+        values = effect.coordinates.to_values(1e-4 * np.eye(count)[number], {})
+        twists = effect.contribute(motion, values).twists
+        joint, wave = _expected(name, number, motion.drive)
+        expected = np.zeros_like(twists)
+        expected[:, arms.ARM.legs.site_numbers[f"joint {joint + 1}"], 5] = 1e-4 * wave
+        np.testing.assert_allclose(twists, expected, rtol=0.0, atol=1e-15)
+
+
+def test_the_functions_along_the_drives_are_differences_of_what_the_law_contributes(motion):
+    effect, generator = _law(FUNCTION), np.random.default_rng(0)
+    functions = effect.along_drives(motion)
+    assert [f.shape for f in functions] == [(40, 2 * len(ORDERS))] * 6
+    start, site = 1e-4 * generator.standard_normal(len(effect.parameters)), arms.ARM.legs.site_numbers
+    before = effect.contribute(motion, start).twists
+    together = np.concatenate(functions, axis=1)
+    for number in _SOME:
+        step = 1e-3 * np.eye(len(start))[number]
+        slope = (effect.contribute(motion, start + step).twists - before) / 1e-3
+        own = site[f"joint {number // 128 + 1}"]
+        np.testing.assert_allclose(slope[:, own, 5], together[:, number], rtol=1e-9, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", [FUNCTION, SHARP])
+def test_columns_are_slopes_of_exact_readings(name, frame):
+    """Central differences through the exact closure, about the calibrated arm; the generic way gives the same."""
+    effect = _law(name)
+    case = arms.case_of(frame, library={name: effect})
+    if name == FUNCTION:
+        assert name in case.untestable
+        case = replace(case, library={name: effect})
+    state = calibrate(case)
+    columns = case.linearise(state).columns[name, 0]
+    secant = replace(case, library={name: replace(effect, along_drives=None)}).linearise(state).columns[name, 0]
+    # turns by errors and by waves add up as vectors or one after the other
+    largest = np.abs(columns).max()
+    np.testing.assert_allclose(columns, secant, rtol=0.0, atol=2e-5 * largest)
+    for number in _SOME if name == FUNCTION else range(len(effect.coordinates)):
+        step = 1e-4 * np.eye(len(effect.coordinates))[number]
+        down, up = (case.residual(State(state.deviations, {(name, 0): sign * step})) for sign in (-1.0, 1.0))
+        assert np.abs(columns[..., number]).max() > 1.0
+        np.testing.assert_allclose(columns[..., number], (down - up) / 2e-4, rtol=0.0, atol=5e-5 * largest)
+
+
+def test_a_drive_that_others_follow_moves_them_too():
+    """Joints on rods: the drive's column is what moving it does, not what turning its own joint does."""
+    robot = make_mechanism("two_arms", two_arms.section())
+    count, names = 20, two_arms.DRIVES
+    drive = robot.legs.home_drives + np.random.default_rng(2).uniform(-0.5, 0.5, (count, len(names)))
+    hand = np.array(["right", "left"] * count)[:count]
+    position, still, rest = robot.guess(drive, hand), np.zeros((count, 3)), np.zeros_like(drive)
+    course = Course(
+        position, drive, drive, np.arange(count), np.arange(count), still, still, np.zeros(count), (rest, rest)
+    )
+    motion, effect = make_motion(robot, Masses(0.0, 0.0, 0.0), course), find(FUNCTION, robot)
+    poses = robot.solve(drive, position)
+    at = robot.map(drive, poses)
+    functions = effect.along_drives(motion)
+    for k in range(len(names)):
+        number = k * 128 + 5
+        made = at.move(effect.contribute(motion, np.eye(len(effect.parameters))[number]).twists)
+        np.testing.assert_allclose(functions[k][:, 5, None] * at.drive_effect[:, :, k], made, rtol=0.0, atol=1e-6)
+        h = 1e-5 * np.eye(len(names))[k]
+        moved = (robot.guess(drive + h, hand) - robot.guess(drive - h, hand)) / 2e-5
+        np.testing.assert_allclose(made, np.cos(3.0 * drive[:, k, None]) * moved, rtol=0.0, atol=1e-3)
+
+
+def test_what_repeats_with_every_turn_and_what_does_not(motion):
+    generator = np.random.default_rng(1)
+
+    def parted(effect, turn):
+        values = effect.coordinates.to_values(1e-4 * generator.standard_normal(len(effect.coordinates)), {})
+        twists = [effect.contribute(replace(motion, drive=motion.drive + by), values).twists for by in (0.0, turn)]
+        return np.abs(twists[1] - twists[0]).max()
+
+    function = _law(FUNCTION)
+    assert parted(function, 2.0 * np.pi) < 1e-14 and parted(function, np.pi) > 1e-4
+    sharp = find(SHARP, arms.ARM)
+    assert parted(sharp.with_waves(((2, 7.25),)), 2.0 * np.pi / 7.25) < 1e-14
+    assert parted(sharp.with_waves(((2, 7.25),)), 2.0 * np.pi) > 1e-5
+
+
+def test_a_law_without_waves_does_nothing_and_one_with_them_is_of_the_stated_drives(motion):
+    nothing = find(SHARP, arms.ARM)
+    assert len(nothing.coordinates) == 0 and not np.any(nothing.contribute(motion, []).twists)
+    told = nothing.with_waves(WAVES, -3.0)
+    assert [parameter.leg for parameter in told.parameters] == [1, 1, 5, 5, 1, 1, 6, 6]
+    assert len(set(told.parameters.names)) == 8 and told.coordinates.log_prior == -3.0
+
+
+@pytest.mark.parametrize("name", [FUNCTION, SHARP])
+def test_robots_with_slides_have_neither_law(name):
+    assert find(name, Ptt3()) is None and find(name, LinearDelta()) is None
+    for robot in (Rrru3(), Delta(), arms.ARM):
+        assert find(name, robot).name == name
+
+
+def test_every_spectrum_falls_with_the_order_alike_for_all_drives():
+    """Sizes of sine and cosine are those of one order: 1 / sqrt(1 + (n / b)^4) up to a factor, of five roughnesses."""
+    coordinates = _law(FUNCTION).coordinates
+    assert len(coordinates.spectra) >= 3
+    roughness = []
+    for spectrum in coordinates.spectra:
+        sizes = np.reshape(spectrum, (6, len(ORDERS), 2))
+        assert (sizes == sizes[:1, :, :1]).all()
+        power = sizes[0, :, 0] ** -2.0
+        # straight lines over the fourth power of the order
+        line = np.polynomial.polynomial.polyfit(ORDERS.astype(float) ** 4, power / power[0], 1, w=1.0 / power)
+        np.testing.assert_allclose(np.polynomial.polynomial.polyval(ORDERS**4.0, line), power / power[0], rtol=1e-6)
+        roughness.append((line[0] / line[1]) ** 0.25)
+    assert (np.diff(roughness) > 0.0).all() and roughness[0] > 1.0 and roughness[-1] < 64.0

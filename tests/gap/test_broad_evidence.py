@@ -1,0 +1,257 @@
+"""Terms of many coefficients, which are averaged over first, against the marginal likelihood of the whole model."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import lsq_linear
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
+
+from rrru.effects.protocol import Coordinates
+from rrru.gap.averages import Average, averaged_mean
+from rrru.gap.case import Linear
+from rrru.gap.evidence import LEVELS, STRENGTHS, ModelEvidence
+from rrru.gap.noise_model import NoiseModel
+from rrru.gap.search import Hypothesis
+from rrru.gap.terms import Term
+
+NOISE_MM = 0.05
+_POINTS, _ROUGH, _FINE = 16, 14, 8
+_SIZES = np.random.default_rng(9).uniform(0.3, 3.0, _ROUGH)
+
+
+def _effect(typical, positive=False, broad=False, most=np.inf):
+    typical = np.asarray(typical, dtype=float)
+    none = np.zeros(len(typical), dtype=int)
+    return SimpleNamespace(
+        coordinates=Coordinates(typical, none, np.full(len(typical), positive), None, most=most, broad=broad)
+    )
+
+
+LIBRARY = {
+    "rough": _effect(_SIZES, broad=True),
+    "fine": _effect(np.ones(_FINE), broad=True),
+    "free": _effect([0.3, 2.0]),
+    "other": _effect([1.0, 1.0, 1.5]),
+    "pull": _effect([0.7], positive=True),
+}
+ROUGH, FINE, FREE, OTHER, PULL = (Term(name) for name in LIBRARY)
+
+
+def _evidence(seed, with_law=False, smooth=False):
+    """Evidence on random numbers: three calibration columns and the library's, of stops in no order unless smooth."""
+    generator, shape = np.random.default_rng(seed), (_POINTS, 3)
+    columns = {(name, 0): generator.normal(size=(*shape, len(e.coordinates))) for name, e in LIBRARY.items()}
+    laws = {"free": 0.03 * generator.normal(size=(*shape, 1))} if with_law else {}
+    base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
+    data = 0.2 * generator.normal(size=shape) + 0.1 * columns["pull", 0][..., 0]
+    linear, run = Linear(data, base, columns, laws, {}, None), np.ones(_POINTS, dtype=int)
+    return ModelEvidence(LIBRARY, linear, run, NoiseModel.white(NOISE_MM), smooth)
+
+
+@dataclass(frozen=True)
+class Dense:
+    """The whole Gaussian model of some terms at strengths: columns (3n, k) in units of the noise, sizes (k,)."""
+
+    data: np.ndarray
+    base: np.ndarray
+    columns: np.ndarray
+    size: np.ndarray
+    owner: np.ndarray
+
+    @classmethod
+    def of(cls, evidence, terms, strengths):
+        """The model of terms at strengths on the evidence's columns and data."""
+        linear = evidence.linear
+        base = linear.base.reshape(-1, 3) / NOISE_MM
+        basis, _ = np.linalg.qr(base)
+        columns, sizes, owner = [np.zeros((len(base), 0))], [], []
+        for number, (term, strength) in enumerate(zip(terms, strengths, strict=True)):
+            own = linear.columns[term.effect, 0].reshape(len(base), -1) / NOISE_MM
+            typical = LIBRARY[term.effect].coordinates.typical
+            beyond = (own - basis @ (basis.T @ own)) * typical
+            columns.append(own)
+            # of strength 1 the rms of its part beyond the calibration is that of the noise
+            sizes.extend(strength * typical / np.sqrt((beyond**2).sum() / len(base)))
+            owner.extend([number] * len(typical))
+        for term in terms:
+            if term.effect in linear.shape_columns:
+                own = linear.shape_columns[term.effect].reshape(len(base), -1) / NOISE_MM
+                columns.append(own)
+                sizes.extend([1.0] * own.shape[1])
+                owner.extend([len(terms)] * own.shape[1])
+        data = linear.data.ravel() / NOISE_MM
+        return cls(data, base, np.concatenate(columns, axis=1), np.array(sizes), np.array(owner))
+
+    @property
+    def likelihood(self):
+        """Restricted log likelihood, its constants as in `ModelEvidence`."""
+        solve = np.linalg.inv(np.eye(len(self.data)) + (self.columns * self.size**2) @ self.columns.T)
+        inner = self.base.T @ solve @ self.base
+        projector = solve - solve @ self.base @ np.linalg.inv(inner) @ self.base.T @ solve
+        value = np.linalg.slogdet(solve)[1] - np.linalg.slogdet(inner)[1] - self.data @ projector @ self.data
+        return 0.5 * value
+
+    @property
+    def _design(self):
+        """Columns and data with the prior as more rows."""
+        left = np.zeros((len(self.size), self.base.shape[1]))
+        design = np.block([[self.base, self.columns], [left, np.diag(1.0 / self.size)]])
+        return design, np.concatenate([self.data, np.zeros(len(self.size))])
+
+    @property
+    def mean(self):
+        """Coefficients (k,) by least squares of the whole."""
+        design, target = self._design
+        return np.linalg.lstsq(design, target, rcond=None)[0][self.base.shape[1] :]
+
+    def bounded_mean(self, positive):
+        """Coefficients (k,) by bounded least squares."""
+        design, target = self._design
+        low = np.concatenate([np.full(self.base.shape[1], -np.inf), np.where(positive, 0.0, -np.inf)])
+        return lsq_linear(design, target, (low, np.inf), method="bvls", tol=1e-14).x[self.base.shape[1] :]
+
+    def explained(self, chosen):
+        """Rms per axis over the noise of what some coefficients make, calibration taken out."""
+        made = self.columns @ np.where(chosen, self.mean, 0.0)
+        left = made - self.base @ np.linalg.lstsq(self.base, made, rcond=None)[0]
+        return np.sqrt((left**2).mean())
+
+
+_SETS = [
+    (ROUGH,),
+    (ROUGH, FREE),
+    (FREE, ROUGH),
+    (FREE, ROUGH, OTHER),
+    (OTHER, FREE, ROUGH),
+    (ROUGH, FINE),
+    (FINE, FREE, ROUGH),
+]
+_GRIDS = ([0.3, 3.0], [1.0, 30.0, 100.0], [0.1, 10.0])
+
+
+@pytest.mark.parametrize("terms", _SETS, ids=lambda terms: "+".join(term.effect for term in terms))
+@pytest.mark.parametrize("with_law", [False, True], ids=["", "doubted"])
+def test_scores_equal_a_dense_marginal_likelihood(terms, with_law):
+    evidence = _evidence(1, with_law)
+    grids = _GRIDS[: len(terms)]
+    found, combinations = evidence.over_strengths(terms, grids)
+    assert [tuple(one) for one in combinations] == list(product(*grids)) and found.shape == (1, len(combinations))
+    expected = [Dense.of(evidence, terms, one).likelihood for one in combinations]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-8)
+
+
+def test_alone_it_is_averaged_over_all_strengths_and_levels():
+    evidence = _evidence(2, smooth=True)
+    found, grid = evidence.over_strengths((ROUGH,))
+    assert found.shape == (len(LEVELS), len(STRENGTHS)) and grid[:, 0].tolist() == STRENGTHS.tolist()
+    expected = [Dense.of(evidence, (ROUGH,), (strength,)).likelihood for strength in STRENGTHS]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-8)
+    alone, best = evidence.independent((ROUGH,), [0])
+    np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(STRENGTHS)), rtol=1e-8)
+    assert best[0, 0] == STRENGTHS[np.argmax(expected)]
+
+
+@pytest.mark.parametrize("terms", _SETS[:-2], ids=lambda terms: "+".join(term.effect for term in terms))
+def test_a_broad_term_is_what_the_same_term_is_that_is_not(terms):
+    """At every level of a smooth discrepancy: being averaged over first changes nothing."""
+    broad = _evidence(3, with_law=True, smooth=True)
+    rough = LIBRARY["rough"].coordinates
+    plain = replace(broad, library=LIBRARY | {"rough": SimpleNamespace(coordinates=replace(rough, broad=False))})
+    grids = _GRIDS[: len(terms)]
+    np.testing.assert_allclose(broad.over_strengths(terms, grids)[0], plain.over_strengths(terms, grids)[0], rtol=1e-9)
+
+
+def _with_positive(evidence, terms, strengths):
+    """Log likelihood with the positive half of the prior of "pull", by quadrature over its coefficient."""
+    others = tuple(term for term in terms if term != PULL)
+    number = terms.index(PULL)
+    rest = Dense.of(evidence, others, np.delete(strengths, number))
+    pull = Dense.of(evidence, (PULL,), [strengths[number]])
+    column, size = pull.columns[:, 0], pull.size[0]
+
+    def log_density(c):
+        moved = replace(rest, data=rest.data - c * column)
+        return moved.likelihood - 0.5 * (c / size) ** 2 - np.log(size * np.sqrt(0.5 * np.pi))
+
+    # a parabola in the coefficient: three of its values tell it
+    a, b, c = np.polyfit([-size, 0.0, size], [log_density(x) for x in (-size, 0.0, size)], 2)
+    top, width = -0.5 * b / a, (-2.0 * a) ** -0.5
+    low = max(top - 12.0 * width, 0.0)
+    shift = max(a * x * x + b * x + c for x in (low, max(top, 0.0)))
+    area, _ = quad(lambda x: np.exp(a * x * x + b * x + c - shift), low, max(top, 0.0) + 12.0 * width, limit=200)
+    return shift + np.log(area)
+
+
+@pytest.mark.parametrize("terms", [(ROUGH, PULL), (PULL, ROUGH), (PULL, FREE, ROUGH)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_beside_a_positive_coefficient_half_its_prior_is_left(terms, sign):
+    evidence = _evidence(4)
+    linear = evidence.linear
+    evidence = replace(evidence, linear=replace(linear, data=sign * linear.data))
+    grids = _GRIDS[: len(terms)]
+    found, combinations = evidence.over_strengths(terms, grids)
+    expected = [_with_positive(evidence, terms, one) for one in combinations]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("terms", _SETS, ids=lambda terms: "+".join(term.effect for term in terms))
+@pytest.mark.parametrize("with_law", [False, True], ids=["", "doubted"])
+def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_law):
+    evidence = _evidence(5, with_law)
+    strengths = np.array([3.0, 0.5, 10.0])[: len(terms)]
+    dense = Dense.of(evidence, terms, strengths)
+    found = evidence._mean(terms, strengths, 0)
+    np.testing.assert_allclose(found, dense.mean, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(evidence.coefficients(terms, strengths, 0)[0], dense.mean, rtol=1e-6, atol=1e-9)
+    value = np.full(len(LEVELS), -np.inf)
+    value[0] = 0.0
+    hypothesis = Hypothesis(terms, value, np.tile(strengths, (len(LEVELS), 1)))
+    for names in ({"rough"}, {"free"}, {"free", "rough"}, {term.effect for term in terms}):
+        chosen = np.array([*(term.effect in names for term in terms), True])[dense.owner]
+        expected = dense.explained(chosen) if names & hypothesis.effects else 0.0
+        assert evidence.explained(hypothesis, names) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("terms", [(ROUGH, PULL), (PULL, FREE, ROUGH), (PULL, ROUGH, OTHER)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_coefficients_that_cannot_be_negative_are_bounded_least_squares(terms, sign):
+    evidence = _evidence(6)
+    linear = evidence.linear
+    evidence = replace(evidence, linear=replace(linear, data=sign * linear.data))
+    strengths = np.array([3.0, 1.0, 10.0])[: len(terms)]
+    dense = Dense.of(evidence, terms, strengths)
+    positive = dense.owner == terms.index(PULL)
+    expected = dense.bounded_mean(positive)
+    found = evidence._mean(terms, strengths, 0)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7)
+    assert (expected[positive] == 0.0).all() == (sign < 0.0)
+
+
+def test_an_average_is_an_integral_over_the_coefficients():
+    """Of normal densities: data with the averaged columns in their covariance, the others' coefficients given."""
+    generator = np.random.default_rng(7)
+    columns, data, size = generator.normal(size=(9, 5)), generator.normal(size=9), generator.uniform(0.3, 2.0, 3)
+    index, others = np.array([1, 2, 4]), np.array([0, 3])
+    made = Average.over(columns.T @ columns, columns.T @ data, index, size)
+    averaged = np.eye(9) + (columns[:, index] * size**2) @ columns[:, index].T
+    assert made.kept.tolist() == others.tolist()
+    ratio = multivariate_normal.logpdf(data, cov=averaged) - multivariate_normal.logpdf(data, cov=np.eye(9))
+    assert made.evidence == pytest.approx(ratio, rel=1e-9)
+    for values in generator.normal(size=(4, 2)):
+        moved = multivariate_normal.logpdf(data - columns[:, others] @ values, cov=averaged)
+        gram, moment = made.rest(others)
+        foretold = moment @ values - 0.5 * values @ gram @ values
+        assert moved - multivariate_normal.logpdf(data, cov=averaged) == pytest.approx(foretold, rel=1e-8)
+    gram, moment = made.rest(np.array([3]))
+    assert gram[0, 0] == made.gram[1, 1] and moment[0] == made.moment[1]
+    values = generator.normal(size=2)
+    design = np.concatenate([columns[:, index], np.diag(1.0 / size)])
+    target = np.concatenate([data - columns[:, others] @ values, np.zeros(3)])
+    expected = np.linalg.lstsq(design, target, rcond=None)[0]
+    found = averaged_mean(columns.T @ columns, columns.T @ data, index, size, others, values)
+    np.testing.assert_allclose(found, expected, rtol=1e-8)
