@@ -190,3 +190,9 @@ def test_a_sim_without_a_pose_is_an_error_that_says_so(case):
 def test_campaigns_are_as_strong_as_they_say():
     for name in ("backlash", "frame_misregistration"):
         assert campaigns.gap_mm((campaigns.strong(name, 4.0),)) == pytest.approx(4.0 * campaigns.NOISE_RMS_MM, rel=0.02)
+
+
+def test_a_state_tells_a_shape_that_was_searched_without_a_library_that_lists_it():
+    state = State(np.zeros(1), {("transmission_error", 7): np.zeros(6)}, {"transmission_error": {"ratio": 4.2}})
+    assert state.shape(EFFECTS, ("transmission_error", 7)) == {"ratio": 4.2}
+    assert state.shape(EFFECTS, ("transmission_error", 0)) == {"ratio": 50.0}
