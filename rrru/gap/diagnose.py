@@ -154,7 +154,7 @@ def _row(
     }
 
 
-def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attribution, list]:
+def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attribution, tuple]:
     """Verdict, the attribution fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
@@ -163,12 +163,14 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
     """
     ruled_out: set[str] = set()
     while True:
-        verdict = decide(attribution, _shares(attribution))
-        fitted = with_effects(attribution, verdict.effects)
+        known, ordered = _likely(attribution)
+        verdict = decide(attribution, {term.effect: share for term, share in ordered})
+        same = known.hypothesis.effects == frozenset(verdict.effects)
+        fitted = known if same else with_effects(attribution, verdict.effects)
         least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
         worse = {name for name, gain in _gains(fitted, verdict.effects).items() if gain < least}
         if not worse:
-            return verdict, fitted, order_by_share(fitted)
+            return verdict, fitted, ordered if same else order_by_share(fitted)
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
 
@@ -188,14 +190,14 @@ def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], pri
     return posterior(evidence, search(evidence, without=ruled_out), prior)
 
 
-def _shares(attribution: Attribution) -> dict[str, float]:
-    """Share of the gap that each effect removes: of the best hypothesis, or of those that act beside the unexplained.
+def _likely(attribution: Attribution) -> tuple[Attribution, tuple]:
+    """The attribution of the best hypothesis, or of what acts beside the unexplained, and its terms with their shares.
 
     What else the best hypothesis holds there may be a part of what is unexplained, and spoils what is predicted.
     """
     if attribution.posterior.probability_unexplained > _HALF:
         attribution = with_effects(attribution, tuple(certain_beside_unexplained(attribution.posterior)))
-    return {term.effect: share for term, share in order_by_share(attribution)}
+    return attribution, order_by_share(attribution)
 
 
 def _gains(attribution: Attribution, names: Sequence[str]) -> dict[str, float]:
