@@ -20,6 +20,8 @@ from rrru.gap.unknown import UNKNOWN
 
 # orders per resolved one; highest order; most waves that are still called few
 _DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
+# steps of that grid by which a wave's order may lie beside the one of the grid that shows it
+_REACH = 0.75
 # logarithms of the signal over the noise that are tried: from, to, how many
 _RATIOS = -4.0, 7.0, 23
 
@@ -88,30 +90,33 @@ def pursue(data, basis, drive_effect, drive):
     unit = _unit(every, least)
     resolved = max(sum(_HIGHEST * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
-    tried, found, had, left = [], [], np.zeros((len(data), 0)), data
-    while left.any() and len(found) < min(_MOST_WAVES, len(data) // 20):
-        best = int((((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)).argmax())
-        if best in tried:
+    found, had, left = [], np.zeros((len(data), 0)), data
+    while len(found) < min(_MOST_WAVES, len(data) // 20):
+        gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
+        if not gains.any():
             break
-        k, middle = atoms[best]
+        k, middle = atoms[int(gains.argmax())]
+        step = 2.0 * np.pi / reach[k] / _DENSITY
         wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
-        order = _sharpest(data, had, wave, middle, 2.0 * np.pi / reach[k] / _DENSITY)
+        order = _sharpest(data, had, wave, middle, step)
         had = np.concatenate([had, wave(order)], axis=1)
         trial = _left(data, had)
         if 0.5 * freedom * np.log((left @ left) / (trial @ trial)) < price:
             break
-        tried.append(best)
         found.append((k, order))
         left = trial
+        # what is nearer than that is the same wave
+        same = [drive == k and abs(one - order) < step for drive, one in atoms]
+        unit[:, np.repeat(same, 2)] = 0.0
     return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
 
 
 def _sharpest(data, had, wave, middle, step):
-    """The order within a step of the middle whose wave, from orders to columns (m, 2), takes most off beside others.
+    """The order about the middle whose wave, from orders to columns (m, 2), takes most off beside others.
 
-    A wave between two orders of the grid would else be taken for both of them.
+    A wave between two orders of the grid, which lie a step apart, would else be taken for both of them.
     """
-    bounds = max(middle - step, _DENSITY * step), min(middle + step, _HIGHEST)
+    bounds = max(middle - _REACH * step, _DENSITY * step), min(middle + _REACH * step, _HIGHEST)
 
     def cost(order):
         left = _left(data, np.concatenate([had, wave(order)], axis=1))
