@@ -86,6 +86,14 @@ def test_three_sharp_orders_of_different_drives_are_named(waves, size_rad):
         assert near and max(near) == pytest.approx(amplitude, rel=0.35)
 
 
+def test_sharp_orders_are_found_behind_a_law_that_hides_them():
+    """Drives that give way make a gap twenty times theirs, which looks like many waves at first."""
+    acting, _ = _sharp(((0, 17.0), (2, 31.0), (4, 9.0)), 6e-5, 1)
+    found = _diagnosed((acting, arms.active("drive_compliance", [5e-8] * 6)), 1)
+    assert set(found.verdict["effects"].split("+")) == {"drive_compliance", "transmission_orders"}
+    assert found.verdict["share_closed"] > 0.95
+
+
 @pytest.mark.parametrize("seed", [0, 3])
 def test_nothing_is_named_where_nothing_acts(seed):
     found = _diagnosed((), seed)

@@ -85,6 +85,20 @@ def test_numbers_that_are_fitted_beside_them_make_waves_no_more_frequent(arm):
     assert found <= 9
 
 
+def test_waves_of_one_drive_keep_apart_whatever_is_looked_through(arm):
+    """Something slow that is no wave, far above the noise: many waves stand for it, none of them twice."""
+    _, basis, effect, drive = arm
+    slow = np.tanh(3.0 * drive) * np.abs(drive) * 1e-3
+    data = np.einsum("nak,nk->na", effect, slow).ravel() + NOISE_MM * np.random.default_rng(0).normal(size=len(basis))
+    found, _ = pursue(data - basis @ (basis.T @ data), basis, effect, drive)
+    assert len(found) > 3
+    for k, step in enumerate(_resolution(arm)):
+        orders = np.sort([order for number, order in found if number == k])
+        assert (np.diff(orders) > 0.1 * step).all() and (orders >= step).all() and (orders <= 64.0).all()
+    names = find("transmission_orders", arms.ARM).with_waves(found).parameters.names
+    assert len(set(names)) == 2 * len(found)
+
+
 def test_the_price_of_a_choice_is_that_of_one_among_all_resolved(arm):
     """Minus the logarithm of how many sets of so many waves there are, 64 times the drives' turns each."""
     generator = np.random.default_rng(3)
