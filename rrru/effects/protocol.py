@@ -123,7 +123,8 @@ class Coordinates:
     probabilities of the shapes, None where all are alike; searched: what is searched beside the listed shapes, of which
     the first so many are stated; doubt: share that a shape's parameter may be off by, 1 sigma, of what is searched the
     order itself; broad: so many coordinates that they are averaged over before anything else is tried; spectra: sizes
-    (c,) of the coordinates, of which the campaign chooses; log_prior: of a choice that has been made otherwise.
+    (c,) of the coordinates, of which the campaign chooses; sized: whether it has, and the typical sizes are its own;
+    log_prior: of a choice that has been made otherwise.
     """
 
     typical: np.ndarray
@@ -138,6 +139,7 @@ class Coordinates:
     doubt: float = 0.3
     broad: bool = False
     spectra: tuple[np.ndarray, ...] = ()
+    sized: bool = False
     log_prior: float = 0.0
 
     def __len__(self) -> int:

@@ -188,7 +188,11 @@ class ModelEvidence:
             size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
             power, total = ((all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whole))
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
-            size /= np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
+            unit = np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
+            if coordinates.sized:
+                # of many coefficients the data tell the size far better than the strengths lie apart: one is just it
+                unit = STRENGTHS[np.abs(np.log(STRENGTHS / unit)).argmin()]
+            size /= unit
             most = np.broadcast_to(coordinates.most, len(coordinates))
             largest = np.array([most[column > 0.0].max() for column in matrix.T])
             self._priors[term] = _Prior(index, size, largest, matrix.T @ coordinates.positive > 0)

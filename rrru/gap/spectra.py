@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
@@ -23,7 +22,10 @@ from rrru.gap.unknown import UNKNOWN
 _DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
 # share of a wave's squares that the calibration has to leave
 _TOLD = 0.01
-_STRENGTHS, _ROUNDS = np.geomspace(0.1, 10.0, 5), 3
+# steps of that grid by which a wave's order may lie beside the one of the grid that shows it
+_REACH = 0.75
+# logarithms of the signal over the noise that are tried: from, to, how many
+_RATIOS = -4.0, 7.0, 23
 
 
 def with_spectra(case, linear, terms):
@@ -51,8 +53,11 @@ def with_spectra(case, linear, terms):
                 library.pop(effect.name)
             continue
         columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
-        best = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
-        chosen = replace(effect.coordinates, typical=effect.coordinates.spectra[best], spectra=())
+        best, strength = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
+        typical = strength * effect.coordinates.spectra[best]
+        # one of several, chosen by the data
+        paid = effect.coordinates.log_prior - np.log(len(effect.coordinates.spectra))
+        chosen = replace(effect.coordinates, typical=typical, spectra=(), sized=True, log_prior=paid)
         library[effect.name] = replace(effect, coordinates=chosen)
     return replace(case, library=library), changed
 
@@ -88,30 +93,33 @@ def pursue(data, basis, drive_effect, drive):
     unit = _unit(every, least)
     resolved = max(sum(_HIGHEST * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
-    tried, found, had, left = [], [], np.zeros((len(data), 0)), data
-    while left.any() and len(found) < min(_MOST_WAVES, len(data) // 20):
-        best = int((((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)).argmax())
-        if best in tried:
+    found, had, left = [], np.zeros((len(data), 0)), data
+    while len(found) < min(_MOST_WAVES, len(data) // 20):
+        gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
+        if not gains.any():
             break
-        k, middle = atoms[best]
+        k, middle = atoms[int(gains.argmax())]
+        step = 2.0 * np.pi / reach[k] / _DENSITY
         wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
-        order = _sharpest(data, had, wave, middle, 2.0 * np.pi / reach[k] / _DENSITY)
+        order = _sharpest(data, had, wave, middle, step)
         had = np.concatenate([had, wave(order)], axis=1)
         trial = _left(data, had)
         if 0.5 * freedom * np.log((left @ left) / (trial @ trial)) < price:
             break
-        tried.append(best)
         found.append((k, order))
         left = trial
+        # what is nearer than that is the same wave
+        same = [drive == k and abs(one - order) < step for drive, one in atoms]
+        unit[:, np.repeat(same, 2)] = 0.0
     return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
 
 
 def _sharpest(data, had, wave, middle, step):
-    """The order within a step of the middle whose wave, from orders to columns (m, 2), takes most off beside others.
+    """The order about the middle whose wave, from orders to columns (m, 2), takes most off beside others.
 
-    A wave between two orders of the grid would else be taken for both of them.
+    A wave between two orders of the grid, which lie a step apart, would else be taken for both of them.
     """
-    bounds = max(middle - step, _DENSITY * step), min(middle + step, _HIGHEST)
+    bounds = max(middle - _REACH * step, _DENSITY * step), min(middle + _REACH * step, _HIGHEST)
 
     def cost(order):
         left = _left(data, np.concatenate([had, wave(order)], axis=1))
@@ -162,26 +170,39 @@ def _waves_of(drive_effect, drive, k, orders):
 
 
 def likeliest(data, columns, spectra, fitted):
-    """Number of the spectrum of highest likelihood of data (m,), of coefficients (c,) of columns (m, c).
+    """Number of the spectrum of highest likelihood and the factor of its sizes: of data (m,) and columns (m, c).
 
     spectra: sizes (c,) of the coefficients up to a common factor; fitted: numbers fitted beside them.
     """
     gram, moment, square = columns.T @ columns, columns.T @ data, float(data @ data)
-    count = len(data) - fitted
+    found = [
+        _likeliest_factor(size[:, None] * gram * size, size * moment, square, len(data) - fitted) for size in spectra
+    ]
+    best = int(np.argmax([value for value, _ in found]))
+    return best, found[best][1]
 
-    def likelihood(size):
-        """At the noise that the coefficients of these sizes leave, found in turn with them."""
-        variance = 0.1 * square / count
-        for _ in range(_ROUNDS):
-            scaled = size[:, None] * gram * size / variance + np.eye(len(size))
-            factor = cho_factor(scaled, lower=True)
-            mean = size * cho_solve(factor, size * moment) / variance
-            fit = moment @ mean
-            spare = len(size) - np.trace(cho_solve(factor, np.eye(len(size))))
-            result = -0.5 * count * np.log(variance) - 0.5 * (square - fit) / variance
-            result -= np.log(np.diag(factor[0])).sum()
-            variance = (square - 2.0 * fit + mean @ gram @ mean) / max(count - spare, 1.0)
-        return result
 
-    best = [max(likelihood(strength * size) for strength in _STRENGTHS) for size in spectra]
-    return int(np.argmax(best))
+def _likeliest_factor(gram, moment, square, count):
+    """Highest log likelihood over the factor of all coefficients, and that factor.
+
+    Of a sum of squares with so many degrees of freedom, a Gram matrix (c, c) and moments (c,) of columns of unit
+    coefficients. For each ratio of factor and noise the likeliest noise is known.
+    """
+    value, turned = np.linalg.eigh(gram)
+    value, power = np.maximum(value, 0.0), (turned.T @ moment) ** 2
+
+    def noise(log_ratio):
+        """Likeliest variance of the noise."""
+        return (square - (power / (np.exp(-2.0 * log_ratio) + value)).sum()) / count
+
+    def cost(log_ratio):
+        """Minus the log likelihood up to a constant."""
+        return 0.5 * count * np.log(noise(log_ratio)) + 0.5 * np.log1p(np.exp(2.0 * log_ratio) * value).sum()
+
+    # a ratio of 1 over the root of the mean square is that of as much signal as noise
+    middle = 0.5 * np.log(count / max(value.sum(), 1e-300))
+    tried = middle + np.linspace(*_RATIOS)
+    best = tried[np.argmin([cost(one) for one in tried])]
+    width = tried[1] - tried[0]
+    fine = minimize_scalar(cost, bounds=(best - width, best + width), method="bounded")
+    return -float(fine.fun), float(np.exp(fine.x) * np.sqrt(noise(fine.x)))

@@ -255,3 +255,17 @@ def test_an_average_is_an_integral_over_the_coefficients():
     expected = np.linalg.lstsq(design, target, rcond=None)[0]
     found = averaged_mean(columns.T @ columns, columns.T @ data, index, size, others, values)
     np.testing.assert_allclose(found, expected, rtol=1e-8)
+
+
+def test_of_sizes_that_the_campaign_has_chosen_one_strength_is_just_these():
+    """Many coefficients tell their common size far better than the strengths that are tried lie apart."""
+    plain, rough = _evidence(8), LIBRARY["rough"].coordinates
+    for factor in (0.01, 0.17, 1.0, 2.3):
+        typical = factor * rough.typical
+        sized = SimpleNamespace(coordinates=replace(rough, typical=typical, sized=True))
+        evidence = replace(plain, library=LIBRARY | {"rough": sized})
+        scales = np.array([evidence.scales((ROUGH,), [strength]) for strength in STRENGTHS])
+        shares = scales / typical
+        np.testing.assert_allclose(shares, np.tile(shares[:, :1], len(typical)), rtol=1e-9)
+        assert np.abs(shares[:, 0] - 1.0).min() < 1e-9
+        np.testing.assert_allclose(shares[:, 0] / shares[0, 0], STRENGTHS / STRENGTHS[0], rtol=1e-9)
