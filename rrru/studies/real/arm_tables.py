@@ -12,10 +12,12 @@ from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.sheets import PLACE
-from rrru.studies.real.steps import counted, trained_mm
+from rrru.studies.real.steps import counted, held_by_robot, trained_mm
 
 MODELS, UNDIAGNOSED = "abcde", "undiagnosed"
 _FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders", 0), 40
+# a reading held out is far off from so many medians on; so many are told
+_FAR, _TOLD = 20.0, 6
 # what ingest says of every such series
 _USUAL = ("no column", "left out, as nobody declared them", "no commanded positions")
 
@@ -41,7 +43,12 @@ def _verdict(studied: Studied) -> dict:
     told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
-    notes = (found["notes"], _waves(studied), *(note for note in studied.notes if not note.startswith(_USUAL)))
+    notes = (
+        found["notes"],
+        _waves(studied),
+        _far(studied),
+        *(note for note in studied.notes if not note.startswith(_USUAL)),
+    )
     return own | {
         "dataset": series.dataset,
         "robot": series.section.get("robot", series.dataset),
@@ -52,6 +59,19 @@ def _verdict(studied: Studied) -> dict:
         **_by_model(studied, series.section.get("reference", {})),
         "notes": "; ".join(filter(None, notes)),
     }
+
+
+def _far(studied: Studied) -> str:
+    """Which readings on the rows held out no law comes near, and what is left without them, in words; "" if none."""
+    frame, left = studied.measurements, studied.held_out_mm
+    held = (frame["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(studied.case)
+    far = left > _FAR * np.median(left) if len(left) else np.zeros(0, dtype=bool)
+    if not far.any():
+        return ""
+    own = studied.rows[held][far]
+    readings = [f"row {row} of {target}" for row, target in zip(own[PLACE], own["target"], strict=True)]
+    more = f" and {len(readings) - _TOLD} more" if len(readings) > _TOLD else ""
+    return f"far off among those held out: {', '.join(readings[:_TOLD])}{more}; without: {_rms(left[~far]):.3g} mm rms"
 
 
 def _found(studied: Studied) -> Mapping[str, Any]:

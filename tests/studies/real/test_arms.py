@@ -39,7 +39,7 @@ def studied(tmp_path_factory):
 def test_compliance_and_lost_zero_of_a_strange_arm_are_named(studied):
     row = arm_tables.tables(studied)["real_verdicts"].iloc[0]
     assert row["effects"] == "drive_compliance" and row["probability"] > 0.8
-    assert "joint 4: zero is off by 2 degrees" in row["notes"]
+    assert "joint 4: zero is off by 2" in row["notes"]
     assert row["held_out_rms_mm"] < 0.03 < row["held_out_b_rms_mm"]
     assert row["predicted_share"] == pytest.approx(row["held_out_share"], abs=0.05)
 
@@ -66,6 +66,18 @@ def test_a_short_series_is_calibrated_but_not_diagnosed(tmp_path):
     empty["real_budget"] = empty["real_budget"].assign(share_low=0.0, share_high=0.0)
     figures.steps(tables | empty, {"set": "mine"})
     figures.spectrum(tables, {"set": "mine"})
+
+
+def test_a_reading_held_out_that_is_far_off_is_told(tmp_path):
+    raw = simulated_arm.log(60)
+    raw.loc[40, [*"XYZ"]] += 5.0
+    known = arms.prepared(_series(tmp_path, raw), ROBOTS, tmp_path / "sheet.parquet")
+    row = arm_tables.tables(arms.studied(known, _settings()))["real_verdicts"].iloc[0]
+    told = "row 41 of tcp"
+    assert (
+        f"far off among those held out: {told}; without: 0.0" in row["notes"]
+        or f"left out of fits: {told}" in row["notes"]
+    )
 
 
 def test_without_held_out_rows_there_is_a_diagnosis(tmp_path):
