@@ -18,7 +18,7 @@ from rrru.robots.rrru3 import Rrru3
 
 MECHANISMS: dict[str, Any] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
 # keys of which one is in an entry that describes a robot of the user's own
-_OWN = ("urdf", "mjcf", "dh", "module")
+OWN = ("urdf", "mjcf", "dh", "module")
 
 
 def tracked_set(name: str) -> str:
@@ -36,7 +36,7 @@ def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Rob
 
     Angles of the entry are in degrees, with keys that end in _deg.
     """
-    if any(key in section for key in _OWN):
+    if any(key in section for key in OWN):
         return _own(name, dict(section), options)
     if name not in MECHANISMS:
         raise ConfigError(

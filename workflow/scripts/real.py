@@ -38,7 +38,9 @@ def main(settings, inputs, outputs):
 def _arms(series, settings, folder):
     """Tables of the series of an arm, and of what carries from one to another."""
     chosen = GapSettings.from_config(settings["gap"] | settings["real"]["gap"], settings["seed"])
-    studied = [arms.study(one, settings["robots"], chosen, folder / f"{one.name}_sheet.parquet") for one in series]
+    # all are read before the first is studied: what is refused is refused at once
+    known = [arms.prepared(one, settings["robots"], folder / f"{one.name}_sheet.parquet") for one in series]
+    studied = [arms.studied(one, chosen) for one in known]
     made = [_called(arm_tables.tables(one), one.series.name) for one in studied]
     return [*made, {"real_carried": carried(studied)}]
 

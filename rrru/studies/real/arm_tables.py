@@ -1,5 +1,6 @@
 """Tables of one real series of an arm. Lengths in mm, angles in rad."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,51 +12,80 @@ from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.sheets import PLACE
-from rrru.studies.real.steps import counted, trained_mm
+from rrru.studies.real.steps import counted, held_by_robot, trained_mm
 
-MODELS = "abcde"
+MODELS, UNDIAGNOSED = "abcde", "undiagnosed"
 _FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders", 0), 40
+# a reading held out is far off from so many medians on; so many are told
+_FAR, _TOLD = 20.0, 6
 # what ingest says of every such series
 _USUAL = ("no column", "left out, as nobody declared them", "no commanded positions")
 
 
 def tables(studied: Studied) -> dict[str, pd.DataFrame]:
-    """Frames by name, without the campaign."""
+    """Frames by name, without the campaign; those of the diagnosis are empty where there is none."""
+    found = studied.diagnosis
     return {
         "real_verdicts": pd.DataFrame([_verdict(studied)]),
         "real_steps": _steps(studied),
         "real_parameters": _parameters(studied),
         "real_points": _points(studied),
         "real_spectrum": _spectrum(studied),
-        "real_budget": studied.diagnosis.tables["gap_budget"],
+        "real_budget": found.tables["gap_budget"] if found else pd.DataFrame(),
         "real_seconds": pd.DataFrame({"step": [*studied.seconds], "seconds": [*studied.seconds.values()]}),
     }
 
 
 def _verdict(studied: Studied) -> dict:
     """The row of `real_verdicts`."""
-    found, series, left = studied.diagnosis.verdict, studied.series, studied.held_out_mm
+    found, series, left = _found(studied), studied.series, studied.held_out_mm
     told = ("effects", "probability", "where", "confusable_with", "noise_rms_mm", "gap_rms_mm", "gap_after_rms_mm")
     told = (*told, "share_closed", "share_closed_low", "share_closed_high", "noise_stated_mm", "next_runs", "points")
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
-    notes = (found["notes"], _waves(studied), *(note for note in studied.notes if not note.startswith(_USUAL)))
+    notes = (
+        found["notes"],
+        _waves(studied),
+        _far(studied),
+        *(note for note in studied.notes if not note.startswith(_USUAL)),
+    )
     return own | {
         "dataset": series.dataset,
         "robot": series.section.get("robot", series.dataset),
         "source": series.file.name,
         "predicted_share": predicted_share(studied),
-        "held_out_share": float(1.0 - (left**2).mean() / (before**2).mean()),
-        "held_out_mean_mm": float(left.mean()),
-        "held_out_rms_mm": _rms(left),
-        "held_out_max_mm": float(left.max()),
+        "held_out_share": 1.0 - (_rms(left) / _rms(before)) ** 2,
+        **_held_out(left),
         **_by_model(studied, series.section.get("reference", {})),
         "notes": "; ".join(filter(None, notes)),
     }
 
 
+def _far(studied: Studied) -> str:
+    """Which readings on the rows held out no law comes near, and what is left without them, in words; "" if none."""
+    frame, left = studied.measurements, studied.held_out_mm
+    held = (frame["status"] == rows.HELD_OUT).to_numpy() & held_by_robot(studied.case)
+    far = left > _FAR * np.median(left) if len(left) else np.zeros(0, dtype=bool)
+    if not far.any():
+        return ""
+    own = studied.rows[held][far]
+    readings = [f"row {row} of {target}" for row, target in zip(own[PLACE], own["target"], strict=True)]
+    more = f" and {len(readings) - _TOLD} more" if len(readings) > _TOLD else ""
+    return f"far off among those held out: {', '.join(readings[:_TOLD])}{more}; without: {_rms(left[~far]):.3g} mm rms"
+
+
+def _found(studied: Studied) -> Mapping[str, Any]:
+    """The verdict of the diagnosis; without one what a series has that nobody has diagnosed."""
+    if studied.diagnosis:
+        return studied.diagnosis.verdict
+    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes"), "")
+    return defaultdict(lambda: np.nan, texts, effects=UNDIAGNOSED, points=studied.plain.count, dropped_points=0)
+
+
 def _waves(studied: Studied) -> str:
     """Whether a few sharp waves of single drives do, or a rough function of their angles, in words; "" if neither."""
+    if studied.diagnosis is None:
+        return ""
     attribution = studied.diagnosis.attribution
     best = {}
     for hypothesis in attribution.posterior.hypotheses:
@@ -80,6 +110,8 @@ def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float
 
 def predicted_share(studied: Studied) -> float:
     """Share of the mean square of the calibrated model's misses that the causes take off, by folds of training rows."""
+    if studied.diagnosis is None:
+        return np.nan
     attribution = studied.diagnosis.attribution
     hypothesis, level = attribution.hypothesis, attribution.level
     at = counted(studied.case)
@@ -92,6 +124,8 @@ def predicted_share(studied: Studied) -> float:
 
 def _steps(studied: Studied) -> pd.DataFrame:
     """Rows of `real_steps`: the plain models, and that of the verdict."""
+    if studied.diagnosis is None:
+        return pd.DataFrame([step.row for step in studied.steps]).assign(number=1 + np.arange(len(studied.steps)))
     attribution, left = studied.diagnosis.attribution, studied.held_out_mm
     fitted = len(studied.state.deviations) + sum(len(values) for values in studied.state.effects.values())
     misses = trained_mm(studied.case, studied.state)
@@ -101,9 +135,7 @@ def _steps(studied: Studied) -> pd.DataFrame:
         "parameters": fitted,
         "identifiable": fitted,
         "train_rms_mm": _rms(misses),
-        "held_out_mean_mm": float(left.mean()),
-        "held_out_rms_mm": _rms(left),
-        "held_out_max_mm": float(left.max()),
+        **_held_out(left),
     }
     result = pd.DataFrame([*(step.row for step in studied.steps), last])
     return result.assign(number=np.arange(1, len(result) + 1))
@@ -111,6 +143,8 @@ def _steps(studied: Studied) -> pd.DataFrame:
 
 def _parameters(studied: Studied) -> pd.DataFrame:
     """Rows of `real_parameters`; those of the error functions are in the spectrum."""
+    if studied.diagnosis is None:
+        return pd.DataFrame()
     frame = studied.diagnosis.tables["gap_parameters"]
     frame = frame[frame["effect"] != _FUNCTION[0]]
     return frame[["effect", "parameter", "unit", "value", "standard_error"]].assign(nominal=0.0, note="")
@@ -139,14 +173,14 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
     case, robot = studied.case, studied.case.mechanism
     orders, parts = np.arange(1, _SHOWN + 1), []
     found = studied.state.effects.get(_FUNCTION)
-    errors = studied.diagnosis.tables["gap_parameters"]
-    errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
     for number, (drive, unit) in enumerate(zip(robot.parts.drives, robot.parts.units, strict=True)):
         if unit != "rad":
             continue
         made = [amplitudes(case, state, number, orders) for state in (studied.step("b").state, studied.state)]
         sine, cosine, error = np.zeros((3, len(orders)))
         if found is not None:
+            errors = studied.diagnosis.tables["gap_parameters"]
+            errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
             own = np.reshape(found, (-1, len(ORDERS), 2))[number, : len(orders)]
             (sine, cosine), error = own.T, np.reshape(errors, (-1, len(ORDERS), 2))[number, : len(orders)].mean(axis=1)
         reach = float(np.ptp(case.motion.drive[case.used][:, number]))
@@ -167,6 +201,12 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
 
 
+def _held_out(left: np.ndarray) -> dict[str, float]:
+    """Mean, rms and largest of what is left on the rows held out, NaN where none is."""
+    mean, most = (float(left.mean()), float(left.max())) if len(left) else (np.nan, np.nan)
+    return {"held_out_mean_mm": mean, "held_out_rms_mm": _rms(left), "held_out_max_mm": most}
+
+
 def _rms(values: np.ndarray) -> float:
-    """Root mean square."""
-    return float(np.sqrt((values**2).mean()))
+    """Root mean square, NaN of nothing."""
+    return float(np.sqrt((values**2).mean())) if len(values) else np.nan

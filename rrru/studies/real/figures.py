@@ -1,41 +1,76 @@
 """Figures of real arms: model after model with the budget of the gap, and the waves of every joint."""
 
-import numpy as np
+from textwrap import fill
 
-from rrru.figures import gap_budget, style
+import numpy as np
+from matplotlib.ticker import LogLocator
+
+from rrru.figures import style
 
 _OURS = {"color": style.BLUE, "marker": "s"}
 _OTHERS = {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white", "linestyle": "none"}
-_ROW_MM, _JOINT_MM = 52.0, 36.0
+_KINDS = {"effect": style.BLUE, "unexplained": style.VERMILION}
+# a row of panels, a joint's panel where there are few and where there are many, and from how many on
+_ROW_MM, _JOINT_MM, _LOW_MM, _MANY = 56.0, 36.0, 24.0, 8
+# characters in a line of a title over a panel, by panels beside each other
+_LINE = {1: 110, 2: 54, 3: 34}
+_LEAST = 0.005
 _MICRORAD = 1e6
 
 
 @style.printed
 def steps(tables, options):
     """Real robot, a row per series. Left: what model after model leaves on rows no fit has seen, ours, others' fits
-    of the same model, and last the model of the named causes. Right: what the gap is made of.
+    of the same model, and last the model of the named causes. a: frames, b: + geometry, c: + compliance of the drives,
+    c2: across the joints, c3: of a trunk, d: + two harmonics of the drives, e: + drift of the base. Right: what the gap
+    is made of, with 95 % intervals; parts that take from each other add up to more than all of it.
     """
     verdicts, models, budget = (tables[name] for name in ("real_verdicts", "real_steps", "real_budget"))
     if verdicts.empty:
-        return _nothing(options)
+        return style.note(f"{options['set']}: no file of this set is here")
     figure = style.new(style.DOUBLE_MM, 8.0 + _ROW_MM * len(verdicts))
-    panels = figure.subplots(len(verdicts), 2, squeeze=False, width_ratios=(1.0, 1.2))
+    panels = figure.subplots(len(verdicts), 2, squeeze=False, width_ratios=(1.2, 1.0))
     for row, (left, right) in zip(verdicts.to_dict("records"), panels, strict=True):
-        own = models[models["campaign"] == row["campaign"]]
-        left.plot(own["model"], own["held_out_rms_mm"], label="held-out rows", **_OURS)
-        known = {model: row[f"reference_{model}_rms_mm"] for model in "abcde"}
-        known = {model: value for model, value in known.items() if np.isfinite(value) and model in set(own["model"])}
-        if known:
-            left.plot([*known], [*known.values()], label="others' fit", **_OTHERS)
-        left.set(yscale="log", ylabel="rms (mm)", xlabel="model")
-        left.grid(True, which="both")
-        left.set_title(row["campaign"])
-        left.legend()
-        gap_budget.draw(right, budget[budget["campaign"] == row["campaign"]])
-        right.set_title(
-            f"{row['effects'].replace('_', ' ').replace('+', ' + ')}, p = {row['probability']:.2f}", wrap=True
-        )
+        _draw_models(left, models[models["campaign"] == row["campaign"]], row)
+        _draw_budget(right, budget[budget["campaign"] == row["campaign"]])
+        told = row["effects"].replace("_", " ").replace("+", " + ")
+        told += f", p = {row['probability']:.2f}" if np.isfinite(row["probability"]) else ""
+        left.set_title(f"{row['campaign']}\n{fill(told, _LINE[2])}", fontsize=7.0)
     return figure
+
+
+def _draw_models(axes, own, row):
+    """Rms on the held-out rows of model after model."""
+    axes.plot(own["model"], own["held_out_rms_mm"], label="held-out rows", **_OURS)
+    known = {model: row[f"reference_{model}_rms_mm"] for model in "abcde"}
+    known = {model: value for model, value in known.items() if np.isfinite(value) and model in set(own["model"])}
+    if known:
+        axes.plot([*known], [*known.values()], label="others' fit", **_OTHERS)
+    axes.set(yscale="log", ylabel="rms (mm)", xlabel="model")
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0, 7.0)))
+    style.plain_log(axes.yaxis)
+    axes.grid(True)
+    axes.legend()
+
+
+def _draw_budget(axes, rows):
+    """Parts of a budget as bars with their intervals, the largest on top."""
+    shown = rows[(rows["share"] > _LEAST) & ~rows["kind"].isin(["covariance", "sampling"])]
+    if shown.empty:
+        axes.set_axis_off()
+        axes.text(0.5, 0.5, "no budget", ha="center", va="center", transform=axes.transAxes)
+        return
+    shown = shown.sort_values("share", kind="stable")
+    names = [part.replace("_", " ") for part in shown["part"]]
+    places = np.arange(len(shown))
+    axes.barh(places, 100.0 * shown["share"], color=[_KINDS.get(kind, "#aaaaaa") for kind in shown["kind"]], height=0.6)
+    low, high = (100.0 * shown[name] for name in ("share_low", "share_high"))
+    axes.hlines(places, low.clip(lower=0.0), high, color=style.BLACK, linewidth=0.7)
+    axes.set_yticks(places, names)
+    axes.set_ylim(-0.6, max(len(shown), 3) - 0.4)
+    axes.set_xlim(left=0.0)
+    axes.set(xlabel="share of the gap's mean square (%)")
+    axes.grid(True, axis="x")
 
 
 @style.printed
@@ -46,27 +81,30 @@ def spectrum(tables, options):
     """
     waves = tables["real_spectrum"]
     if waves.empty:
-        return _nothing(options)
+        return style.note(f"{options['set']}: no file of this set is here")
     names, joints = (list(dict.fromkeys(waves[name])) for name in ("campaign", "joint"))
-    figure = style.new(style.DOUBLE_MM, 14.0 + _JOINT_MM * len(joints))
+    row_mm = _LOW_MM if len(joints) > _MANY else _JOINT_MM
+    figure = style.new(style.DOUBLE_MM, 16.0 + row_mm * len(joints))
     panels = figure.subplots(len(joints), len(names), squeeze=False, sharex=True, sharey="row")
     for column, name in enumerate(names):
         for axes, joint in zip(panels[:, column], joints, strict=True):
-            own = waves[(waves["campaign"] == name) & (waves["joint"] == joint)]
-            axes.bar(own["order"], _MICRORAD * own["found_rad"], color="#cccccc", label="found function")
-            axes.plot(own["order"], _MICRORAD * own["before_rad"], color=style.VERMILION, label="before")
-            axes.plot(own["order"], _MICRORAD * own["after_rad"], color=style.BLUE, label="after")
-            axes.set_title(f"{name}, {joint}, resolution {own['resolution'].iloc[0]:.2f}")
-            axes.grid(True)
+            _draw_waves(axes, waves[(waves["campaign"] == name) & (waves["joint"] == joint)])
+        panels[0, column].set_title(fill(name.replace("_", " "), _LINE.get(len(names), 20)))
         panels[-1, column].set_xlabel("waves per turn")
-    for axes in panels[:, 0]:
-        axes.set_ylabel("amplitude (urad)")
+    for axes, joint in zip(panels[:, 0], joints, strict=True):
+        axes.set_ylabel(f"{joint}\n(µrad)")
+        axes.set_ylim(bottom=0.0)
     style.legend_above(figure, panels.ravel(), columns=3)
     return figure
 
 
-def _nothing(options):
-    """A page that says that no file of the set is here."""
-    figure = style.new(style.DOUBLE_MM, 30.0)
-    figure.text(0.5, 0.5, f"{options['set']}: no file of this set is here", ha="center", va="center")
-    return figure
+def _draw_waves(axes, own):
+    """Amplitudes of one joint over the orders, with the resolution in the corner."""
+    if own["found_rad"].any():
+        axes.bar(own["order"], _MICRORAD * own["found_rad"], color="#cccccc", label="found function")
+    axes.plot(own["order"], _MICRORAD * own["before_rad"], color=style.VERMILION, label="before")
+    axes.plot(own["order"], _MICRORAD * own["after_rad"], color=style.BLUE, label="after")
+    for resolution in own["resolution"].head(1):
+        place = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 6.0, "in_layout": False}
+        axes.text(0.98, 0.95, f"resolution {resolution:.1f}", **place)
+    axes.grid(True)

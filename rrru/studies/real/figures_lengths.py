@@ -17,7 +17,7 @@ _ROW_MM = 68.0
 def lengths(tables, options):
     """Machines of which only lengths are known, one row each. Left: the frame and the places, without any further law
     and with those of the verdict. Middle and right: what each length's model misses, without and with them; mind the
-    scales. Circles: readings left out.
+    scales. Circles: readings left out, at the edge with their value where they lie beyond it.
     """
     points, parameters = tables["real_points"], tables["real_parameters"]
     names = list(dict.fromkeys(points["campaign"])) if "campaign" in points else [""]
@@ -56,12 +56,18 @@ def _anchors(parameters, prefix):
 
 
 def _draw_residuals(axes, points, column, title):
-    """Residual of every length over the rows."""
+    """Residual of every length over the rows; the scale is that of the readings that a fit has seen."""
+    edge = 1.1 * float(points.loc[points["used"], column].abs().max())
     for k, (reading, own) in enumerate(points.groupby("reading", sort=False)):
         look = {"color": _COLOURS[k % len(_COLOURS)], "marker": _MARKERS[k % len(_MARKERS)], "markersize": 2.0}
-        axes.plot(own["row"], own[column], linewidth=0.5, label=reading, **look)
-        out = own[~own["used"]]
-        axes.plot(out["row"], out[column], "o", markersize=7.0, color=style.BLACK, markerfacecolor="none")
+        axes.plot(own["row"], own[column].where(own["used"]), linewidth=0.5, label=reading, **look)
+        for row, value in own.loc[~own["used"], ["row", column]].to_numpy():
+            place = float(np.clip(value, -edge, edge))
+            axes.plot(row, place, "o", markersize=6.0, color=look["color"], markerfacecolor="none")
+            if place != value:
+                axes.annotate(
+                    f"{value:.0f}", (row, place), (5, 0), textcoords="offset points", va="center", fontsize=6.0
+                )
     axes.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=0)
     axes.set(xlabel="row", ylabel="read less modelled length (mm)")
     axes.set_title(title)

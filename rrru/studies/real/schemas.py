@@ -16,16 +16,17 @@ campaign
 dataset                str    its set in the configuration
 robot                  str    what was measured
 source                 str    file
-effects                str    names joined by + in the order of their share; none; unexplained where no law holds it
-probability            float  of this whole verdict, 0 to 1
+effects                str    names joined by + in the order of their share; none; unexplained where no law holds it;
+    undiagnosed where there are too few rows, and the numbers of a diagnosis are null
+probability            float? of this whole verdict, 0 to 1
 where                  str    where the effects act; empty where nothing acts or no site is told
 confusable_with        str    what the series cannot tell from the verdict; empty where nothing
-noise_rms_mm           float  noise that is left, instrument and scatter
-gap_rms_mm             float  what the calibrated model gets wrong, noise taken out
-gap_after_rms_mm       float  the same, expected of the corrected model on rows that it was not fitted on
-share_closed           float  share of the gap that the effects close
-share_closed_low       float  lower end, 95 %
-share_closed_high      float  upper end, 95 %
+noise_rms_mm           float? noise that is left, instrument and scatter
+gap_rms_mm             float? what the calibrated model gets wrong, noise taken out
+gap_after_rms_mm       float? the same, expected of the corrected model on rows that it was not fitted on
+share_closed           float? share of the gap that the effects close
+share_closed_low       float? lower end, 95 %
+share_closed_high      float? upper end, 95 %
 predicted_share        float? share of the mean square that the named causes take off the calibrated model's, foretold
     by folds of the training rows; null where no rows are held out
 held_out_share         float? the same on the rows held out

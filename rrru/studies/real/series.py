@@ -3,12 +3,13 @@
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import pandas as pd
 
 from rrru.errors import ConfigError
+from rrru.robots.catalogue import OWN
 
 # the folder that data which may not be shipped are read from
 VARIABLE = "RRRU_REAL_DATA"
@@ -29,13 +30,23 @@ class Series:
     section: Mapping[str, Any]
 
     def read(self) -> pd.DataFrame:
-        """The file's columns; raises ConfigError where it cannot be read or has no rows."""
+        """The file's columns; raises ConfigError where it cannot be read, has no rows or a column's name twice."""
+        where = f"real.sets.{self.dataset}: {self.file}"
         try:
-            frame = pd.read_parquet(self.file) if self.file.suffix == ".parquet" else pd.read_csv(self.file)
+            if self.file.suffix == ".parquet":
+                frame = pd.read_parquet(self.file)
+                names = frame.columns
+            else:
+                frame = pd.read_csv(self.file, skipinitialspace=True)
+                # pandas numbers the names that come twice
+                names = pd.read_csv(self.file, skipinitialspace=True, header=None, nrows=1, dtype=str).iloc[0].dropna()
         except (OSError, ValueError) as error:
-            raise ConfigError(f"real.sets.{self.dataset}: {self.file}: {error}") from error
+            raise ConfigError(f"{where}: {str(error).strip()}; allowed: CSV or parquet, one row per pose") from error
+        twice = names[names.duplicated()].tolist()
+        if twice:
+            raise ConfigError(f"{where} has two columns {twice[0]!r}; allowed: each name once")
         if frame.empty:
-            raise ConfigError(f"real.sets.{self.dataset}: {self.file} has no rows")
+            raise ConfigError(f"{where} has no rows; allowed: one row per pose")
         return frame
 
     def column(self, frame: pd.DataFrame, key: str, names: Any) -> Any:
@@ -50,9 +61,9 @@ class Series:
 
 
 def folders(section: Mapping[str, Any]) -> tuple[Path, ...]:
-    """Folders that the data lie in: the configuration's, and the one that the environment names."""
+    """Folders that the data lie in: the one that the environment names goes before the configuration's."""
     own = os.environ.get(VARIABLE)
-    return (Path(section["folder"]), *([Path(own)] if own else []))
+    return (*([Path(own)] if own else []), Path(section["folder"]))
 
 
 def found(section: Mapping[str, Any], name: str) -> tuple[Series, ...]:
@@ -63,7 +74,7 @@ def found(section: Mapping[str, Any], name: str) -> tuple[Series, ...]:
     """
     own = dict(section["sets"][name])
     variants = own.pop("variants", {"": {}})
-    paths: dict[str, Path] = {}
+    paths: dict[str, Path] = {}  # of the same label the first folder's
     for folder in folders(section):
         for file in sorted(folder.glob(own["files"])):
             paths.setdefault(_label(own["files"], file), file)
@@ -76,24 +87,63 @@ def found(section: Mapping[str, Any], name: str) -> tuple[Series, ...]:
     return tuple(result)
 
 
+def used(section: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The data sets of the configuration's `real` by name; an overlay takes one out by setting it to null."""
+    return {name: one for name, one in section["sets"].items() if one is not None}
+
+
 def check(config: Mapping[str, Any]) -> None:
     """Raise ConfigError where a data set names a robot or a variant that does not exist, or no way to read it."""
-    for name, section in config["real"]["sets"].items():
+    sets = used(config["real"])
+    if not sets:
+        raise ConfigError("real.sets: got none but null; allowed: at least one set")
+    for name, section in sets.items():
         where = f"real.sets.{name}"
-        if "kind" in section:
-            continue
-        if ("robot" in section) == ("chain" in section):
+        pattern = PurePath(section["files"])
+        signs = set("?[") & set(section["files"]) or {"*"} & set(str(pattern.parent))
+        if signs or pattern.name.count("*") > 1 or pattern.is_absolute() or ".." in pattern.parts:
             raise ConfigError(
-                f"{where}: got {'both' if 'robot' in section else 'no'} robot and chain; allowed: one of them"
+                f"{where}.files: got {section['files']!r}; allowed: a path below the folder, one * in the file's name"
             )
-        if "robot" in section and section["robot"] not in config["robots"]:
-            known = ", ".join(config["robots"])
-            raise ConfigError(f"{where}.robot: robots has no {section['robot']!r}; known: {known}")
-        if "readings" not in section:
-            raise ConfigError(f"{where}: got no readings; allowed: at least one target with its position")
-        for target in section.get("world_targets", ()):
-            if target not in section["readings"]:
-                raise ConfigError(f"{where}.world_targets: readings has no {target!r}")
+        if "kind" not in section:
+            _check_arm(where, section, config["robots"])
+
+
+def _check_arm(where: str, section: Mapping[str, Any], robots: Mapping[str, Any]) -> None:
+    """Raise ConfigError where the section of an arm names what does not exist, or no way to read it."""
+    if ("robot" in section) == ("chain" in section):
+        raise ConfigError(
+            f"{where}: got {'both' if 'robot' in section else 'no'} robot and chain; allowed: one of them"
+        )
+    own = [name for name, robot in robots.items() if set(OWN) & set(robot)]
+    if "robot" in section and section["robot"] not in own:
+        raise ConfigError(
+            f"{where}.robot: got {section['robot']!r}; allowed: an entry of robots with {', '.join(OWN)}: "
+            f"{', '.join(own)}"
+        )
+    if "readings" not in section:
+        raise ConfigError(f"{where}: got no readings; allowed: at least one target with its position")
+    targets, beside = [*section["readings"]], section.get("world_targets", ())
+    for target in beside:
+        if target not in targets:
+            raise ConfigError(f"{where}.world_targets: got {target!r}; allowed: of readings: {', '.join(targets)}")
+    if set(targets) == set(beside):
+        raise ConfigError(f"{where}.world_targets: got all of readings; allowed: all but one: what the robot holds")
+    for key, names in _named(section):
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ConfigError(f"{where}.{key}: got {twice[0]!r} twice; allowed: another column for each")
+
+
+def _named(section: Mapping[str, Any]) -> list[tuple[str, list[str]]]:
+    """Keys of an arm's section and the columns that each names, which have to differ."""
+    ways = {"joints": section} | {f"variants.{name}.joints": one for name, one in section.get("variants", {}).items()}
+    joints = [(key, [*one["joints"].values()]) for key, one in ways.items() if "joints" in one]
+    readings = [
+        (f"readings.{target}", [*reading["position"], *reading.get("rotation", ())])
+        for target, reading in section["readings"].items()
+    ]
+    return joints + readings
 
 
 def missing(section: Mapping[str, Any], name: str) -> str:

@@ -1,5 +1,6 @@
 """A real series of an arm as a campaign file of our own form: one row per target and stop, mm, rad, quaternions."""
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign.ingest.columns import MM, RAD
 from rrru.campaign.ingest.sheet import MEASURED, QUATERNIONS
-from rrru.errors import ConfigError
+from rrru.errors import ConfigError, IngestError
 from rrru.studies.real.series import Series
 
 # flags of the rows that are kept out of every fit, and the numbers of the rows in the file
@@ -22,24 +23,63 @@ def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
     The set's section says which columns are what: joints, {actuator column: theirs}, in joint_unit, absent where they
     are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; held_out. The number
     of the row stands for the time. Targets that were not seen are left out. Raises ConfigError for a column that is not
-    there or not of numbers.
+    there or not of numbers, for a blank joint of a row with readings, and where nothing was read.
     """
     section, parts = series.section, []
     common = {"trajectory": "poses", "time_s": np.arange(len(raw), dtype=float), HELD_OUT: _held_out(series, raw)}
-    for ours, theirs in _joints(series, raw).items():
+    joints = joint_columns(series, raw)
+    for ours, theirs in joints.items():
         scale = 1.0 if ours.endswith("_mm") else RAD[section.get("joint_unit", "rad")]
         common[ours] = scale * _numbers(series, raw, "joints", theirs)
     for target, reading in section["readings"].items():
         part = pd.DataFrame(common | dict(_read(series, raw, target, reading)))
         parts.append(part.assign(target=target, **{PLACE: np.arange(1, len(raw) + 1)}))
     whole = pd.concat(parts).sort_values(PLACE, kind="stable")
-    return whole[whole[[*MEASURED]].notna().all(axis=1)].reset_index(drop=True)
+    whole = whole[whole[[*MEASURED]].notna().all(axis=1)].reset_index(drop=True)
+    if whole.empty:
+        read = " or ".join(", ".join(reading["position"]) for reading in section["readings"].values())
+        raise ConfigError(f"{series.file}: no row has numbers in {read}; allowed: numbers in some rows")
+    for ours, theirs in joints.items():
+        blank = whole.loc[whole[ours].isna(), PLACE]
+        if len(blank):
+            where = f"row {blank.iloc[0]}, column {theirs}"
+            raise ConfigError(f"{series.file}: {where}: blank; allowed: a number where a target was seen")
+    return whole
 
 
-def _joints(series: Series, raw: pd.DataFrame) -> Mapping[str, str]:
+def joint_columns(series: Series, raw: pd.DataFrame) -> Mapping[str, str]:
     """Our actuator columns to theirs; where the section names none, all of the file's that are called like ours."""
     named = series.section.get("joints")
     return named or {name: name for name in raw if name.startswith("q") and name.endswith(("_rad", "_mm"))}
+
+
+def retold(error: IngestError, series: Series, whole: pd.DataFrame) -> IngestError:
+    """What ingest says of a sheet, in rows and columns of the series' file."""
+    theirs, told = dict(series.section.get("joints", {})), []
+    for problem in error.problems:
+        row, column, names = problem.get("row"), problem.get("column"), theirs
+        if row is not None and row <= len(whole):
+            at = whole.iloc[row - 1]
+            row, reading = int(at[PLACE]), series.section["readings"][at["target"]]
+            names = theirs | dict(zip(MEASURED, reading["position"], strict=True))
+        if column is not None:
+            column = ", ".join(names.get(name, name) for name in column.split(", "))
+        own = {"file": str(series.file), "row": row, "column": column, "value": in_file(problem["value"], whole)}
+        told.append(problem | own)
+    return IngestError(told)
+
+
+def in_file(text: str, whole: pd.DataFrame) -> str:
+    """A text that counts the rows of a sheet, as points of its one run or as rows, by rows of the file and targets."""
+
+    def place(found: re.Match) -> str:
+        """A row of the sheet in words."""
+        number = int(found[1]) - 1
+        if not 0 <= number < len(whole):
+            return found[0]
+        return f"row {whole[PLACE].iloc[number]} of {whole['target'].iloc[number]}"
+
+    return re.sub(r"\b(?:run 1 point|row) (\d+)\b", place, text)
 
 
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:
@@ -76,17 +116,29 @@ def _read(
 
 
 def _held_out(series: Series, raw: pd.DataFrame) -> np.ndarray:
-    """Which rows (n,) are held out: those that the file flags, else every third from the second on."""
-    name = series.section.get("held_out")
-    return np.arange(len(raw)) % 3 == 1 if name is None else _numbers(series, raw, "held_out", name) == 1.0
+    """Which rows (n,) are held out: those that the file flags, else every third from the second on.
+
+    Raises ConfigError for a flag that is neither 0 nor 1, and where no row is left for a fit.
+    """
+    name = series.section.get("held_out", HELD_OUT)
+    if name not in raw and "held_out" not in series.section:
+        return np.arange(len(raw)) % 3 == 1
+    flags = _numbers(series, raw, "held_out", name)
+    wrong = np.flatnonzero(~np.isin(flags, (0.0, 1.0)))
+    if len(wrong):
+        where = f"row {wrong[0] + 1}, column {name}"
+        raise ConfigError(f"{series.file}: {where}: {raw[name].tolist()[wrong[0]]!r}; allowed: 0 or 1")
+    if flags.all():
+        raise ConfigError(f"{series.file}: column {name}: 1 in every row; allowed: 0 in those to fit on")
+    return flags == 1.0
 
 
 def _numbers(series: Series, raw: pd.DataFrame, key: str, name: str) -> np.ndarray:
     """A column (n,) of numbers, NaN where blank; raises ConfigError naming the first cell that holds none."""
     cells = series.column(raw, key, name)
-    values = pd.to_numeric(cells, errors="coerce")
-    wrong = np.flatnonzero(values.isna() & cells.notna())
+    values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=float)
+    wrong = np.flatnonzero(np.isinf(values) | (np.isnan(values) & cells.notna().to_numpy()))
     if len(wrong):
-        where = f"row {wrong[0] + 2}, column {name}"
-        raise ConfigError(f"{series.file}: {where}: {cells.iloc[wrong[0]]!r}; allowed: a number")
-    return values.to_numpy(dtype=float)
+        where = f"row {wrong[0] + 1}, column {name}"
+        raise ConfigError(f"{series.file}: {where}: {cells.tolist()[wrong[0]]!r}; allowed: a number, or blank")
+    return values

@@ -91,7 +91,10 @@ def counted(case: Case) -> np.ndarray:
 
 
 def steps(case: Case) -> tuple[Step, ...]:
-    """The models one after another; one whose effects the robot does not have is left out."""
+    """The models one after another; one whose effects the robot does not have, or whose fit does not end, is left out.
+
+    Raises FitError where that of the geometry does not end.
+    """
     library = dict(case.library) | _own(case)
     case, began = replace(case, library=library), time.perf_counter()
     none = State(np.zeros(len(case.mechanism.parameters)), {})
@@ -103,7 +106,14 @@ def steps(case: Case) -> tuple[Step, ...]:
         if effect and effect not in library:
             continue
         began, names = time.perf_counter(), (*names, effect) if effect else names
-        fit = fit_effects(case, names)
+        try:
+            fit = fit_effects(case, names)
+        except FitError:
+            if not effect:
+                raise
+            # the next models go on from those before
+            names = names[:-1]
+            continue
         numbers = fit.numbers, fit.identifiable, time.perf_counter() - began
         result.append(Step(model, adds, fit.state, *numbers, *_left(case, fit.state)))
     return tuple(result)

@@ -4,7 +4,7 @@ from rrru.studies.real.schemas import TABLES as REAL_SCHEMAS
 CHECKS.append("rrru.studies.real.series:check")
 REAL_TABLES = [one.name for one in REAL_SCHEMAS]
 REAL_PATHS = {one.name: f"{RESULTS}/{one.path}" for one in REAL_SCHEMAS}
-REAL_SETS = config["real"]["sets"]
+REAL_SETS = real_series.used(config["real"])
 # machines of which only lengths are known have figures of their own
 REAL_LENGTHS = [name for name, section in REAL_SETS.items() if "kind" in section]
 REAL_ARMS = [name for name in REAL_SETS if name not in REAL_LENGTHS]
@@ -16,8 +16,14 @@ LENGTH_FIGURES = {"lengths": ("rrru.studies.real.figures_lengths:lengths", ["rea
 
 
 def real_files(wildcards):
-    """The files of a data set, none where they are not here."""
-    return [str(one.file) for one in real_series.found(config["real"], wildcards.set)]
+    """The files of a data set and of what describes its robot, none where they are not here."""
+    series, section = real_series.found(config["real"], wildcards.set), REAL_SETS[wildcards.set]
+    files = [one.file for one in series]
+    if "chain" in section:
+        files += sorted({one.parent / section["chain"] for one in files})
+    elif "robot" in section:
+        files += [parts.own_robot_file(config["robots"][section["robot"]])]
+    return [str(file) for file in files if file is not None and file.exists()]
 
 
 def real_settings(figures):
