@@ -12,7 +12,7 @@ from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case, State
-from rrru.gap.evidence import LEVELS, ModelEvidence
+from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.noise_model import alike, fit_noise
 from rrru.gap.orders import with_orders
@@ -21,6 +21,7 @@ from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.spectra import with_spectra
 from rrru.gap.unknown import UNKNOWN
+from rrru.gap.whitened import LEVELS
 
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
 # a gap of fewer times the noise is linear in everything that can cause it

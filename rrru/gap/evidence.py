@@ -18,67 +18,21 @@ A law's shape parameters may be off the grid on which they were tried: each has 
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
 
-from rrru.campaign.noise import along_runs
-from rrru.gap import evidence_kernels as kernels
 from rrru.gap.averages import Average, averaged_mean
-from rrru.gap.noise_model import NoiseModel, lengths
-from rrru.gap.terms import EACH, SAME, per_leg, spread
+from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.noise_model import NoiseModel
+from rrru.gap.projected import Prior, Projected, gained, posterior_mean
+from rrru.gap.terms import EACH, SAME, spread
+from rrru.gap.whitened import LEVELS, Whitened
 
-LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # times that each of many strengths is found about the others
 _SWEEPS = 2
-# the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
-_HALF_WAVES, _WHITE = 3.0, 0.01
 # a term of which the calibration leaves a smaller share of the mean square is not seen
 _LEAST_VISIBLE = 1e-9
-
-
-def spectrum(wave):
-    """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
-    density = 1.0 / (1.0 + (wave / _HALF_WAVES) ** 2) + _WHITE
-    return density / density.mean()
-
-
-class _Prior(NamedTuple):
-    """Prior of k coefficients: their columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
-
-    index: np.ndarray
-    size: np.ndarray
-    largest: np.ndarray
-    positive: np.ndarray
-
-    def at(self, strength):
-        """Sizes at a strength."""
-        return np.minimum(strength * self.size, self.largest)
-
-
-@dataclass(frozen=True)
-class Projected:
-    """Least squares of k coefficients with their priors, the calibration taken out.
-
-    Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels,
-    k); size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody; index
-    (k,): of the columns.
-    """
-
-    gram: np.ndarray
-    moment: np.ndarray
-    size: np.ndarray
-    largest: np.ndarray
-    positive: np.ndarray
-    owner: np.ndarray
-    index: np.ndarray
-
-    def scale(self, strengths):
-        """Prior standard deviations (m, k) at strengths (m, terms)."""
-        each = np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
-        return np.minimum(each[:, self.owner] * self.size, self.largest)
 
 
 @dataclass(frozen=True)
@@ -99,66 +53,9 @@ class ModelEvidence:
         return len(self.run)
 
     @cached_property
-    def _layout(self):
-        """Numbers of all columns but the calibration's by (effect, shape, "each" or "same") and effect.
-
-        With the matrix (K, k) that makes them, those of one value on all legs being sums, of the linearisation's.
-        """
-        linear = self.linear
-        blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
-        blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
-        ends = np.cumsum([0, *(size for _, size in blocks)])
-        numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
-        made = [np.zeros((ends[-1], 0))]
-        for name, shape in linear.columns:
-            if per_leg(self.library[name]):
-                own, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
-                numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
-                made.append(np.zeros((ends[-1], sums.shape[1])))
-                made[-1][own] = sums
-        return numbers, np.concatenate(made, axis=1)
-
-    @cached_property
-    def _together(self):
-        """Columns of calibration and effects, and the data, (m, 3, k), as they are and by the runs' cosines; waves."""
-        linear = self.linear
-        blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
-        together = np.concatenate(blocks, axis=-1)
-        cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
-        return together, cosines.reshape(together.shape), wave
-
-    @cached_property
-    def _whole(self):
-        """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
-        together, _, _ = self._together
-        columns = (together[..., self.linear.base.shape[-1] : -1] / self.noise.mean_mm).reshape(3 * len(self), -1)
-        sums = columns @ self._layout[1]
-        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)])
-
-    @cached_property
-    def _made(self):
-        """Grams of the levels that have been asked for."""
-        return {}
-
-    def _gram(self, level):
-        """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
-
-        The calibration is projected out.
-        """
-        if level not in self._made:
-            (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
-            own = self.noise.variance(wave, lengths(self.run)) / unit**2
-            variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
-            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
-            basis, triangle = np.linalg.qr(white[:, :p])
-            rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
-            gram, sums = rest.T @ rest, self._layout[1]
-            none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
-            gram, moment = gram[:-1, :-1], gram[:-1, -1]
-            across = gram @ sums
-            gram = np.block([[gram, across], [across.T, sums.T @ across]])
-            self._made[level] = gram, np.concatenate([moment, sums.T @ moment]), none
-        return self._made[level]
+    def _whitened(self):
+        """The columns, whitened."""
+        return Whitened(self.library, self.linear, self.run, self.noise)
 
     @property
     def levels(self):
@@ -169,24 +66,26 @@ class ModelEvidence:
     def none(self):
         """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
         result = np.full(len(LEVELS), -np.inf)
-        result[self.levels] = [self._gram(level)[2] for level in self.levels]
+        result[self.levels] = [self._whitened.gram(level)[2] for level in self.levels]
         return result
 
     @cached_property
     def _priors(self):
         """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
-        numbers = {name: self._layout[0][name] for name in self.linear.shape_columns}
-        return {name: _Prior(k, np.ones(len(k)), np.full(len(k), np.inf), k < 0) for name, k in numbers.items()}
+        numbers = {name: self._whitened.layout[0][name] for name in self.linear.shape_columns}
+        return {name: Prior(k, np.ones(len(k)), np.full(len(k), np.inf), k < 0) for name, k in numbers.items()}
 
     def _prior(self, term):
         """The prior of one term's coefficients."""
         if term not in self._priors:
-            coordinates, gram = self.library[term.effect].coordinates, np.diag(self._gram(0)[0])
+            coordinates, gram = self.library[term.effect].coordinates, np.diag(self._whitened.gram(0)[0])
             matrix = spread(coordinates, term.legs)
-            index = self._layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
+            index = self._whitened.layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
             index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
             size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
-            power, total = ((all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whole))
+            power, total = (
+                (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)
+            )
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
             unit = np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
             if coordinates.sized:
@@ -195,7 +94,7 @@ class ModelEvidence:
             size /= unit
             most = np.broadcast_to(coordinates.most, len(coordinates))
             largest = np.array([most[column > 0.0].max() for column in matrix.T])
-            self._priors[term] = _Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
+            self._priors[term] = Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
         return self._priors[term]
 
     def projected(self, terms, levels):
@@ -204,7 +103,7 @@ class ModelEvidence:
         priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
         owner = np.repeat(np.minimum(np.arange(len(priors)), len(terms)), [len(prior.index) for prior in priors])
         index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
-        grams = [self._gram(level) for level in levels]
+        grams = [self._whitened.gram(level) for level in levels]
         gram, moment = (
             np.array(part) for part in zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True)
         )
@@ -220,8 +119,8 @@ class ModelEvidence:
         levels = self.levels if levels is None else levels
         broad = self._broadest(terms)
         if broad is None:
-            none = np.array([self._gram(level)[2] for level in levels])
-            return none[:, None] + _evidence(self.projected(terms, levels), combinations), combinations
+            none = np.array([self._whitened.gram(level)[2] for level in levels])
+            return none[:, None] + gained(self.projected(terms, levels), combinations), combinations
         rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(rest, levels) if rest else None
@@ -245,17 +144,19 @@ class ModelEvidence:
         problem: the others' Projected at the levels, None where there are none; strengths (m, terms): theirs.
         """
         averages = [self._average(broad, strength, level) for level in levels]
-        value = np.array([self._gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[:, None]
+        value = np.array([self._whitened.gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[
+            :, None
+        ]
         if problem is None:
             return value
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
-        return value + _evidence(replace(problem, gram=gram, moment=moment), strengths)
+        return value + gained(replace(problem, gram=gram, moment=moment), strengths)
 
     def _average(self, term, strength, level):
         """The Average over the coefficients of a broad term at a strength and a level (an index)."""
         key = term, float(strength), int(level)
         if key not in self._averages:
-            gram, moment, _ = self._gram(level)
+            gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
             self._averages[key] = Average.over(gram, moment, prior.index, prior.at(strength))
         return self._averages[key]
@@ -314,8 +215,8 @@ class ModelEvidence:
             index = problem.index
             gram, moment = self._average(terms[broad], strengths[broad], level).rest(index)
             scale = problem.scale(np.delete(strengths, broad)[None])[0]
-            found = _posterior_mean(gram + np.diag(scale**-2.0), moment, problem.positive)
-        gram, moment, _ = self._gram(level)
+            found = posterior_mean(gram + np.diag(scale**-2.0), moment, problem.positive)
+        gram, moment, _ = self._whitened.gram(level)
         own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, found)
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], own, found[before:]])
@@ -328,29 +229,9 @@ class ModelEvidence:
         problem = self.projected(terms, [level])
         moment, positive = problem.moment[0], problem.positive
         precision = problem.gram[0] + np.diag(problem.scale(np.asarray(strengths)[None])[0] ** -2.0)
-        return _posterior_mean(precision, moment, positive), np.linalg.inv(precision)
-
-
-def _evidence(problem, strengths):
-    """Log evidence (levels, m) of a Projected problem at strengths (m, terms) over that of none of its terms."""
-    scale = np.ascontiguousarray(problem.scale(strengths))
-    gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
-    return kernels.log_evidence(gram, moment, scale, problem.positive)
+        return posterior_mean(precision, moment, positive), np.linalg.inv(precision)
 
 
 def averaged(value, terms):
     """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""
-    return kernels.log_sum_exp(value) - terms * np.log(len(STRENGTHS))
-
-
-def _posterior_mean(precision, moment, positive):
-    """The mean (k,) of normal coefficients, or where that has negative positive ones their most probable point."""
-    mean = np.linalg.solve(precision, moment)
-    return _not_negative(precision, moment, positive) if (mean[positive] < 0.0).any() else mean
-
-
-def _not_negative(precision, moment, positive):
-    """The most probable point (k,) without negative positive coefficients: bounded least squares."""
-    factor = np.linalg.cholesky(precision)
-    low = np.where(positive, 0.0, -np.inf)
-    return lsq_linear(factor.T, np.linalg.solve(factor, moment), bounds=(low, np.inf), method="bvls").x
+    return log_sum_exp(value) - terms * np.log(len(STRENGTHS))

@@ -9,10 +9,11 @@ from scipy.linalg import cho_solve
 
 from rrru.campaign.noise import along_runs
 from rrru.gap.case import Case
-from rrru.gap.evidence import LEVELS, ModelEvidence, spectrum
+from rrru.gap.evidence import ModelEvidence
 from rrru.gap.noise_model import lengths
 from rrru.gap.terms import EACH, signatures
 from rrru.gap.terms import spread as spread_of
+from rrru.gap.whitened import LEVELS, spectrum
 
 # where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
 # so-manieth is left out

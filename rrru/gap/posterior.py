@@ -6,10 +6,10 @@ from math import comb
 
 import numpy as np
 
-from rrru.gap.evidence import LEVELS
 from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
+from rrru.gap.whitened import LEVELS
 
 # hypotheses further below the best than this carry nothing
 NEGLIGIBLE = 25.0

@@ -11,9 +11,10 @@ from itertools import combinations, product
 
 import numpy as np
 
-from rrru.gap.evidence import LEVELS, STRENGTHS, averaged
+from rrru.gap.evidence import STRENGTHS, averaged
 from rrru.gap.terms import variants
 from rrru.gap.unknown import UNKNOWN
+from rrru.gap.whitened import LEVELS
 
 # hypotheses this far below the best in log evidence are not worth refining
 _WORTH = 12.0

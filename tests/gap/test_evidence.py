@@ -17,9 +17,10 @@ from rrru.campaign.noise import along_runs
 from rrru.effects.protocol import Coordinates
 from rrru.gap import evidence_kernels as kernels
 from rrru.gap.case import Linear
-from rrru.gap.evidence import LEVELS, STRENGTHS, ModelEvidence, spectrum
+from rrru.gap.evidence import STRENGTHS, ModelEvidence
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.terms import EACH, SAME, Term
+from rrru.gap.whitened import LEVELS, spectrum
 
 NOISE_MM = 0.05
 RUN = np.repeat([1, 4, 2], [9, 6, 1])

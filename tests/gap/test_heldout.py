@@ -15,9 +15,9 @@ from rrru.errors import ConfigError
 from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap import shrink
 from rrru.gap.attribute import calibrate, with_noise
-from rrru.gap.evidence import LEVELS
 from rrru.gap.heldout import HeldOut, Prediction, resampled_rows
 from rrru.gap.terms import Term
+from rrru.gap.whitened import LEVELS
 from tests.gap.campaigns import (
     EFFECTS,
     FORWARD,

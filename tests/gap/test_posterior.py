@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from rrru.gap.evidence import LEVELS
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis
 from rrru.gap.settings import Prior
 from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
 from rrru.gap.verdict import decide, label
+from rrru.gap.whitened import LEVELS
 from tests.gap.campaigns import EFFECTS
 
 WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_axis_error"}

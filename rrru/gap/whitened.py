@@ -1,0 +1,102 @@
+"""The columns of calibration and effects along the runs, whitened at every level of the discrepancy.
+
+The discrepancy's covariance along a run is diagonal in its cosine basis, as is that of the noise; see
+`rrru.gap.evidence`. Lengths in mm.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.campaign.noise import along_runs
+from rrru.gap.noise_model import NoiseModel, lengths
+from rrru.gap.terms import EACH, SAME, per_leg, spread
+
+LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
+# the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
+_HALF_WAVES, _WHITE = 3.0, 0.01
+
+
+def spectrum(wave):
+    """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
+    density = 1.0 / (1.0 + (wave / _HALF_WAVES) ** 2) + _WHITE
+    return density / density.mean()
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """Gram matrices of all columns of a linearisation, made when they are asked for.
+
+    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel.
+    """
+
+    library: dict
+    linear: object
+    run: np.ndarray
+    noise: NoiseModel
+
+    def __len__(self):
+        return len(self.run)
+
+    @cached_property
+    def layout(self):
+        """Numbers of all columns but the calibration's by (effect, shape, "each" or "same") and effect.
+
+        With the matrix (K, k) that makes them, those of one value on all legs being sums, of the linearisation's.
+        """
+        linear = self.linear
+        blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
+        blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
+        ends = np.cumsum([0, *(size for _, size in blocks)])
+        numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
+        made = [np.zeros((ends[-1], 0))]
+        for name, shape in linear.columns:
+            if per_leg(self.library[name]):
+                own, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
+                numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
+                made.append(np.zeros((ends[-1], sums.shape[1])))
+                made[-1][own] = sums
+        return numbers, np.concatenate(made, axis=1)
+
+    @cached_property
+    def _together(self):
+        """Columns of calibration and effects, and the data, (m, 3, k), as they are and by the runs' cosines; waves."""
+        linear = self.linear
+        blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
+        together = np.concatenate(blocks, axis=-1)
+        cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
+        return together, cosines.reshape(together.shape), wave
+
+    @cached_property
+    def whole(self):
+        """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
+        together, _, _ = self._together
+        columns = (together[..., self.linear.base.shape[-1] : -1] / self.noise.mean_mm).reshape(3 * len(self), -1)
+        sums = columns @ self.layout[1]
+        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)])
+
+    @cached_property
+    def _made(self):
+        """Grams of the levels that have been asked for."""
+        return {}
+
+    def gram(self, level):
+        """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
+
+        The calibration is projected out.
+        """
+        if level not in self._made:
+            (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+            own = self.noise.variance(wave, lengths(self.run)) / unit**2
+            variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
+            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
+            basis, triangle = np.linalg.qr(white[:, :p])
+            rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
+            gram, sums = rest.T @ rest, self.layout[1]
+            none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
+            gram, moment = gram[:-1, :-1], gram[:-1, -1]
+            across = gram @ sums
+            gram = np.block([[gram, across], [across.T, sums.T @ across]])
+            self._made[level] = gram, np.concatenate([moment, sums.T @ moment]), none
+        return self._made[level]
