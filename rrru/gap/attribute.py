@@ -11,7 +11,7 @@ from rrru.campaign import noise
 from rrru.errors import FitError
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.gap.case import Case, State
+from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.noise_model import alike, fit_noise
@@ -20,6 +20,7 @@ from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.spectra import with_spectra
+from rrru.gap.state import State
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
 

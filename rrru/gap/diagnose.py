@@ -14,7 +14,6 @@ from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
 from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
-from rrru.gap.case import State
 from rrru.gap.details import details_of, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
@@ -23,6 +22,7 @@ from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
+from rrru.gap.state import State
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot

@@ -11,7 +11,7 @@ import numpy as np
 
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State
+from rrru.gap.state import State
 
 _STEPS, _STILL = 12, 1e-6
 # shares of the largest singular value below which a combination of numbers is not seen

@@ -3,7 +3,7 @@
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.gap.case import State
+from rrru.gap.state import State
 from rrru.gap.terms import spread
 
 _STEPS, _HALVINGS = 6, 5

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
 from rrru.effects.drive_error_function import waves
-from rrru.gap.case import State
+from rrru.gap.state import State
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
 

@@ -9,7 +9,7 @@ from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State
+from rrru.gap.state import State
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses

@@ -13,10 +13,10 @@ from scipy.stats import multivariate_normal
 
 from rrru.effects.protocol import Coordinates
 from rrru.gap.averages import Average, averaged_mean
-from rrru.gap.case import Linear
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.search import Hypothesis
+from rrru.gap.state import Linear
 from rrru.gap.terms import Term
 from rrru.gap.whitened import LEVELS
 

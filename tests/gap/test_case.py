@@ -12,8 +12,8 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
 from rrru.errors import FitError
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State
 from rrru.gap.make_case import at_reversals
+from rrru.gap.state import State
 from tests.gap import campaigns
 from tests.gap.campaigns import EFFECTS, ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
 

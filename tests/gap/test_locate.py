@@ -9,9 +9,9 @@ from scipy.stats import chi2
 
 from rrru.effects.protocol import Coordinates, plain_coordinates
 from rrru.gap.attribute import calibrate
-from rrru.gap.case import State
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate, worst_spot
+from rrru.gap.state import State
 from rrru.parameters import Parameter, ParameterSet
 from tests.gap.campaigns import EFFECTS, NOISE_MM, case_of, measure
 from tests.schemas import check

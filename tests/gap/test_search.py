@@ -12,12 +12,12 @@ import pytest
 from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import NOTHING, advise
 from rrru.gap.attribute import Attribution, attribute, calibrate
-from rrru.gap.case import State
 from rrru.gap.evidence import averaged
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.settings import Prior
+from rrru.gap.state import State
 from rrru.gap.terms import Term, spread, variants
 from rrru.gap.verdict import decide
 from rrru.gap.whitened import LEVELS

@@ -8,12 +8,12 @@ import pytest
 from rrru.effects.protocol import Coordinates
 from rrru.gap import diagnose
 from rrru.gap.attribute import Attribution, calibrate
-from rrru.gap.case import Linear
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.posterior import NEGLIGIBLE, posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
+from rrru.gap.state import Linear
 from tests.gap.campaigns import EFFECTS, case_of, measure, strong
 
 NOISE_MM, PRIOR = 0.05, Prior()

@@ -17,10 +17,11 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.errors import ConfigError, FitError, IngestError
 from rrru.gap.attribute import with_arm
-from rrru.gap.case import Case, State
+from rrru.gap.case import Case
 from rrru.gap.diagnose import Diagnosis, MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
+from rrru.gap.state import State
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.studies import setup

@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.gap.case import State
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
+from rrru.gap.state import State
 from rrru.gap.unknown import UNKNOWN
 from rrru.studies.real.arms import NO_MASSES, Studied
 from rrru.studies.real.steps import FRAMES, frames, held_out_mm, placed

@@ -15,8 +15,9 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
-from rrru.gap.case import Case, State
+from rrru.gap.case import Case
 from rrru.gap.fit_effects import fit_effects
+from rrru.gap.state import State
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.geometric_numbers import direction, open_numbers
 from rrru.robots.robot import Robot

@@ -10,7 +10,7 @@ from itertools import combinations
 
 import numpy as np
 
-from rrru.gap.case import State
+from rrru.gap.state import State
 
 _FALSE_ALARMS = 0.01
 _TRUE = "true:"

@@ -15,9 +15,10 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
-from rrru.gap.case import Case, State
+from rrru.gap.case import Case
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
+from rrru.gap.state import State
 from rrru.gap.terms import EACH, signatures, variants
 from rrru.studies.withheld.verdicts import NONE, in_order
 

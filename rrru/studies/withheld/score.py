@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from rrru.effects.library import HOLDS
-from rrru.gap.case import State
 from rrru.gap.make_case import make_case
+from rrru.gap.state import State
 from rrru.studies.withheld.draw import fresh
 from rrru.studies.withheld.oracle import Limits, limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS

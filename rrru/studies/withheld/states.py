@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from rrru.gap.case import State
+from rrru.gap.state import State
 
 # what a verdict is scored by, and what tells whether it is ambiguous
 VERDICT = [

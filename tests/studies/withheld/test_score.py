@@ -10,8 +10,8 @@ from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
-from rrru.gap.case import State
 from rrru.gap.make_case import make_case
+from rrru.gap.state import State
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.field import field_verdicts, read_field_answers, score_field
 from rrru.studies.withheld.oracle import limits, with_truth

@@ -1,0 +1,51 @@
+"""A corrected sim, and the sim linearised about it. Lengths in mm, angles in rad."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class State:
+    """A corrected sim: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+
+    shape_values: effect to the values of its shape's parameters where they have been fitted further.
+    """
+
+    deviations: np.ndarray
+    effects: dict
+    shape_values: dict = field(default_factory=dict)
+
+    def shape(self, library, key):
+        """Values of the shape's parameters of one effect (name, shape) by name."""
+        name, number = key
+        if key in self.effects and name in self.shape_values:
+            # one that was searched may not be among those that a library lists
+            return self.shape_values[name]
+        return library[name].coordinates.shapes[number]
+
+    def contribution(self, library, key, motion, coordinates=None, shape=None):
+        """What one effect (name, shape) changes along a motion, at its own coordinates and shape or other ones."""
+        coordinates = self.effects[key] if coordinates is None else coordinates
+        effect = library[key[0]]
+        values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
+        return effect.contribute(motion, values)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The sim linearised about a state.
+
+    data (m, 3): what was read minus model, with the state's effects taken out again; base (m, 3, p): derivative by the
+    mechanism's deviations; columns: (effect, shape) to the derivative (m, 3, c) by the effect's coordinates;
+    shape_columns: effect of the state to what its shape's parameters may be wrong by, (m, 3, q), each column one
+    standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
+    derivative by the actuator values.
+    """
+
+    data: np.ndarray
+    base: np.ndarray
+    columns: dict
+    shape_columns: dict
+    shape_steps: dict
+    drive: np.ndarray
