@@ -44,7 +44,7 @@ def study(frame, section, name):
     case, belts = length_case(frame, read)
     verdict = case.verdict()
     chosen = verdict[2]
-    steps, step_errors = length_tables.steps(case, _chain(case, chosen), held_out(frame))
+    steps, step_errors = length_tables.steps(case, _chain(case, chosen), held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, belts)
     row = length_tables.verdict_row(
         case, verdict, step_errors, where=where, confusable_with=rivals, next_runs=next_runs
@@ -62,6 +62,8 @@ def length_case(frame, read):
     """The LengthCase of a set and the names of its belts; read: its Section."""
     columns = read.mapping("lengths")
     belts, dimensions = tuple(columns), read.choice("dimensions", 2, (2, 3))
+    if len(set(columns.values())) < len(belts):
+        read.refuse("lengths", list(columns.values()), "another column for each belt")
     if len(belts) <= dimensions:
         read.refuse("lengths", belts, f"at least {dimensions + 1} belts: fewer leave every place unchecked")
     if dimensions == 3 and read.given("heights_mm"):
@@ -71,7 +73,10 @@ def length_case(frame, read):
     least = -(-(free + 1) // (len(belts) - dimensions))
     factor = MM[read.choice("unit", "mm", tuple(MM))]
     counted = factor * numbers(frame, list(columns.values()), read.given("files"), least, above=0.0)
-    count = len(belts)
+    count, short = len(belts), counted.mean(axis=0) <= heights
+    if short.any():
+        told = f"{belts[short.argmax()]} {counted.mean(axis=0)[short.argmax()]:.3g} mm long on average"
+        read.refuse("unit", told, "belts longer than their heights_mm")
     basis, _ = frame_columns(count, dimensions, count)
     origin = np.append(np.zeros(count * dimensions + count), np.ones(count))
     names = tuple(f"frame_{number}" for number in range(basis.shape[1]))

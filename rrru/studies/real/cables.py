@@ -48,7 +48,7 @@ def study(frame, section, name):
     chosen = verdict[2]
     laws = case.laws[RADIUS]
     chain = list(dict.fromkeys([(), (laws[0],), (laws[-1],), chosen.laws]))
-    steps, errors = length_tables.steps(case, chain, held_out(frame))
+    steps, errors = length_tables.steps(case, chain, held_out(frame, read))
     notes, where, next_runs, rivals = _words(case, verdict, drums)
     row = length_tables.verdict_row(case, verdict, errors, where=where, confusable_with=rivals, next_runs=next_runs)
     rows = row_numbers(frame, read)

@@ -96,25 +96,41 @@ def numbers(frame, columns, name, least_rows, above=None):
     wanted = "a finite number" if above is None else f"a finite number above {above:g}"
     fault = ~(np.abs(values) < _LARGEST) | (values <= (-np.inf if above is None else above))
     for row, place in np.argwhere(fault):
-        shown = repr(frame[columns[place]].iloc[row])
+        shown = repr(frame[columns[place]].tolist()[row])
         problems.add("number", row=row + 1, column=str(columns[place]), value=shown, allowed=wanted)
     problems.refuse()
     return values
 
 
 def row_numbers(frame, section, default="row"):
-    """The rows' numbers (n,): those of the column that the key `row` names, `row` where there is one, else from 1."""
+    """The rows' numbers (n,): those of the column that the key `row` names, `row` where there is one, else from 1.
+
+    Raises IngestError where two rows have the same one, or one has none.
+    """
     column = section.given("row", default)
-    if column in frame.columns:
-        return frame[column].to_numpy()
-    if section.given("row") is not None:
-        section.refuse("row", column, f"one of {', '.join(map(str, frame.columns))}")
-    return np.arange(1, len(frame) + 1)
+    if column not in frame.columns:
+        if section.given("row") is not None:
+            section.refuse("row", column, f"one of {', '.join(map(str, frame.columns))}")
+        return np.arange(1, len(frame) + 1)
+    found, problems = pd.to_numeric(frame[column], errors="coerce"), Problems(section.given("files"))
+    for row in np.flatnonzero((found.isna() | (found % 1 != 0) | found.duplicated()).to_numpy()):
+        shown = repr(frame[column].tolist()[row])
+        problems.add("number", row=row + 1, column=column, value=shown, allowed="whole numbers, each once")
+    problems.refuse()
+    return found.to_numpy(dtype=int)
 
 
-def held_out(frame):
-    """Flags (n,) of the rows that the column `held_out` keeps back; None without one, or where it keeps none or all."""
+def held_out(frame, section):
+    """Flags (n,) of the rows that the column `held_out` keeps back; None without one, or where it keeps none or all.
+
+    Raises IngestError for a flag that is neither 0 nor 1.
+    """
     if "held_out" not in frame.columns:
         return None
-    flags = pd.to_numeric(frame["held_out"], errors="coerce").fillna(0).to_numpy(dtype=float) > 0.0
-    return flags if 0 < flags.sum() < len(flags) else None
+    flags = pd.to_numeric(frame["held_out"], errors="coerce").to_numpy(dtype=float)
+    problems = Problems(section.given("files"))
+    for row in np.flatnonzero(~np.isin(flags, (0.0, 1.0))):
+        shown = repr(frame["held_out"].tolist()[row])
+        problems.add("number", row=row + 1, column="held_out", value=shown, allowed="0 or 1")
+    problems.refuse()
+    return flags == 1.0 if 0 < flags.sum() < len(flags) else None
