@@ -39,7 +39,7 @@ _LEAST_VISIBLE = 1e-9
 class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
-    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel;
+    library: effects by name; linear: `rrru.gap.state.Linear`; run (n,): the series of each row; noise: a NoiseModel;
     smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is.
     """
 

@@ -28,7 +28,7 @@ def spectrum(wave):
 class Whitened:
     """Gram matrices of all columns of a linearisation, made when they are asked for.
 
-    library: effects by name; linear: `rrru.gap.case.Linear`; run (n,): the series of each row; noise: a NoiseModel.
+    library: effects by name; linear: `rrru.gap.state.Linear`; run (n,): the series of each row; noise: a NoiseModel.
     """
 
     library: dict
