@@ -178,7 +178,7 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
             continue
         made = [amplitudes(case, state, number, orders) for state in (studied.step("b").state, studied.state)]
         sine, cosine, error = np.zeros((3, len(orders)))
-        if found is not None:
+        if found is not None and studied.diagnosis:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
             own = np.reshape(found, (-1, len(ORDERS), 2))[number, : len(orders)]

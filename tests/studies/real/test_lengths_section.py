@@ -4,7 +4,7 @@ import pandas as pd
 import pytest
 
 from rrru.errors import ConfigError, IngestError
-from rrru.studies.real import belts
+from rrru.studies.real import belts, figures_lengths
 from rrru.studies.real.lengths_section import Section, held_out, row_numbers
 
 READ = Section({"files": "run_x.csv"}, "mine", ("files",), ())
@@ -36,3 +36,9 @@ def test_belts_have_columns_of_their_own_and_are_longer_than_high(key, change):
     section = {"kind": "belts", "files": "run_x.csv", "lengths": {name: name for name in "abcd"}} | change
     with pytest.raises(ConfigError, match=rf"real\.sets\.mine\.{key}: got"):
         belts.study(frame, section, "mine")
+
+
+def test_a_set_without_files_has_a_page_that_says_so():
+    tables = {name: pd.DataFrame(columns=["campaign"]) for name in ("real_points", "real_parameters")}
+    (text,) = figures_lengths.lengths(tables, {"set": "mine"}).texts
+    assert text.get_text() == "mine: no file of this set is here"

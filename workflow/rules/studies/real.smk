@@ -46,12 +46,12 @@ rule study_arm:
         **drawn(ARM_FIGURES, "figures/real/{set}"),
     log:
         f"{RESULTS}/logs/real/{{set}}.log",
+    wildcard_constraints:
+        set="|".join(REAL_ARMS) or "(?!)",
     params:
         settings=real_settings(ARM_FIGURES),
         own_effects=own_effects_digests(),
         code=code("real", ARM_FIGURES),
-    wildcard_constraints:
-        set="|".join(REAL_ARMS) or "(?!)",
     script:
         "../../scripts/real.py"
 
@@ -60,12 +60,12 @@ use rule study_arm as study_lengths with:
     output:
         **named(REAL_TABLES, under("real/{set}")),
         **drawn(LENGTH_FIGURES, "figures/real/{set}"),
+    wildcard_constraints:
+        set="|".join(REAL_LENGTHS) or "(?!)",
     params:
         settings=real_settings(LENGTH_FIGURES),
         own_effects=own_effects_digests(),
         code=code("real", LENGTH_FIGURES),
-    wildcard_constraints:
-        set="|".join(REAL_LENGTHS) or "(?!)",
 
 
 use rule gather as gather_real with:
