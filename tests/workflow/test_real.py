@@ -16,6 +16,7 @@ def folder(tmp_path_factory):
     whole = pd.read_csv(ROOT / "data/real/ur10/series_D.csv")
     (place / "measured/ur10").mkdir(parents=True)
     whole.head(150).to_csv(place / "measured/ur10/series_S.csv", index=False)
+    (place / "record").mkdir()
     (place / "mine.yaml").write_text(
         "real: {folder: measured, gap: {effects: [drive_compliance, encoder_eccentricity]}}\n"
     )
