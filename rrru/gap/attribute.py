@@ -81,6 +81,19 @@ def with_arm(case, noise_mm=None, noise_rad=None):
     return replace(case, arm_mm=positions / turned)
 
 
+def with_beside(case):
+    """The case with reflectors beside the robot counted by what everything fitted leaves of them and of the others."""
+    if not case.beside.any() or case.beside.all():
+        return case
+    linear, columns = _few(case, calibrate(case))
+    flat = columns.reshape(linear.data.size, -1)
+    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+    fitted = flat / size @ np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
+    squares = ((linear.data.ravel() - fitted).reshape(-1, 3) ** 2).sum(axis=1)
+    others = case.positions & ~case.beside
+    return replace(case, beside_scale=float(np.sqrt(squares[others].mean() / max(squares[case.beside].mean(), 1e-12))))
+
+
 def with_noise(case, linear, stated_mm):
     """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
 
@@ -102,14 +115,20 @@ def with_noise(case, linear, stated_mm):
 
 def _rough(case, calibrated):
     """`rrru.campaign.noise.estimate` of a case with everything fitted that may be."""
+    linear, columns = _few(case, calibrated)
+    used = case.measurements[case.used]
+    return noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
+
+
+def _few(case, calibrated):
+    """The linearisation about a calibration, and the columns (m, 3, k) of all but laws of many coefficients.
+
+    Too few points to fit everything: what the calibration leaves has to do.
+    """
     few = {name: effect for name, effect in case.library.items() if not effect.coordinates.broad}
     linear = replace(case, library=few).linearise(calibrated)
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-    if columns.shape[-1] > len(case):
-        # too few points to fit everything: what the calibration leaves has to do
-        columns = linear.base
-    used = case.measurements[case.used]
-    return noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
+    return linear, (columns if columns.shape[-1] <= len(case) else linear.base)
 
 
 def attribute(case, prior, stated=KNOWN):

@@ -29,7 +29,8 @@ class Case:
     What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
     library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can;
     untestable: name to the reason for the other effects; noise_mm: deviation per axis; arm_mm: of
-    `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none.
+    `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none; beside_scale: factor by which
+    rows of reflectors beside the robot count, so that they have the noise of the others.
     """
 
     mechanism: object
@@ -41,6 +42,7 @@ class Case:
     noise_mm: float
     arm_mm: float = np.nan
     noise: NoiseModel | None = None
+    beside_scale: float = 1.0
 
     def __len__(self):
         return len(self.at)
@@ -65,6 +67,20 @@ class Case:
     def _along_paths(self):
         """Whether the points lie along paths, not in any order."""
         return follows_path(rows.command(self.measurements), self.measurements["run"].to_numpy())
+
+    @cached_property
+    def beside(self):
+        """Which rows (m,) are of reflectors beside the robot."""
+        on_world = rows.on_the_world(self.measurements)
+        return np.zeros(len(self), dtype=bool) if on_world is None else on_world[self.at]
+
+    def _of_rows(self, values):
+        """Of values (n, 3, ..) of all that was read those of the rows (m, 3, ..), as they count."""
+        kept = values[self._kept]
+        if self.beside_scale == 1.0:
+            return kept
+        scale = np.where(self.beside, self.beside_scale, 1.0)
+        return kept * scale.reshape(-1, *[1] * (kept.ndim - 1))
 
     @cached_property
     def at(self):
@@ -162,7 +178,7 @@ class Case:
 
     def residual(self, state):
         """`left` of the used points (m, 3)."""
-        return self.left(state)[self._kept]
+        return self._of_rows(self.left(state))
 
     def linearise(self, state, keys=None):
         """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
@@ -181,11 +197,11 @@ class Case:
             data = data + columns[key] @ coordinates
         return Linear(
             data,
-            at.columns(self.mechanism.directions)[self._kept],
+            self._of_rows(at.columns(self.mechanism.directions)),
             columns,
             {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
             {name: steps for name, (_, steps) in by_shape.items()},
-            at.drive_effect[self._kept],
+            self._of_rows(at.drive_effect),
         )
 
     def _map(self, state):
@@ -205,7 +221,7 @@ class Case:
             stepped = effect.doubted(name, value)
             if stepped != value:
                 other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
-                columns.append(at.move((other - own).twists)[self._kept])
+                columns.append(self._of_rows(at.move((other - own).twists)))
                 steps.append((name, value, stepped))
         nothing = np.zeros((len(self), 3, 0))
         return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
@@ -214,7 +230,7 @@ class Case:
         """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
         functions = getattr(self.library[key[0]], "along_drives", None)
         if functions is not None:
-            response = at.drive_effect[self._kept]
+            response = self._of_rows(at.drive_effect)
             made = (f[self.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(functions(self.motion)))
             return np.concatenate(list(made), axis=-1)
         step = np.array(self.library[key[0]].coordinates.typical)
@@ -224,5 +240,5 @@ class Case:
         result = np.empty((len(self), 3, len(step)))
         for k, one in enumerate(np.diag(step)):
             change = state.contribution(self.library, key, self.motion, one)
-            result[..., k] = at.move(change.twists)[self._kept] / step[k]
+            result[..., k] = self._of_rows(at.move(change.twists)) / step[k]
         return result

@@ -11,7 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.errors import FitError
 from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
-from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_effects
+from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
 from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
 from rrru.gap.details import details_of, where
@@ -91,6 +91,7 @@ def diagnose(
         raise FitError(f"{whose}{case.count} usable points are too few for a diagnosis; allowed: at least {least}")
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
+    case = with_beside(case)
     generator = stream(settings.seed, "gap", robot.campaign)
     verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated), settings.prior)
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)

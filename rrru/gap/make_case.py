@@ -41,14 +41,13 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
-    turned = rows.has_turns(measurements) and measurements["measured_rx_rad"].notna().to_numpy()
-    read = 3 * int(used.sum() + (used & turned).sum())
+    read = _told(measurements, used, stop)
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
             continue
         if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * read:
-            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {read} that were read"
+            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {read} that were told"
             continue
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
         missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
@@ -63,6 +62,16 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+
+
+def _told(measurements, used, stop):
+    """How many numbers the used points tell of the robot: at each stop no more than the six of a platform's pose."""
+    turned = np.zeros(len(used), dtype=bool)
+    if rows.has_turns(measurements):
+        turned = measurements["measured_rx_rad"].notna().to_numpy()
+    beside = rows.on_the_world(measurements)
+    own = used if beside is None else used & ~beside
+    return int(np.minimum(np.bincount(stop, own * (3.0 + 3.0 * turned)), 6.0).sum())
 
 
 def _fitted(effect, motion):
