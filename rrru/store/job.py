@@ -18,6 +18,8 @@ def run(main: Callable[[dict, dict, dict], None], snakemake: Any) -> None:
     log.parent.mkdir(parents=True, exist_ok=True)
     logging.basicConfig(filename=log, filemode="w", level=logging.INFO, format="%(message)s", force=True)
     logging.captureWarnings(True)
+    # what fonts are made of is of no use to anybody
+    logging.getLogger("fontTools").setLevel(logging.WARNING)
     try:
         main(snakemake.params.settings, dict(snakemake.input.items()), dict(snakemake.output.items()))
     except RrruError as error:
