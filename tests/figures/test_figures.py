@@ -23,6 +23,7 @@ from tests.studies.delta import synthetic_delta
 from tests.studies.methods import synthetic_methods
 from tests.studies.printers import synthetic_printers
 from tests.studies.ptt3 import synthetic_ptt
+from tests.studies.real import synthetic_real
 
 # labels of axes that count or name things, or carry a number without a unit
 WITHOUT_UNIT = (
@@ -57,12 +58,15 @@ WITHOUT_UNIT = (
     ),
     *("experiment, curve backwards", "payload (kg)", "slider", "scatter per travel (µm/mm)", "left over (µm)"),
     "azimuth of the first point (°)",
+    *("model", "waves per turn", "row", "x (m)", "y (m)", "share of the gap's mean square (%)"),
+    *(f"joint {number}\n(µrad)" for number in range(1, 7)),
     "size of the weight in the unit direction (angles as arcs at the end of the drive arm)",
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign
 DELTA = ("delta_images", "delta_errors", "delta_observability")
 PTT = tuple(name for name in FIGURES if name.startswith("ptt_"))
+REAL = ("steps", "spectrum", "lengths")
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +80,7 @@ def frames():
         | synthetic_delta.delta_tables()
         | synthetic_methods.method_tables()
         | synthetic_ptt.ptt_tables()
+        | synthetic_real.real_tables()
     )
 
 
@@ -179,7 +184,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         *(
             (name, {"campaign": "nowhere"}, "'nowhere'")
             for name in FIGURES
-            if name not in ("fig06", "fig07", "withheld", "printers", "methods", *DELTA, *PTT)
+            if name not in ("fig06", "fig07", "withheld", "printers", "methods", *DELTA, *PTT, *REAL)
         ),
         ("fig07", {"sweep_campaign": "nowhere"}, "'nowhere'"),
     ],

@@ -10,6 +10,7 @@ import pandas as pd
 
 from rrru.errors import ConfigError
 from rrru.robots.catalogue import OWN
+from rrru.studies.config import own_robot_file
 
 # the folder that data which may not be shipped are read from
 VARIABLE = "RRRU_REAL_DATA"
@@ -156,3 +157,20 @@ def _label(pattern: str, file: Path) -> str:
     """What stands for the * of a pattern in a file's name, "" where it has none."""
     before, star, after = Path(pattern).name.partition("*")
     return file.name.removeprefix(before).removesuffix(after) if star else ""
+
+
+def files(config: Mapping[str, Any], name: str) -> list[str]:
+    """The files of a data set and of what describes its robot, none where they are not here."""
+    result, section = [one.file for one in found(config["real"], name)], config["real"]["sets"][name]
+    if "chain" in section:
+        result += sorted({one.parent / section["chain"] for one in result})
+    elif "robot" in section:
+        result.append(own_robot_file(config["robots"][section["robot"]]))
+    return [str(file) for file in result if file is not None and file.exists()]
+
+
+def part(config: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """What is told of a data set: its own part of the configuration, and the robot that it names."""
+    section, real = config["real"]["sets"][name], {key: config["real"][key] for key in ("folder", "gap")}
+    robots = {section["robot"]: config["robots"][section["robot"]]} if "robot" in section else {}
+    return {"set": name, "real": real | {"sets": {name: section}}, "robots": robots}

@@ -15,32 +15,9 @@ ARM_FIGURES = {
 LENGTH_FIGURES = {"lengths": ("rrru.studies.real.figures_lengths:lengths", ["real_points", "real_parameters"])}
 
 
-def real_files(wildcards):
-    """The files of a data set and of what describes its robot, none where they are not here."""
-    series, section = real_series.found(config["real"], wildcards.set), REAL_SETS[wildcards.set]
-    files = [one.file for one in series]
-    if "chain" in section:
-        files += sorted({one.parent / section["chain"] for one in files})
-    elif "robot" in section:
-        files += [parts.own_robot_file(config["robots"][section["robot"]])]
-    return [str(file) for file in files if file is not None and file.exists()]
-
-
-def real_settings(figures):
-    """What is told of a data set: its own part of the configuration, and the robot that it names."""
-
-    def settings(wildcards):
-        section = REAL_SETS[wildcards.set]
-        real = {key: config["real"][key] for key in ("folder", "gap")} | {"sets": {wildcards.set: section}}
-        robots = parts.part(config, f"robots.{section['robot']}").get("robots", {}) if "robot" in section else {}
-        return {"set": wildcards.set, "real": real, "robots": robots, "figures": figures, **reads("seed", "gap")}
-
-    return settings
-
-
 rule study_arm:
     input:
-        files=real_files,
+        files=lambda wildcards: real_series.files(config, wildcards.set),
     output:
         **named(REAL_TABLES, under("real/{set}")),
         **drawn(ARM_FIGURES, "figures/real/{set}"),
@@ -49,7 +26,11 @@ rule study_arm:
     wildcard_constraints:
         set="|".join(REAL_ARMS) or "(?!)",
     params:
-        settings=real_settings(ARM_FIGURES),
+        settings=lambda wildcards: {
+            "figures": ARM_FIGURES,
+            **real_series.part(config, wildcards.set),
+            **reads("seed", "gap"),
+        },
         own_effects=own_effects_digests(),
         code=code("real", ARM_FIGURES),
     script:
@@ -63,7 +44,11 @@ use rule study_arm as study_lengths with:
     wildcard_constraints:
         set="|".join(REAL_LENGTHS) or "(?!)",
     params:
-        settings=real_settings(LENGTH_FIGURES),
+        settings=lambda wildcards: {
+            "figures": LENGTH_FIGURES,
+            **real_series.part(config, wildcards.set),
+            **reads("seed", "gap"),
+        },
         own_effects=own_effects_digests(),
         code=code("real", LENGTH_FIGURES),
 
