@@ -105,6 +105,6 @@ def _draw_waves(axes, own):
     axes.plot(own["order"], _MICRORAD * own["before_rad"], color=style.VERMILION, label="before")
     axes.plot(own["order"], _MICRORAD * own["after_rad"], color=style.BLUE, label="after")
     for resolution in own["resolution"].head(1):
-        place = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 6.0, "in_layout": False}
+        place = {"transform": axes.transAxes, "ha": "right", "va": "top", "fontsize": 7.0, "in_layout": False}
         axes.text(0.98, 0.95, f"resolution {resolution:.1f}", **place)
     axes.grid(True)
