@@ -18,6 +18,7 @@ Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The
 
 import numpy as np
 
+from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
@@ -59,8 +60,3 @@ def _err(motion, values):
     own = np.reshape(values, (motion.drive.shape[1], -1))
     changes = [waves(angle, ORDERS) @ one for angle, one in zip(motion.drive.T, own, strict=True)]
     return motion.at_drives(np.stack(changes, axis=1))
-
-
-def waves(angle, orders):
-    """Sine and cosine in turn, (n, 2 orders), of orders (k,) times an angle (n,)."""
-    return np.stack([np.sin(np.outer(angle, orders)), np.cos(np.outer(angle, orders))], axis=2).reshape(len(angle), -1)

@@ -38,3 +38,8 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
         shapes=tuple(shapes),
         most=np.full(len(names), parameters[names[0]].high),
     )
+
+
+def waves(angle, orders):
+    """Sine and cosine in turn, (n, 2 orders), of orders (k,) times an angle (n,)."""
+    return np.stack([np.sin(np.outer(angle, orders)), np.cos(np.outer(angle, orders))], axis=2).reshape(len(angle), -1)

@@ -15,7 +15,7 @@ IEEE Transactions on Signal Processing 41, 1993). The size is assumed: one arc m
 
 import numpy as np
 
-from rrru.effects.drive_error_function import waves
+from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 

@@ -63,6 +63,10 @@ def fit_effects(case, names, times_typical=_TIMES_TYPICAL):
         raise FitError(f"the fit of {', '.join(names) or 'the calibration'} does not end: {cost:.6g} mm^2 left")
     spread = unit * np.sqrt(np.diag(np.linalg.pinv((matrix * unit).T @ (matrix * unit), rcond=_SEEN**2)))
     errors = {name: spread[first:end] for name, first, end in zip(names, ends, ends[1:], strict=False)}
-    # a number of the robot is alike to one of an effect's typical size, by how far it moves what is read
-    seen = np.linalg.matrix_rank(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300), rtol=_SEEN)
-    return EffectFit(state, errors, len(prior), int(seen))
+    return EffectFit(state, errors, len(prior), identified(columns))
+
+
+def identified(columns):
+    """How many combinations of numbers the columns (m, k) that these make tell, each number by how far it moves."""
+    unit = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    return int(np.linalg.matrix_rank(np.linalg.qr(unit, mode="r"), rtol=_SEEN))

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
-from rrru.effects.drive_error_function import waves
+from rrru.effects.harmonic import waves
 from rrru.gap.state import State
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
@@ -139,21 +139,21 @@ def _unit(columns, least):
     return columns / np.where(norm > least, norm, np.inf)
 
 
-def amplitudes(case, state, drive, orders):
-    """Amplitudes (g,) in rad of waves of orders (g,) of one drive that fit what a state leaves, one at a time.
+def amplitudes(case, state, orders):
+    """Amplitudes (K, g) in rad of waves of orders (g,) of each drive that fit what a state leaves, one at a time.
 
     The calibration's numbers are fitted beside each; NaN where they take up all but a hundredth of a wave.
     """
-    linear = case.linearise(State(state.deviations, {}), [])
+    linear, drive = case.linearise(State(state.deviations, {}), []), case.motion.drive[case.at]
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
-    made = waves(case.motion.drive[case.at, drive], orders)
-    whole = (linear.drive[:, :, drive, None] * made[:, None, :]).reshape(linear.data.size, -1)
-    columns, left = _without(whole, basis), case.residual(state).ravel()
-    pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
-    grams = np.einsum("mgi,mgj->gij", pairs, pairs)
-    told = np.linalg.eigvalsh(grams)[:, 0] > _TOLD * (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
-    result = np.full(len(orders), np.nan)
-    result[told] = np.linalg.norm(np.linalg.solve(grams[told], moments[told, :, None])[:, :, 0], axis=1)
+    left, result = case.residual(state).ravel(), np.full((drive.shape[1], len(orders)), np.nan)
+    for k, found in enumerate(result):
+        whole = _waves_of(linear.drive, drive, k, orders)
+        columns = _without(whole, basis)
+        pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
+        grams = np.einsum("mgi,mgj->gij", pairs, pairs)
+        told = np.linalg.eigvalsh(grams)[:, 0] > _TOLD * (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
+        found[told] = np.linalg.norm(np.linalg.solve(grams[told], moments[told, :, None])[:, :, 0], axis=1)
     return result
 
 

@@ -9,6 +9,7 @@ import warnings
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tests.robots import craig
 from tests.robots.mjcf import file_of, text_of
 
 # Craig's rows: d in m, theta, a in m, alpha; the fourth one's joint turns by -(q1 + q2)
@@ -57,24 +58,7 @@ def section(**more):
 
 def _fixed(xyz_mm, rpy_deg):
     """Placement (4, 4) in m."""
-    result = np.eye(4)
-    result[:3, :3] = Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
-    result[:3, 3] = np.asarray(xyz_mm) / 1e3
-    return result
-
-
-def _row(row, angle):
-    """Craig's Rx(alpha) Tx(a) Rz(theta + q) Tz(d), written out."""
-    d, theta, a, alpha = row[0], np.radians(row[1]) + angle, row[2], np.radians(row[3])
-    (s, c), (sa, ca) = (np.sin(theta), np.cos(theta)), (np.sin(alpha), np.cos(alpha))
-    return np.array(
-        [
-            [c, -s, 0.0, a],
-            [s * ca, c * ca, -sa, -sa * d],
-            [s * sa, c * sa, ca, ca * d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
+    return craig.fixed(np.asarray(xyz_mm) / 1e3, rpy_deg)
 
 
 def frames(drives):
@@ -83,7 +67,7 @@ def frames(drives):
     q["chest"] = -(q["torso1"] + q["torso2"])
     here, result = _fixed(*BASE), []
     for k, (name, row) in enumerate(zip(NAMES, (*TORSO, *ARM), strict=True)):
-        here = (here @ _fixed(*SHOULDER) if k == len(TORSO) else here) @ _row(row, q[name])
+        here = (here @ _fixed(*SHOULDER) if k == len(TORSO) else here) @ craig.row(row, q[name])
         result.append(here)
     return [*result, here @ _fixed(*HAND)]
 
@@ -98,7 +82,7 @@ def urdf_file(tmp_path):
     joints, links, placement, parent = "", ["base", "hand", "chest_turned"], _fixed(*BASE), "base"
     bodies = ""
     for k, (name, row, (mass, com)) in enumerate(zip(NAMES, (*TORSO, *ARM), MASSES, strict=True)):
-        placement = placement @ (_fixed(*SHOULDER) if k == len(TORSO) else np.eye(4)) @ _row(row, 0.0)
+        placement = placement @ (_fixed(*SHOULDER) if k == len(TORSO) else np.eye(4)) @ craig.row(row, 0.0)
         more = ""
         if name == "chest":
             more = '<mimic joint="torso1" multiplier="-1" offset="0"/>'

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.robots.dynamics import GRAVITY_MM_S2
+from tests.robots import craig
 from tests.robots.mjcf import text_of
 
 # Craig's rows: d in mm, theta in degrees, a in mm, alpha in degrees; mass in kg and its centre in mm
@@ -65,28 +66,6 @@ def section(**more):
     return {"dh": [*trunk, head], "hands": hands, "convention": "modified", **more}
 
 
-def _fixed(xyz_mm, rpy_deg):
-    """Placement (4, 4) in mm."""
-    result = np.eye(4)
-    result[:3, :3] = Rotation.from_euler("xyz", rpy_deg, degrees=True).as_matrix()
-    result[:3, 3] = xyz_mm
-    return result
-
-
-def _row(numbers, angle):
-    """Craig's Rx(alpha) Tx(a) Rz(theta + q) Tz(d), written out."""
-    d, theta, a, alpha = numbers[0], np.radians(numbers[1]) + angle, numbers[2], np.radians(numbers[3])
-    (s, c), (sa, ca) = (np.sin(theta), np.cos(theta)), (np.sin(alpha), np.cos(alpha))
-    return np.array(
-        [
-            [c, -s, 0.0, a],
-            [s * ca, c * ca, -sa, -sa * d],
-            [s * sa, c * sa, ca, ca * d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-
-
 def frames(drives, turned=()):
     """Placements (4, 4) in mm of all rows' frames by name, and of the hands by theirs, at drive values (11,).
 
@@ -96,14 +75,14 @@ def frames(drives, turned=()):
     q["chest"] = -(q["hip"] + q["belly"])
     for name, angle in dict(turned).items():
         q[name] = q[name] + angle
-    result, here = {}, _fixed(*BASE)
+    result, here = {}, craig.fixed(*BASE)
     for name, (numbers, *_) in TRUNK.items():
-        result[name] = here = here @ _row(numbers, q[name])
+        result[name] = here = here @ craig.row(numbers, q[name])
     for hand, rows in ARMS.items():
-        at = here @ _fixed(*SHOULDERS[hand])
+        at = here @ craig.fixed(*SHOULDERS[hand])
         for name, (numbers, *_) in rows.items():
-            result[name] = at = at @ _row(numbers, q[name])
-        result[hand] = at @ _fixed(*HANDS[hand])
+            result[name] = at = at @ craig.row(numbers, q[name])
+        result[hand] = at @ craig.fixed(*HANDS[hand])
     return result
 
 
@@ -128,9 +107,9 @@ def urdf_text():
     """The tree as a URDF in m; a mimic follows one joint, so that the chest's joint is two at one place."""
     joints, links = "", '<link name="base"/><link name="chest_turned"/>'
     links += "".join(_link(hand, HAND_KG, HAND_MM) for hand in ARMS) + _link("head", HEAD_KG, HEAD_MM)
-    parent, placement = "base", _fixed(*BASE)
+    parent, placement = "base", craig.fixed(*BASE)
     for name, (numbers, mass, com) in TRUNK.items():
-        placement, more = placement @ _row(numbers, 0.0), ""
+        placement, more = placement @ craig.row(numbers, 0.0), ""
         if name == "chest":
             more = '<mimic joint="hip" multiplier="-1" offset="0"/>'
             joints += _joint("chest_turned", parent, placement, more)
@@ -139,14 +118,14 @@ def urdf_text():
         parent, placement = name, np.eye(4)
     joints += _joint("head", "chest", np.eye(4), kind="fixed")
     for hand, rows in ARMS.items():
-        parent, placement = "chest", _fixed(*SHOULDERS[hand])
+        parent, placement = "chest", craig.fixed(*SHOULDERS[hand])
         for name, (numbers, mass, com) in rows.items():
             joints, links = (
-                joints + _joint(name, parent, placement @ _row(numbers, 0.0)),
+                joints + _joint(name, parent, placement @ craig.row(numbers, 0.0)),
                 links + _link(name, mass, com),
             )
             parent, placement = name, np.eye(4)
-        joints += _joint(hand, parent, _fixed(*HANDS[hand]), kind="fixed")
+        joints += _joint(hand, parent, craig.fixed(*HANDS[hand]), kind="fixed")
     return f'<robot name="two_arms">{links}{joints}</robot>'
 
 

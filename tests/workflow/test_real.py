@@ -17,7 +17,9 @@ def folder(tmp_path_factory):
     (place / "measured/ur10").mkdir(parents=True)
     whole.head(150).to_csv(place / "measured/ur10/series_S.csv", index=False)
     (place / "record").mkdir()
-    (place / "mine.yaml").write_text("real: {folder: measured, gap: {effects: [drive_compliance, link_flexure]}}\n")
+    (place / "mine.yaml").write_text(
+        "real: {folder: measured, gap: {effects: [drive_compliance, encoder_eccentricity]}}\n"
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.delenv("RRRU_REAL_DATA", raising=False)
         code, said = run(place, "real", overlays=("mine.yaml",), record=place / "record")

@@ -12,7 +12,7 @@ from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.sheets import PLACE
-from rrru.studies.real.steps import counted, held_by_robot, trained_mm
+from rrru.studies.real.steps import counted, held_by_robot, held_out, rms, verdict_step
 
 MODELS, UNDIAGNOSED = "abcde", "undiagnosed"
 _FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders", 0), 40
@@ -54,8 +54,8 @@ def _verdict(studied: Studied) -> dict:
         "robot": series.section.get("robot", series.dataset),
         "source": series.file.name,
         "predicted_share": predicted_share(studied),
-        "held_out_share": 1.0 - (_rms(left) / _rms(before)) ** 2,
-        **_held_out(left),
+        "held_out_share": 1.0 - (rms(left) / rms(before)) ** 2,
+        **held_out(left),
         **_by_model(studied, series.section.get("reference", {})),
         "notes": "; ".join(filter(None, notes)),
     }
@@ -71,7 +71,7 @@ def _far(studied: Studied) -> str:
     own = studied.rows[held][far]
     readings = [f"row {row} of {target}" for row, target in zip(own[PLACE], own["target"], strict=True)]
     more = f" and {len(readings) - _TOLD} more" if len(readings) > _TOLD else ""
-    return f"far off among those held out: {', '.join(readings[:_TOLD])}{more}; without: {_rms(left[~far]):.3g} mm rms"
+    return f"far off among those held out: {', '.join(readings[:_TOLD])}{more}; without: {rms(left[~far]):.3g} mm rms"
 
 
 def _found(studied: Studied) -> Mapping[str, Any]:
@@ -102,7 +102,7 @@ def _waves(studied: Studied) -> str:
 
 def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float]:
     """Held-out rms of the models' letters, ours and others'; of the kinds of compliance that of the last."""
-    ours = {step.model[0]: _rms(step.held_out_mm) for step in studied.steps}
+    ours = {step.model[0]: rms(step.held_out_mm) for step in studied.steps}
     stated = reference.get(studied.series.label, {})
     result = {f"held_out_{model}_rms_mm": ours.get(model, np.nan) for model in MODELS}
     return result | {f"reference_{model}_rms_mm": float(stated.get(model, np.nan)) for model in MODELS}
@@ -124,21 +124,10 @@ def predicted_share(studied: Studied) -> float:
 
 def _steps(studied: Studied) -> pd.DataFrame:
     """Rows of `real_steps`: the plain models, and that of the verdict."""
-    if studied.diagnosis is None:
-        return pd.DataFrame([step.row for step in studied.steps]).assign(number=1 + np.arange(len(studied.steps)))
-    attribution, left = studied.diagnosis.attribution, studied.held_out_mm
-    fitted = len(studied.state.deviations) + sum(len(values) for values in studied.state.effects.values())
-    misses = trained_mm(studied.case, studied.state)
-    last = {
-        "model": "verdict",
-        "adds": "+".join(term.effect for term in attribution.hypothesis.terms) or "nothing",
-        "parameters": fitted,
-        "identifiable": fitted,
-        "train_rms_mm": _rms(misses),
-        **_held_out(left),
-    }
-    result = pd.DataFrame([*(step.row for step in studied.steps), last])
-    return result.assign(number=np.arange(1, len(result) + 1))
+    made = [*studied.steps]
+    if studied.diagnosis:
+        made.append(verdict_step(studied.case, studied.state, studied.seconds["gap"]))
+    return pd.DataFrame([step.row for step in made]).assign(number=np.arange(1, len(made) + 1))
 
 
 def _parameters(studied: Studied) -> pd.DataFrame:
@@ -147,7 +136,7 @@ def _parameters(studied: Studied) -> pd.DataFrame:
         return pd.DataFrame()
     frame = studied.diagnosis.tables["gap_parameters"]
     frame = frame[frame["effect"] != _FUNCTION[0]]
-    return frame[["effect", "parameter", "unit", "value", "standard_error"]].assign(nominal=0.0, note="")
+    return frame[["effect", "parameter", "unit", "value", "standard_error"]].assign(nominal=np.nan, note="")
 
 
 def _points(studied: Studied) -> pd.DataFrame:
@@ -173,10 +162,10 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
     case, robot = studied.case, studied.case.mechanism
     orders, parts = np.arange(1, _SHOWN + 1), []
     found = studied.state.effects.get(_FUNCTION)
+    before, after = (amplitudes(case, state, orders) for state in (studied.step("b").state, studied.state))
     for number, (drive, unit) in enumerate(zip(robot.parts.drives, robot.parts.units, strict=True)):
         if unit != "rad":
             continue
-        made = [amplitudes(case, state, number, orders) for state in (studied.step("b").state, studied.state)]
         sine, cosine, error = np.zeros((3, len(orders)))
         if found is not None and studied.diagnosis:
             errors = studied.diagnosis.tables["gap_parameters"]
@@ -190,8 +179,8 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
                     "joint": drive.site,
                     "order": orders,
                     "resolution": 2.0 * np.pi / max(reach, 1e-9),
-                    "before_rad": made[0],
-                    "after_rad": made[1],
+                    "before_rad": before[number],
+                    "after_rad": after[number],
                     "found_rad": np.hypot(sine, cosine),
                     "found_phase_rad": np.arctan2(cosine, sine),
                     "found_error_rad": error,
@@ -199,14 +188,3 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
             )
         )
     return pd.concat(parts, ignore_index=True) if parts else pd.DataFrame()
-
-
-def _held_out(left: np.ndarray) -> dict[str, float]:
-    """Mean, rms and largest of what is left on the rows held out, NaN where none is."""
-    mean, most = (float(left.mean()), float(left.max())) if len(left) else (np.nan, np.nan)
-    return {"held_out_mean_mm": mean, "held_out_rms_mm": _rms(left), "held_out_max_mm": most}
-
-
-def _rms(values: np.ndarray) -> float:
-    """Root mean square, NaN of nothing."""
-    return float(np.sqrt((values**2).mean())) if len(values) else np.nan

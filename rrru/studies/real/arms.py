@@ -28,7 +28,7 @@ from rrru.studies import setup
 from rrru.studies.real import chains
 from rrru.studies.real.series import Series
 from rrru.studies.real.sheets import HELD_OUT, in_file, joint_columns, retold, sheet, stated_noise
-from rrru.studies.real.steps import Step, held_out_mm, steps
+from rrru.studies.real.steps import Step, held_out_mm, laws, steps
 
 # an arm's masses are those of its links
 NO_MASSES = Masses(0.0, 0.0, 0.0)
@@ -119,7 +119,7 @@ def study(series: Series, robots: Mapping[str, Any], settings: GapSettings, shee
 
 def studied(known: Prepared, settings: GapSettings) -> Studied:
     """A series with its plain models and its diagnosis; raises ConfigError and FitError as these steps do."""
-    plain, made = _reference(known, settings)
+    plain, made = _reference(known)
     at = {"ingest": known.seconds} | {step.model: step.seconds for step in made}
     began, notes = time.perf_counter(), known.notes
     measured = MeasuredRobot(known.robot, NO_MASSES, known.noise[0], known.series.name, known.noise[1])
@@ -169,12 +169,11 @@ def _check_joints(series: Series, joints: Mapping[str, str], mechanism: Robot) -
         raise ConfigError(f"{where}: got {', '.join(more)}; allowed: {allowed}")
 
 
-def _reference(known: Prepared, settings: GapSettings) -> tuple[Case, tuple[Step, ...]]:
+def _reference(known: Prepared) -> tuple[Case, tuple[Step, ...]]:
     """The reference models of a series, each fitted to its training rows, and their case."""
     nominal, measurements, turned = sim(known.robot), known.measurements, rows.has_turns(known.measurements)
     arm_mm = nominal.angle_arm_mm if turned else np.nan
-    library = settings.library(nominal)
-    case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, library, True, arm_mm)
+    case = make_case(measurements, nominal, NO_MASSES, known.noise[0] or 1.0, laws(nominal), True, arm_mm)
     if turned:
         case = with_arm(case, *known.noise)
     made = steps(case)

@@ -12,7 +12,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.state import State
 from rrru.gap.unknown import UNKNOWN
 from rrru.studies.real.arms import NO_MASSES, Studied
-from rrru.studies.real.steps import FRAMES, frames, held_out_mm, placed
+from rrru.studies.real.steps import FRAMES, frames, held_out_mm, placed, rms
 
 
 def carried(series: list[Studied]) -> pd.DataFrame:
@@ -36,6 +36,5 @@ def _row(first: Studied, second: Studied) -> dict:
         "geometry_rms_mm": State(geometry, {}),
         "causes_rms_mm": State(state.deviations, effects, state.shape_values),
     }
-    left = {name: held_out_mm(case, placed(case, model)) for name, model in models.items()}
-    rms = {name: float(np.sqrt((misses**2).mean())) for name, misses in left.items()}
-    return {"campaign": second.series.name, "carried_from": first.series.name, **rms}
+    left = {name: rms(held_out_mm(case, placed(case, model))) for name, model in models.items()}
+    return {"campaign": second.series.name, "carried_from": first.series.name, **left}

@@ -16,7 +16,7 @@ from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.gap.case import Case
-from rrru.gap.fit_effects import fit_effects
+from rrru.gap.fit_effects import fit_effects, identified
 from rrru.gap.state import State
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.geometric_numbers import direction, open_numbers
@@ -56,17 +56,25 @@ class Step:
     @property
     def row(self) -> dict:
         """The row of `real_steps` without the campaign."""
-        held, told = self.held_out_mm, {}
-        if len(held):
-            told = {"mean": held.mean(), "rms": np.sqrt((held**2).mean()), "max": held.max()}
         return {
             "model": self.model,
             "adds": self.adds,
             "parameters": self.parameters,
             "identifiable": self.identifiable,
-            "train_rms_mm": float(np.sqrt((self.trained_mm**2).mean())),
-            **{f"held_out_{name}_mm": float(told.get(name, np.nan)) for name in ("mean", "rms", "max")},
+            "train_rms_mm": rms(self.trained_mm),
+            **held_out(self.held_out_mm),
         }
+
+
+def held_out(left_mm: np.ndarray) -> dict[str, float]:
+    """Mean, rms and largest of what is left on the rows held out, NaN where none is, by the columns of tables."""
+    mean, most = (float(left_mm.mean()), float(left_mm.max())) if len(left_mm) else (np.nan, np.nan)
+    return {"held_out_mean_mm": mean, "held_out_rms_mm": rms(left_mm), "held_out_max_mm": most}
+
+
+def rms(values: np.ndarray) -> float:
+    """Root mean square, NaN of nothing."""
+    return float(np.sqrt((values**2).mean())) if len(values) else np.nan
 
 
 def held_out_mm(case: Case, state: State) -> np.ndarray:
@@ -100,8 +108,8 @@ def steps(case: Case) -> tuple[Step, ...]:
     case, began = replace(case, library=library), time.perf_counter()
     none = State(np.zeros(len(case.mechanism.parameters)), {})
     state = placed(case, none)
-    count = len(library[FRAMES].coordinates)
-    result = [Step("a", "frames", state, count, count, time.perf_counter() - began, *_left(case, state))]
+    numbers = len(library[FRAMES].coordinates), _identified(case, state, False), time.perf_counter() - began
+    result = [Step("a", "frames", state, *numbers, *_left(case, state))]
     names: tuple[str, ...] = ()
     for model, adds, effect in _MODELS:
         if effect and effect not in library:
@@ -118,6 +126,20 @@ def steps(case: Case) -> tuple[Step, ...]:
         numbers = fit.numbers, fit.identifiable, time.perf_counter() - began
         result.append(Step(model, adds, fit.state, *numbers, *_left(case, fit.state)))
     return tuple(result)
+
+
+def verdict_step(case: Case, state: State, seconds: float) -> Step:
+    """The step of a diagnosis' state: calibration and named effects."""
+    count = len(state.deviations) + sum(len(values) for values in state.effects.values())
+    adds = "+".join(name for name, _ in state.effects) or "nothing"
+    return Step("verdict", adds, state, count, _identified(case, state), seconds, *_left(case, state))
+
+
+def _identified(case: Case, state: State, calibrated: bool = True) -> int:
+    """How many of the numbers of a state's effects, and of the calibration where that is fitted, the rows tell."""
+    linear = case.linearise(state, [])
+    blocks = [linear.base] * calibrated + [linear.columns[key] for key in state.effects]
+    return identified(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
 
 
 def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:
@@ -146,16 +168,19 @@ def placed(case: Case, state: State) -> State:
 
 
 def _own(case: Case) -> dict[str, Effect]:
-    """The laws that only these models have, as far as a robot has sites and its campaign an order."""
+    """The laws that only these models have, as far as a robot has sites for them."""
     result, robot = {FRAMES: frames(case.mechanism)}, case.mechanism
     sharp = find("transmission_orders", robot)
     if sharp is not None:
         pairs = tuple((drive, float(order)) for drive in range(len(robot.parts.drives)) for order in (1, 2))
         result[_HARMONICS] = replace(sharp.with_waves(pairs), name=_HARMONICS)
-    drift = find("base_drift", robot)
-    if np.ptp(case.motion.time_s) > 0.0:
-        result[drift.name] = drift
     return result
+
+
+def laws(robot: Robot) -> dict[str, Effect]:
+    """The library's laws of the models, by name, as far as a robot has sites for them."""
+    found = {name: find(name, robot) for _, _, name in _MODELS if name and name != _HARMONICS}
+    return {name: effect for name, effect in found.items() if effect is not None}
 
 
 def frames(robot: Robot) -> Effect:

@@ -79,12 +79,18 @@ def _calibrated(found, robot):
     return least_squares(residuals := select(found.measurements, robot, ["*"])), residuals.mechanism
 
 
+def _two_far_off(generator, most, farthest):
+    """Lost zeros (6,): up to `most`, two of them up to `farthest`."""
+    zeros = generator.uniform(-most, most, 6)
+    zeros[generator.choice(6, 2, replace=False)] = generator.uniform(-farthest, farthest, 2)
+    return zeros
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_lost_zeros_of_arms_are_found_with_frame_and_reflectors(seed, tmp_path):
     generator = np.random.default_rng(seed)
     made = _arm(generator)
-    zeros = generator.uniform(-0.06, 0.06, 6)
-    zeros[generator.choice(6, 2, replace=False)] = generator.uniform(-0.35, 0.35, 2)
+    zeros = _two_far_off(generator, 0.06, 0.35)
     found = _file(tmp_path, made, generator, zeros)
     check_measurements(made[0], found.measurements)
     assert (found.measurements["status"] == "ok").all()
@@ -105,8 +111,7 @@ def test_lost_zeros_of_arms_are_found_with_frame_and_reflectors(seed, tmp_path):
 def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_path):
     generator = np.random.default_rng(seed)
     made = _hexapod(generator)
-    zeros = generator.uniform(-20.0, 20.0, 6)
-    zeros[generator.choice(6, 2, replace=False)] = generator.uniform(-60.0, 60.0, 2)
+    zeros = _two_far_off(generator, 20.0, 60.0)
     fit, robot = _calibrated(_file(tmp_path, made, generator, zeros), made[0])
     assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
     assert any(note.startswith("leg ") and note.endswith(" mm") for note in mastering_notes(fit, robot))
