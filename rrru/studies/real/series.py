@@ -161,7 +161,8 @@ def _label(pattern: str, file: Path) -> str:
 
 def files(config: Mapping[str, Any], name: str) -> list[str]:
     """The files of a data set and of what describes its robot, none where they are not here."""
-    result, section = [one.file for one in found(config["real"], name)], config["real"]["sets"][name]
+    result = list(dict.fromkeys(one.file for one in found(config["real"], name)))
+    section = config["real"]["sets"][name]
     if "chain" in section:
         result += sorted({one.parent / section["chain"] for one in result})
     elif "robot" in section:
