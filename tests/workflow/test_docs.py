@@ -1,0 +1,91 @@
+"""Every code block of README and docs does what a reader would do with it.
+
+Python runs, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
+shell's lines `snakemake` is run dry, and `make` says what it would do. A comment `<!-- file: name -->` before a block
+is the name that a reader saves it under. `text` is not for running.
+"""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+
+from tests.places import ROOT
+from tests.workflow.folder import dry_run, link
+
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+_BLOCK = re.compile(r"(?:<!-- file: (\S+) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+def blocks(page):
+    """File name or "", language and text of every block of a page."""
+    return [match.groups(default="") for match in _BLOCK.finditer(page.read_text())]
+
+
+def _readers_folder(folder, results):
+    """What a reader has: the project, results of a run, and a file of a tracker's."""
+    link(folder)
+    for name in ("Makefile", "pyproject.toml", "requirements.lock"):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "results").symlink_to(results)
+    table = pd.read_csv(ROOT / "data/field_01.csv")
+    table.to_csv(folder / "my_file.csv", index=False)
+    names = {"trajectory": "path", "measured_x_mm": "X", "measured_y_mm": "Y", "measured_z_mm": "Z"}
+    table.rename(columns=names).to_csv(folder / "tracker.csv", index=False)
+    shutil.copy(ROOT / "data/linear_delta.json", folder / "my_printers.json")
+
+
+def _shell(line, folder):
+    """Exit code and output of a line, run dry."""
+    words = shlex.split(line, comments=True)
+    if not words or words[0] == ".":
+        return 0, ""
+    if words[0] == "make":
+        told = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
+        return told.returncode, told.stdout + told.stderr
+    assert words[:2] == ["snakemake", "--cores"], f"no way to try {line!r}"
+    told = words[3:]
+    split = told.index("--configfile") if "--configfile" in told else len(told)
+    return dry_run(folder, *told[:split], overlays=tuple(told[split + 1 :]))
+
+
+def _try(kind, text, folder, name):
+    """Run one block."""
+    if kind == "python":
+        command = [sys.executable, "-"]
+        told = subprocess.run(command, input=text, cwd=folder, capture_output=True, text=True, check=False)
+        assert told.returncode == 0, f"{text}\n{told.stderr}"
+    elif kind == "yaml":
+        (folder / name).write_text(text)
+        code, output = dry_run(folder, overlays=(name,))
+        assert code == 0, f"{text}\n{output}"
+    elif kind == "sh":
+        for line in text.splitlines():
+            code, output = _shell(line, folder)
+            assert code == 0, f"{line}\n{output}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_blocks_of_a_page_do_what_they_say(page, results, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(tmp_path))
+    _readers_folder(tmp_path, results)
+    for name, kind, text in blocks(page):
+        assert kind in ("python", "yaml", "sh", "text", "json", "xml"), f"{page.name}: a block of language {kind!r}"
+        if name:
+            (tmp_path / name).write_text(text)
+        _try(kind, text, tmp_path, name or "mine.yaml")
+
+
+def test_every_link_of_a_page_leads_somewhere():
+    """Files and headings that README and docs point to are there."""
+    broken = []
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)]+)\)", page.read_text()):
+            path = target.partition("#")[0]
+            if "://" not in target and not (page.parent / path).exists():
+                broken.append(f"{page.name}: {target}")
+    assert not broken
