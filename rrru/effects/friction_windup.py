@@ -1,4 +1,4 @@
-"""Friction wind-up: the drive train twists against friction, and unwinds and rewinds over a stretch after each reversal.
+"""Friction wind-up: the drive train twists against friction and, after each reversal, unwinds over a stretch of travel.
 
 Between motor and arm the train is a spring of stiffness k that carries the friction F of what it drives. Friction does
 not jump to its full size F_c when a drive turns back but builds up over a travel s of the drive (pre-sliding, by the
@@ -36,7 +36,7 @@ from rrru.parameters import Parameter, ParameterSet
 # a law of a campaign's circumstances: it is tested where a configuration names it
 BY_NAME_ONLY = True
 
-_SOURCE = {"rad": "Coulomb friction over stiffness, size assumed", "mm": "Coulomb friction over stiffness, size assumed"}
+_SOURCE = dict.fromkeys(("rad", "mm"), "Coulomb friction over stiffness, size assumed")
 _HIGHEST = {"rad": ("rad", 0.0, 0.01), "mm": ("mm", 0.0, 0.5)}
 _TYPICAL = {"rad": 2.5e-4, "mm": 0.01}
 _TRAVEL = {

@@ -157,12 +157,12 @@ def with_effects(attribution, effects):
         return attribution
     known = attribution.posterior.best_of(frozenset(effects))
     if known is None:
-        before = attribution.hypothesis
-        chosen = [k for k, term in enumerate(before.terms) if term.effect in effects]
-        terms = tuple(before.terms[k] for k in chosen)
-        found, levels = np.full(len(LEVELS), -np.inf), attribution.evidence.levels
-        found[levels], _ = attribution.evidence.independent(terms, levels)
-        known = Hypothesis(terms, found, before.strengths[:, chosen]), attribution.level
+        terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
+        found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+        levels = attribution.evidence.levels
+        found[levels], strengths[levels] = attribution.evidence.independent(terms, levels)
+        # what an unknown function took beside them is a discrepancy without it
+        known = Hypothesis(terms, found, strengths), int(found.argmax())
     hypothesis, level = known
     state, covariance = attribution.calibrated, _NO_COVARIANCE
     if hypothesis.terms:
