@@ -14,6 +14,7 @@ from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
+from rrru.gap.identify import with_seen
 from rrru.gap.noise_model import alike, fit_noise
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
@@ -195,6 +196,7 @@ def _rounds(case, calibrated, prior, stated):
         return under, linear, source
 
     case, linear, source = seen(case, state)
+    case, linear = with_seen(case, linear)
     evidence = case.evidence(linear)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
     # linear sim or a law's shape is still to be fitted
