@@ -25,9 +25,6 @@ from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_param
 from rrru.effects.protocol import Effect
 from rrru.parameters import ParameterSet
 
-# a law of a campaign's circumstances: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _SOURCE = "difference of diameters over four of them, or tilt squared over four, assumed"
 
 

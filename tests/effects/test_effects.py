@@ -38,10 +38,10 @@ _NAMES = (
     "thermal_growth",
     "servo_lag",
     "joint_axis_error",
+    "encoder_ovality",
+    "friction_windup",
 )
-# laws of a robot itself, or of its instrument, that are tested where a configuration names them
-_BY_NAME = ("friction_windup", "encoder_ovality", "tracker_scale")
-_LAWS = EFFECTS | {name: find(name, ROBOT) for name in _BY_NAME}
+_LAWS = EFFECTS | {"tracker_scale": find("tracker_scale", ROBOT)}
 _PERIODS = {"encoder_eccentricity": 1.0, "encoder_ovality": 2.0, "transmission_error": 50.0}
 _MOTION = VirtualRobot().motion(plan_of(FORWARD, REVERSE, LOADED, trajectories=(LINE, SPIRAL)), Rrru3().inverse)
 _SITES = len(ROBOT.legs.sites)

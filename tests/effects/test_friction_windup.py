@@ -102,6 +102,12 @@ def test_amplitudes_and_travel_of_a_drawn_robot_are_found():
     assert found.state.shape_values["friction_windup"]["travel_rad"] == pytest.approx(travel, rel=0.2)
 
 
+def test_it_holds_play_and_goes_with_it():
+    """Whoever rules play out must not get it back as wind-up over no travel."""
+    assert "friction_windup" in GapSettings().effects
+    assert not {"backlash", "friction_windup"} & set(GapSettings().without("backlash").effects)
+
+
 def test_play_stays_play_beside_it():
     widths = {"width1": 8e-4, "width2": 5e-4, "width3": 6e-4}
     found = _told(measure([ActiveEffect(find("backlash", ROBOT), widths)], seed=5))
