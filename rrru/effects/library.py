@@ -42,7 +42,10 @@ def _module(name):
 
 NAMES, BY_NAME_ONLY = _names()
 # effects that hold others as special cases: what they are told apart by is how few numbers do
-HOLDS = {"joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement")}
+HOLDS = {
+    "joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement"),
+    "friction_windup": ("backlash",),
+}
 
 
 def library(robot):

@@ -41,7 +41,19 @@ def _grown(motion, values):
     """
     strain, time_constant = values
     share = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
-    return Contribution(np.multiply.outer(share, motion.robot.legs.growth))
+    return Contribution(np.multiply.outer(share, lengths(motion.robot.legs)))
+
+
+def lengths(legs):
+    """Twists (sites, 6) that make every length longer by its own size: the lengths at each site."""
+    result = np.zeros((len(legs.sites), 6))
+    for leg in legs.legs:
+        for joint in leg.joints[1:]:
+            result[legs.site_numbers[joint.name], :3] = joint.turn.T @ joint.shift_mm
+        if leg.bar:
+            bar, end = (legs.site_numbers[name] for name in leg.bar_sites)
+            result[bar, 0], result[end, :3] = leg.bar.length_mm, -leg.bar.platform_mm
+    return result
 
 
 def for_robot(_robot):

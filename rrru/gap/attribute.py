@@ -14,6 +14,7 @@ from rrru.fit.residuals import Residuals
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
+from rrru.gap.identify import with_seen
 from rrru.gap.noise_model import alike, fit_noise
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
@@ -157,12 +158,12 @@ def with_effects(attribution, effects):
         return attribution
     known = attribution.posterior.best_of(frozenset(effects))
     if known is None:
-        before = attribution.hypothesis
-        chosen = [k for k, term in enumerate(before.terms) if term.effect in effects]
-        terms = tuple(before.terms[k] for k in chosen)
-        found, levels = np.full(len(LEVELS), -np.inf), attribution.evidence.levels
-        found[levels], _ = attribution.evidence.independent(terms, levels)
-        known = Hypothesis(terms, found, before.strengths[:, chosen]), attribution.level
+        terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
+        found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+        levels = attribution.evidence.levels
+        found[levels], strengths[levels] = attribution.evidence.independent(terms, levels)
+        # what an unknown function took beside them is a discrepancy without it
+        known = Hypothesis(terms, found, strengths), int(found.argmax())
     hypothesis, level = known
     state, covariance = attribution.calibrated, _NO_COVARIANCE
     if hypothesis.terms:
@@ -195,6 +196,7 @@ def _rounds(case, calibrated, prior, stated):
         return under, linear, source
 
     case, linear, source = seen(case, state)
+    case, linear = with_seen(case, linear)
     evidence = case.evidence(linear)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
     # linear sim or a law's shape is still to be fitted

@@ -39,8 +39,7 @@ def details_of(attribution, steps, residual_mm, generator, draws):
 def _attribute_rows(attribution):
     """Rows of `gap_attribute`: every effect of the library, none and unexplained."""
     beliefs, case = attribution.posterior, attribution.case
-    alone = attribution.held_out.predict((), [], 0).log_score
-    result = [_effect_row(attribution, name, alone) for name in case.effects]
+    result = [_effect_row(attribution, name) for name in case.effects]
     result += [
         {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
@@ -62,8 +61,8 @@ def where(attribution, effects):
     return ", ".join(dict.fromkeys(found))
 
 
-def _effect_row(attribution, name, alone):
-    """The row of one testable effect; alone (n,): log predictive score of the calibration alone."""
+def _effect_row(attribution, name):
+    """The row of one testable effect."""
     beliefs = attribution.posterior
     row = {"effect": name, "probability": beliefs.marginal(name), **_EMPTY}
     holding = [h for h in beliefs.hypotheses if name in h.effects]
@@ -76,6 +75,7 @@ def _effect_row(attribution, name, alone):
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
         level, held_out = int(single.evidence.argmax()), attribution.held_out
+        alone = held_out.predict((), [], level).log_score
         gained = held_out.predict(single.terms, single.strengths[level], level).log_score - alone
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
         row["heldout_gain"] = float(by_fold.sum())

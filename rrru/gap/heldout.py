@@ -27,12 +27,14 @@ class Prediction:
     """Predictions of left-out points.
 
     residual_mm (n, 3): what they get wrong; spread (n, 3, k): the part of it that one standard deviation of each of k
-    independent combinations of the fitted numbers makes; log_score (n,): under noise and this uncertainty.
+    independent combinations of the fitted numbers makes; left_mm2 (n, 3): variance of what no fit predicts, noise and
+    discrepancy, along the cosines of the series (n,) where these are told, else at each point.
     """
 
     residual_mm: np.ndarray
     spread: np.ndarray
-    noise_mm: float
+    left_mm2: np.ndarray
+    series: np.ndarray | None = None
 
     @property
     def uncertainty_mm2(self):
@@ -41,9 +43,16 @@ class Prediction:
 
     @property
     def log_score(self):
-        """Log predictive score (n,) under the instrument's noise and the prediction's own uncertainty."""
-        variance = self.noise_mm**2 + self.uncertainty_mm2 / 3.0
-        return -0.5 * (self.residual_mm**2).sum(axis=1) / variance - 1.5 * np.log(variance)
+        """Log predictive score (n,) under noise, discrepancy and the prediction's own uncertainty.
+
+        Of series it is that of their cosines, whose sum over a series is that of its points: what is smooth along a run
+        is one thing to foretell and not one at every point.
+        """
+        together = np.concatenate([self.residual_mm[..., None], self.spread], axis=-1)
+        if self.series is not None:
+            together, _ = along_runs(together, self.series)
+        variance = self.left_mm2 + (together[..., 1:] ** 2).sum(axis=-1)
+        return -0.5 * (together[..., 0] ** 2 / variance + np.log(variance)).sum(axis=-1)
 
 
 @dataclass(frozen=True)
@@ -90,7 +99,7 @@ class HeldOut:
             if uncertain:
                 half = unit[:, None] * np.linalg.inv(factor).T
                 spread[out] = np.concatenate([block[out] for block in blocks], axis=-1) @ half
-        return Prediction(residual, spread, self.case.noise_mm)
+        return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
 
     def _sums(self, level):
         """Sums of squares and products (K + 1, K + 1) of all columns and the data, by fold, at a level (an index)."""
@@ -129,18 +138,36 @@ class HeldOut:
         ends = np.cumsum([linear.base.shape[-1], *(columns.shape[-1] for columns in linear.columns.values())])
         return {key: slice(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
 
+    @cached_property
+    def _whole_runs(self):
+        """Whether every fold is of whole runs."""
+        run = self.case.series
+        return all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run))
+
+    def _left(self, level):
+        """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
+        noise, series = self.evidence.noise, self.case.series
+        misfit = (noise.mean_mm * LEVELS[level]) ** 2
+        if not self._whole_runs:
+            size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
+            return np.broadcast_to(size, self.evidence.linear.data.shape)
+        return noise.variance(self._wave, lengths(series)) + misfit * spectrum(self._wave)[:, None]
+
+    @cached_property
+    def _wave(self):
+        """Half-wave number (n,) of each row among the runs' cosines."""
+        return along_runs(self.evidence.linear.data, self.case.series)[1]
+
     def _weighted(self, level):
         """Weights (n, 3) and all columns with the data (n, 3, K + 1) in which a fit is an ordinary weighted one.
 
         Where folds are whole runs they are along these runs' cosines.
         """
-        linear, run, noise = self.evidence.linear, self.case.series, self.evidence.noise
+        linear = self.evidence.linear
         together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
-        size, misfit = noise.axis_mm**2 * (1.0 + noise.offset), (noise.mean_mm * LEVELS[level]) ** 2
-        if not all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run)):
-            return np.broadcast_to(1.0 / (size + misfit), linear.data.shape), together
-        together, wave = along_runs(together, run)
-        return 1.0 / (noise.variance(wave, lengths(run)) + misfit * spectrum(wave)[:, None]), together
+        if self._whole_runs:
+            together, _ = along_runs(together, self.case.series)
+        return 1.0 / self._left(level), together
 
 
 def within(run, at):

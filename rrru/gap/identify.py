@@ -3,12 +3,15 @@
 How much of it the calibration leaves, from what size on it is found, and which other effect could stand in for it.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from scipy.special import chdtri, chndtrinc
 
 # found 9 times of 10 at 1 % false alarms
 _POWER, _FALSE = 0.9, 0.01
+_HIDDEN = "the calibration takes it up entirely on these points"
 _UNKNOWN = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
 
 
@@ -20,6 +23,26 @@ def identify(case, linear):
     rows = [{"effect": name, **_row(case, name, *visible[name], bases)} for name in case.effects]
     rows += [{"effect": name, "testable": False, **_UNKNOWN, "note": note} for name, note in case.untestable.items()]
     return pd.DataFrame(rows)
+
+
+def with_seen(case, linear):
+    """The case without effects that even at their largest the calibration would hide, and the linearisation of it."""
+    base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
+    hidden = {}
+    for name, effect in case.effects.items():
+        largest = float(np.min(effect.coordinates.most / effect.coordinates.typical))
+        own = float(np.linalg.norm(_visible(case, linear, base, name)[1]))
+        if largest * own < case.noise_mm * np.sqrt(_needed(1)):
+            hidden[name] = _HIDDEN
+    library = {name: effect for name, effect in case.library.items() if name not in hidden}
+    columns = {key: column for key, column in linear.columns.items() if key[0] in library}
+    seen = replace(case, library=library, untestable=case.untestable | hidden)
+    return seen, replace(linear, columns=columns)
+
+
+def _needed(freedom):
+    """Square, over the noise, from which on an effect of so many degrees of freedom is found."""
+    return chndtrinc(chdtri(freedom, _FALSE), freedom, 1.0 - _POWER)
 
 
 def _visible(case, linear, base, name):
@@ -42,11 +65,10 @@ def _row(case, name, raw, visible, bases):
     share = np.sqrt(own / total) if total > 0.0 else 0.0
     row = {"testable": True, **_UNKNOWN, "visible_share": share, "note": ""}
     if share < 1e-6:
-        return row | {"testable": False, "note": "the calibration takes it up entirely on these points"}
+        return row | {"testable": False, "note": _HIDDEN}
     first = visible[:, : len(case.library[name].coordinates)]
     freedom = np.linalg.matrix_rank(first, tol=1e-6 * np.linalg.norm(first))
-    needed = chndtrinc(chdtri(freedom, _FALSE), freedom, 1.0 - _POWER)
-    row["detectable_mm"] = float(case.noise_mm * np.sqrt(needed / len(case)))
+    row["detectable_mm"] = float(case.noise_mm * np.sqrt(_needed(freedom) / len(case)))
     imitated = {other: float(((basis.T @ visible) ** 2).sum() / own) for other, basis in bases.items() if other != name}
     if imitated:
         best = max(imitated, key=imitated.get)

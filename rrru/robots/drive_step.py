@@ -1,11 +1,45 @@
 """Actuator values of a robot without a file: Newton steps, lengths of driven bars. Lengths in mm, angles in rad."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
+_STEPS, _REACHED_MM = 60, 1e-9
+# longest step as a share of the drives' ranges
+_LONGEST_STEP = 0.3
 
-def drive_step(at, ranks, lack_mm, turning_rad):
+
+def searched(robot, freedoms, position_mm, turn, twists, exactly):
+    """Actuator values (n, K) for positions (n, 3) of the tool by Newton's method from the home pose, NaN without end.
+
+    freedoms: as ranks of `_drive_step`; turn (n, 3, 3): orientations to come near to; twists (n or 1, sites, 6);
+    exactly: else positions are met as nearly as the drives can.
+    """
+    actuators = np.tile(robot.legs.home_drives, (len(position_mm), 1)).astype(float)
+    poses = robot.solve(actuators, np.tile(robot.legs.home_mm, (len(position_mm), 1)))
+    left = np.full(len(position_mm), np.inf)
+    low, high = np.asarray(robot.drive_range, dtype=float).T
+    for _ in range(_STEPS):
+        rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
+        if not len(rows):
+            break
+        at = robot.map(actuators[rows], poses.of(rows), twists)
+        lack = position_mm[rows] - robot.measured(at.poses, twists)
+        turning = Rotation.from_matrix(turn[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+        step, held = _drive_step(at, freedoms, lack, turning)
+        if not exactly:
+            # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
+            lack = (at.drive_response @ step[:, :, None])[:, :, 0]
+        left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
+        longest = (np.abs(step) / (high - low)).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
+        actuators[rows] += step
+        poses = robot.model.solve(actuators, poses, twists)
+    return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+
+
+def _drive_step(at, ranks, lack_mm, turning_rad):
     """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
 
     ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have. With the

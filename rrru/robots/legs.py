@@ -166,18 +166,6 @@ class Legs:
         """Number of every passive joint by its name."""
         return {joint.name: number for number, joint in enumerate(self.passive_joints)}
 
-    @cached_property
-    def growth(self):
-        """Twists (sites, 6) that make every length longer by its own size: the lengths at each site."""
-        result = np.zeros((len(self.sites), 6))
-        for leg in self.legs:
-            for joint in leg.joints[1:]:
-                result[self.site_numbers[joint.name], :3] = joint.turn.T @ joint.shift_mm
-            if leg.bar:
-                bar, end = (self.site_numbers[name] for name in leg.bar_sites)
-                result[bar, 0], result[end, :3] = leg.bar.length_mm, -leg.bar.platform_mm
-        return result
-
     def longest_mm(self, first=0):
         """Length of the longest leg from its joint of this number on, to the platform's frame."""
         bars = {leg: leg.bar.length_mm + np.linalg.norm(leg.bar.platform_mm) if leg.bar else 0.0 for leg in self.legs}

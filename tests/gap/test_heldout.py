@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.fft import dct
-from scipy.stats import norm
+from scipy.stats import multivariate_normal, norm
 
 from rrru.campaign.noise import isolated
 from rrru.errors import ConfigError
@@ -213,7 +213,21 @@ def test_single_spikes_are_isolated_and_smooth_gaps_and_noise_are_not(full):
 def test_the_score_of_a_prediction_is_a_normal_density():
     generator = np.random.default_rng(3)
     residual, spread = generator.normal(size=(5, 3)), generator.normal(size=(5, 3, 2))
-    told = Prediction(residual, spread, 0.4)
-    width = np.sqrt(0.4**2 + (spread**2).sum(axis=(1, 2)) / 3.0)
-    expected = norm.logpdf(residual, scale=width[:, None]).sum(axis=1) + 1.5 * np.log(2.0 * np.pi)
-    np.testing.assert_allclose(told.log_score, expected, rtol=1e-12)
+    left = generator.uniform(0.1, 1.0, (5, 3))
+    width = np.sqrt(left + (spread**2).sum(axis=2))
+    expected = norm.logpdf(residual, scale=width).sum(axis=1) + 1.5 * np.log(2.0 * np.pi)
+    np.testing.assert_allclose(Prediction(residual, spread, left).log_score, expected, rtol=1e-12)
+
+
+def test_of_runs_it_is_the_density_of_what_is_correlated_along_them():
+    generator, series = np.random.default_rng(4), np.repeat([1, 2], [6, 9])
+    residual, left = generator.normal(size=(15, 3)), generator.uniform(0.1, 5.0, (15, 3))
+    score, expected = Prediction(residual, np.zeros((15, 3, 0)), left, series).log_score, []
+    for label, count in ((1, 6), (2, 9)):
+        here, cosines = series == label, dct(np.eye(count), axis=0, norm="ortho")
+        for axis in range(3):
+            covariance = cosines.T @ np.diag(left[here, axis]) @ cosines
+            density = multivariate_normal.logpdf(residual[here, axis], cov=covariance)
+            expected.append(density + 0.5 * count * np.log(2.0 * np.pi))
+    assert score[series == 1].sum() == pytest.approx(sum(expected[:3]), rel=1e-9)
+    assert score[series == 2].sum() == pytest.approx(sum(expected[3:]), rel=1e-9)
