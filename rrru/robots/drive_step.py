@@ -1,8 +1,42 @@
 """Actuator values of a robot without a file: Newton steps, lengths of driven bars. Lengths in mm, angles in rad."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rrru.robots.walk import Poses, Twists, bar_ends, walk
+
+# an inverse has at most so many steps, and the longest is so large a share of the drives' ranges
+_STEPS, _REACHED_MM, _LONGEST_STEP = 60, 1e-9, 0.3
+
+
+def drives_at(robot, place, start, twists, nearest=True):
+    """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
+
+    place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
+    them; start: actuator values (n, K) and positions (n, 3) near which to look; nearest: whether positions may be met
+    as nearly as the drives can.
+    """
+    (position, wanted), (actuators, near) = place, start
+    poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
+    low, high = np.asarray(robot.drive_range, dtype=float).T
+    for _ in range(_STEPS):
+        rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
+        if not len(rows):
+            break
+        own = twists[rows] if len(twists) > 1 else twists
+        at = robot.map(actuators[rows], poses.of(rows), own)
+        lack = position[rows] - robot.measured(at.poses, own)
+        turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+        step, held = drive_step(at, robot.freedoms, lack, turning)
+        if nearest:
+            # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
+            lack = (at.drive_response @ step[:, :, None])[:, :, 0]
+        left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
+        longest = (np.abs(step) / (high - low)).max(axis=1, keepdims=True)
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
+        actuators[rows] += step
+        poses = robot.model.solve(actuators, poses, twists)
+    return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
 
 def drive_step(at, ranks, lack_mm, turning_rad):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import geometric_numbers
-from rrru.robots.drive_step import bar_lengths, drive_step, end_of
+from rrru.robots.drive_step import bar_lengths, drives_at, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
@@ -24,9 +24,8 @@ from rrru.robots.robot import Robot
 SETS = ("frame", "zero", "full")
 # poses over which a number has to be told from the others, their tilt, and the share of it that must be left
 _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
-_STEPS, _REACHED_MM = 60, 1e-9
-# longest step of an inverse as a share of the drives' ranges; singular values below this share are none
-_LONGEST_STEP, _SEEN = 0.3, 1e-6
+# singular values below this share are none
+_SEEN = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +176,7 @@ class GeneralRobot(Robot):
     @property
     def orients(self):
         """Whether its drives can orient its platform beside moving it."""
-        return self._freedoms[1] > 0
+        return self.freedoms[1] > 0
 
     @property
     def size_mm(self):
@@ -198,27 +197,9 @@ class GeneralRobot(Robot):
         if self._bars_only:
             place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
             return bar_lengths(self.legs, self.drive_range, place, twists)
-        actuators = np.tile(self.legs.home_drives, (len(position), 1)).astype(float)
-        poses = self.solve(actuators, np.tile(self.legs.home_mm, (len(position), 1)))
-        left = np.full(len(position), np.inf)
-        low, high = np.asarray(self.drive_range, dtype=float).T
-        for _ in range(_STEPS):
-            rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
-            if not len(rows):
-                break
-            at = self.map(actuators[rows], poses.of(rows), twists)
-            lack = position[rows] - self.measured(at.poses, twists)
-            turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
-            step, held = drive_step(at, self._freedoms, lack, turning)
-            if deviations is not None:
-                # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
-                lack = (at.drive_response @ step[:, :, None])[:, :, 0]
-            left[rows] = np.linalg.norm(lack, axis=1) + self.angle_arm_mm * held
-            longest = (np.abs(step) / (high - low)).max(axis=1, keepdims=True)
-            step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
-            actuators[rows] += step
-            poses = self.model.solve(actuators, poses, twists)
-        return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+        count = len(position)
+        start = np.tile(self.legs.home_drives, (count, 1)).astype(float), np.tile(self.legs.home_mm, (count, 1))
+        return drives_at(self, (position, wanted), start, twists, deviations is not None)
 
     def own_load(self, _masses, motion, poses):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
@@ -244,7 +225,7 @@ class GeneralRobot(Robot):
         return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
 
     @cached_property
-    def _freedoms(self):
+    def freedoms(self):
         """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
         actuators, position = (part[:10] for part in self._workspace())
         poses = self.solve(actuators, position)
