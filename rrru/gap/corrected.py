@@ -5,34 +5,35 @@ is the stiffness of the drives and `backlash` their play. Anything else a file c
 that it does not carry itself. The model stands in the frame of the measurements. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.effects.library import find
-from rrru.effects.protocol import Contribution
 from rrru.gap.details import parameter_rows
-from rrru.gap.shrink import model_rows
 from rrru.gap.uncertainty import one_sigma_steps
-from rrru.robots.catalogue import make_mechanism
 from rrru.robots.file_changes import Found
-from rrru.robots.legs import TOOL, WORLD
-from rrru.robots.readings import lacking
+from rrru.robots.to_mjcf import to_mjcf
+from rrru.robots.to_urdf import to_urdf
 
-# the file's keys that hold an effect, by the stem of its parameters
+# what a drive's numbers in a file are, by the effect and the stem of its parameters
 _COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
+_HALF = 0.5
 
 
 @dataclass(frozen=True)
 class Corrected:
-    """text: of the corrected file; not_in_model: what it cannot hold, in words; found: what went into it."""
+    """A corrected file.
+
+    text; not_in_model: what it cannot hold, in words; found: what there is to hold; in_file: values by parameter of the
+    effects that it holds beside geometry.
+    """
 
     text: str
     not_in_model: tuple
     found: Found
+    in_file: dict = field(default_factory=dict)
 
 
 def found_of(attribution):
@@ -85,14 +86,14 @@ def corrected(attribution, section, folder):
 
     Raises ConfigError for a file whose bodies do not all stand in it as such.
     """
-    from rrru.robots.to_mjcf import to_mjcf
-    from rrru.robots.to_urdf import to_urdf
-
     found, others = found_of(attribution)
-    if "mjcf" in section:
-        text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
-    else:
+    if attribution.posterior.probability_unexplained > _HALF:
+        others.append("unexplained")
+    if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
-    unexplained = ["unexplained"] if attribution.posterior.probability_unexplained > 0.5 else []
-    return Corrected(text, (*others, *lost, *unexplained), found)
+        return Corrected(text, (*others, *lost), found)
+    text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
+    drives = ((*_COMPLIANCE, found.compliance), (*_PLAY, found.play))
+    held = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
+    return Corrected(text, (*others, *lost), found, held)

@@ -152,6 +152,7 @@ def _row(
         "points": case.count,
         "dropped_points": attribution.dropped,
         "notes": "; ".join(_notes(attribution, stated_mm)),
+        "not_in_model": "",
     }
 
 

@@ -10,7 +10,6 @@ from rrru.robots.from_mjcf import plays_of
 from rrru.robots.xml_text import own_children, words
 
 _STEPS, _CLOSED_M = 30, 1e-12
-_EQUALITY = mujoco.mjtConstraint.mjCNSTR_EQUALITY
 
 
 def closed_qpos(model, qpos, held):
@@ -22,11 +21,11 @@ def closed_qpos(model, qpos, held):
     for _ in range(_STEPS):
         for step in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_makeConstraint):
             step(model, data)
-        rows = data.efc_type == _EQUALITY
-        lack = data.efc_pos[rows]
-        if not len(lack) or np.abs(lack).max() < _CLOSED_M:
+        # equalities come before all other constraints
+        lack = data.efc_pos[: data.ne]
+        if np.abs(lack).max(initial=0.0) < _CLOSED_M:
             break
-        slope, change = data.efc_J.reshape(-1, model.nv)[rows][:, free], np.zeros(model.nv)
+        slope, change = data.efc_J.reshape(-1, model.nv)[: data.ne, free], np.zeros(model.nv)
         change[free] = -np.linalg.lstsq(slope, lack, rcond=1e-9)[0]
         mujoco.mj_integratePos(model, data.qpos, change, 1.0)
     return data.qpos.copy()
