@@ -20,7 +20,7 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # ASSUME friction holds an arm within its play against this many times its load at home and its share of all weight
 _HOLDS = 2.0
 # what hangs in a clearance swings as a pendulum of that length, damped by this share of the critical
-_SWINGING, _G = 0.1, 9.81
+_SWINGING, _G = 0.5, 9.81
 
 
 def _zero_offset(edit, site, size):
