@@ -20,7 +20,7 @@ from rrru.robots.from_seams import Move, placed, undone
 from rrru.robots.legs import TOOL, WORLD
 
 _BALL = mujoco.mjtJoint.mjJNT_BALL
-_NOTHING = np.zeros(6)
+_NOTHING, _STAYS = np.zeros(6), (np.eye(4), "")
 # smaller changes, in mm and rad, are rounding
 SAME = 1e-10
 
@@ -111,9 +111,9 @@ def _frames(found, twists):
 
 
 def _between(structure, twists, lost):
-    """Placements by number of the seam and of its item before which they act, from near to far; and the platform's.
+    """Placements by number of the seam and of its item before which they act, from near to far, each with its site.
 
-    The latter is what a chain's end turns of a platform that is fixed to the last body, else None.
+    And what a chain's end changes of the place of a platform that is fixed to the last body, None where it is not.
     """
     assembly, own = structure.assembly, _of_chains(structure, twists)
     base = placement_of(twists.get(WORLD, _NOTHING)) @ own.get(structure.open_legs.legs[0].joints[0].name, np.eye(4))
@@ -128,7 +128,7 @@ def _between(structure, twists, lost):
                 if site in own:
                     seat = structure.chains.seats[site]
                     acts = seat @ own[site] @ undone(seat)
-                    at[k if forward else k + 1] = acts if forward else undone(acts)
+                    at[k if forward else k + 1] = (acts if forward else undone(acts)), site
             part = seam.other(part)
         first, last, end = path[0], path[-1], own.get(leg.joints[-1].name, np.eye(4))
         _at_end(result, assembly.seams[first], first, assembly.base, base)
@@ -144,9 +144,9 @@ def _between(structure, twists, lost):
 def _at_end(result, seam, number, part, placement):
     """Enter what moves a seam's end at a part, seen from there."""
     if part == seam.near:
-        result[number][0] = placement
+        result[number][0] = placement, ""
     else:
-        result[number][len(seam.items)] = undone(placement)
+        result[number][len(seam.items)] = undone(placement), ""
 
 
 def _hangs_on(assembly, last):
@@ -184,10 +184,10 @@ def _of_body(assembly, seam, between, lost):
         places.append(here @ undone(item) if k in balls else here)
         here = here if isinstance(item, Move) or k in balls else here @ item
     places.append(here)
-    for k, placement in sorted(between.items()):
+    for k, (placement, site) in sorted(between.items()):
         before, behind = ([m for at, m in moves if (at < k) == side] for side in (True, False))
         if before and behind and before[-1].joint == behind[0].joint:
-            _lose(lost, before[-1], placement)
+            _lose(lost, site, placement)
             continue
         slot = before[-1].joint - first + 1 if before else 0
         acts = places[k] @ placement @ undone(places[k])
@@ -201,12 +201,12 @@ def _anchors(assembly, seam, between, lost):
     near, far = np.eye(4), np.eye(4)
     for k, item in enumerate(seam.items):
         if k > moves[-1]:
-            far = far @ between.get(k, np.eye(4)) @ item
+            far = far @ between.get(k, _STAYS)[0] @ item
         elif k <= moves[0]:
-            near = near @ between.get(k, np.eye(4)) @ (np.eye(4) if k == moves[0] else item)
+            near = near @ between.get(k, _STAYS)[0] @ (np.eye(4) if k == moves[0] else item)
         elif k in between:
-            _lose(lost, item, between[k])
-    far = far @ between.get(len(seam.items), np.eye(4))
+            _lose(lost, between[k][1], between[k][0])
+    far = far @ between.get(len(seam.items), _STAYS)[0]
     moved = {
         seam.near: near @ undone(seam.items[0]),
         seam.far: undone(far) @ seam.items[moves[-1] + 1] @ seam.items[-1],
@@ -221,7 +221,7 @@ def _anchors(assembly, seam, between, lost):
     return result
 
 
-def _lose(lost, move, placement):
+def _lose(lost, site, placement):
     """Note what shifts one axis of a ball joint against another."""
     if np.abs(placement[:3, 3]).max() > 0.0:
-        lost.append(f"{move.name}: the axes of a ball joint meet in a point")
+        lost.append(f"{site}: the axes of a ball joint meet in a point")
