@@ -42,7 +42,7 @@ def corrected_drives(attribution, masses):
     for approach in (-1, 1):
         told = nominal
         for _ in range(_LOOKS):
-            motion = _at_rest(robot, masses, (position, told, payload, end_s), approach)
+            motion = at_rest(robot, masses, (position, told, payload, end_s), approach)
             twists = robot.twists(attribution.state.deviations) + _change(attribution, motion)
             told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
         found[approach] = told
@@ -74,7 +74,7 @@ def _grid(commands):
     return points[far <= _NEAR], number[far <= _NEAR]
 
 
-def _at_rest(robot, masses, state, approach):
+def at_rest(robot, masses, state, approach):
     """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side."""
     position, drive, payload, end_s = state
     count, nothing = len(position), np.zeros_like(position)

@@ -188,7 +188,7 @@ Which drive values bring the robot, as diagnosed, to where it is commanded: on a
 campaigns whose robot is an MJCF or a URDF. Each drive has a column of its nominal value and one of the corrected.
 --
 point                  int    number of the grid's point
-approach               int    1: all drives come from smaller values, -1: from larger ones, 0: both alike {-1, 0, 1}
+approach               int    1: all drives come from smaller values, -1: from larger ones, 0: both alike
 command_{xyz}_mm       float  where the tool shall stand, robot frame
 command_r{xyz}_rad     float  the platform's orientation there, that of the nearest measured point, rotation vector
 payload_kg             float  the campaign's largest
