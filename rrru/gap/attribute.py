@@ -154,9 +154,10 @@ def attribute(case, prior, stated=KNOWN):
 
 def with_effects(attribution, effects):
     """The attribution with hypothesis and state of exactly the named effects, fitted anew; the posterior stays."""
-    if attribution.hypothesis.effects == frozenset(effects):
+    same = attribution.hypothesis.effects == frozenset(effects)
+    if same and set(attribution.state.effects) <= {(t.effect, t.shape) for t in attribution.hypothesis.terms}:
         return attribution
-    known = attribution.posterior.best_of(frozenset(effects))
+    known = (attribution.hypothesis, attribution.level) if same else attribution.posterior.best_of(frozenset(effects))
     if known is None:
         terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
         found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))

@@ -176,6 +176,12 @@ class Case:
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
         return rows.measured(self.measurements) - model
 
+    def by_other(self, robot, poses, twists):
+        """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
+        if self._readings is not None:
+            return self._of_rows(lacking(robot, self._readings, poses, twists))
+        return self._of_rows(rows.measured(self.measurements) - robot.measured(poses, twists))
+
     def residual(self, state):
         """`left` of the used points (m, 3)."""
         return self._of_rows(self.left(state))

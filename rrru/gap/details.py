@@ -10,6 +10,7 @@ from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import sites, spread
+from rrru.gap.uncertainty import coefficient_covariance, covariance_of, fitted_terms
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 
@@ -31,7 +32,7 @@ def details_of(attribution, steps, residual_mm, generator, draws):
         "gap_attribute": _attribute_rows(attribution),
         "gap_sets": _set_rows(attribution),
         "gap_shrink": shrink_table(case, steps, exact),
-        "gap_parameters": _parameter_rows(attribution),
+        "gap_parameters": parameter_rows(attribution),
         "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
     }
 
@@ -111,24 +112,23 @@ def _set_rows(attribution):
     return pd.DataFrame(result)
 
 
-def _parameter_rows(attribution):
-    """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors."""
+def parameter_rows(attribution):
+    """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
     parameters, state = attribution.case.mechanism.parameters, attribution.state
+    sizes = np.sqrt(np.diag(covariance_of(attribution))[: len(parameters)])
     result = [
-        ("calibration", parameter.name, parameter.unit, value, np.nan, False)
-        for parameter, value in zip(parameters, state.deviations, strict=True)
+        ("calibration", parameter.name, parameter.unit, value, error, False)
+        for parameter, value, error in zip(parameters, state.deviations, sizes, strict=True)
     ]
-    start, library = 0, attribution.case.library
-    for term in attribution.hypothesis.terms:
+    start, library, found = 0, attribution.case.library, coefficient_covariance(attribution)
+    for term in fitted_terms(attribution):
         key, effect = (term.effect, term.shape), library[term.effect]
-        if key not in state.effects:
-            break
         shape, coordinates = state.shape(library, key), state.effects[key]
         matrix = spread(effect.coordinates, term.legs)
         own = slice(start, start + matrix.shape[1])
         start = own.stop
         slope = _slope(effect, coordinates, shape)
-        covariance = slope @ (matrix @ attribution.covariance[own, own] @ matrix.T) @ slope.T
+        covariance = slope @ (matrix @ found[own, own] @ matrix.T) @ slope.T
         errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         values = effect.coordinates.to_values(coordinates, shape)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)

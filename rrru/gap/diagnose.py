@@ -152,6 +152,7 @@ def _row(
         "points": case.count,
         "dropped_points": attribution.dropped,
         "notes": "; ".join(_notes(attribution, stated_mm)),
+        "not_in_model": "",
     }
 
 
@@ -171,7 +172,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
         worse = {name for name, gain in _gains(fitted, verdict.effects).items() if gain < least}
         if not worse:
-            return verdict, fitted, ordered if same else order_by_share(fitted)
+            return verdict, with_effects(fitted, verdict.effects), ordered if same else order_by_share(fitted)
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
 

@@ -231,6 +231,15 @@ class ModelEvidence:
         precision = problem.gram[0] + np.diag(problem.scale(np.asarray(strengths)[None])[0] ** -2.0)
         return posterior_mean(precision, moment, positive), np.linalg.inv(precision)
 
+    def calibration(self, terms, level):
+        """Covariance (p, p) of the calibration's deviations at known coefficients of terms, and how they follow these.
+
+        The latter is (p, k), in the order of the coefficients of `coefficients` without those of shapes.
+        """
+        covariance, follows = self._whitened.of_calibration(level)
+        index = [number for term in terms for number in self._prior(term).index]
+        return covariance, follows[:, index]
+
 
 def averaged(value, terms):
     """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""

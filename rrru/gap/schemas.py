@@ -45,6 +45,8 @@ noise_from             str    given: by the configuration, as known; fitted: aro
 points                 int    points diagnosed
 dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing
+not_in_model           str    what was found and the robot's corrected file cannot hold; empty where nothing, or where
+    the robot has no file
 
 ## gap_budget | tables/gap_budget.parquet | campaign part
 What the gap's mean square is made of. Shares add up to 1; calibration is no part of what is measured on fitted points
@@ -126,7 +128,8 @@ added                  str    effect added at this step; empty at 0
 effects                str    all effects so far, joined by +, or none
 trajectory             str    trajectory, * for all
 kind                   str    held_out: on runs that were not fitted on; resimulated: fitted on all runs, through the
-    full spatial closure {held_out, resimulated}
+    full spatial closure; given_model, corrected_model: the robot's file as it came, and as it is written back, on all
+    runs {held_out, resimulated, given_model, corrected_model}
 points
 rms_mm                 float  measured minus sim
 max_mm                 float  largest distance
@@ -148,7 +151,7 @@ campaign effect
 parameter              str    name of the parameter
 unit                   str    unit of the value
 value                  float  fitted value
-standard_error         float? 1 sigma, correlated among them; null for shapes, calibration and what was not fitted
+standard_error         float? 1 sigma, correlated among them; null for shapes and what was not fitted
 at_bound               bool   true where the fit ended at a bound
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank
@@ -180,6 +183,17 @@ to_{xyz}_mm            float  where it ends
 speed_mm_s             float? speed in the middle, to which the robot speeds up evenly; null where any will do
 payload_kg             float  payload
 
+## corrected_drives | campaigns/{campaign}/corrected_drives.parquet | point approach
+Which drive values bring the robot, as diagnosed, to where it is commanded: on a grid over the measured region, of
+campaigns whose robot is an MJCF or a URDF. Each drive has a column of its nominal value and one of the corrected.
+--
+point                  int    number of the grid's point
+approach               int    1: all drives come from smaller values, -1: from larger ones, 0: both alike
+command_{xyz}_mm       float  where the tool shall stand, robot frame
+command_r{xyz}_rad     float  the platform's orientation there, that of the nearest measured point, rotation vector
+payload_kg             float  the campaign's largest
+time_s                 float  since the campaign's start: its end, as warm the robot is
+
 ## gap_points | campaigns/{campaign}/gap_points.parquet | run point
 The gap at every commanded point, before and after the effects are added to the sim.
 --
@@ -200,11 +214,14 @@ used                   bool   false where the diagnosis left the point out
 
 
 def tables_of(robot):
-    """The tables of the diagnosis, `gap_points` with a column for every drive of a robot with more than three."""
+    """The tables of the diagnosis, with the columns of the robot's own drives."""
     more = range(4, len(robot.parts.drives) + 1)
     text = "before, as equivalent error of drive {}; null for drives of another unit and near singularities"
     own = [Column(f"drive_error{k}_{u}", "float64", text.format(k), True) for u in ("rad", "mm") for k in more]
+    drives = [drive.column for drive in robot.parts.drives]
+    told = [Column(name, "float64", f"nominal value {name}") for name in drives]
+    told += [Column(f"corrected_{name}", "float64", f"corrected value {name}") for name in drives]
+    added = {"gap_points": own, "corrected_drives": told}
     return tuple(
-        replace(table, columns=(*table.columns[:-1], *own, table.columns[-1])) if table.name == "gap_points" else table
-        for table in TABLES
+        replace(table, columns=(*table.columns[:-1], *added.get(table.name, ()), table.columns[-1])) for table in TABLES
     )

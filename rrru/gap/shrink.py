@@ -111,6 +111,22 @@ def shrink_table(case, steps, resimulated_mm):
     return pd.DataFrame(rows)
 
 
+def model_row(shrink, kind, left_mm, noise_mm):
+    """A row of `gap_shrink` of a robot's file, given_model or corrected_model, beside the other rows.
+
+    left_mm (m, 3): measured minus the file's robot, NaN where it was not driven; noise_mm: per axis.
+    """
+    last, noise = shrink["step"].max(), float(np.sqrt(3.0) * noise_mm)
+    own = shrink[(shrink["step"] == (0 if kind == "given_model" else last)) & (shrink["kind"] == "held_out")].iloc[0]
+    start = float(shrink.loc[(shrink["step"] == 0) & (shrink["trajectory"] == "*"), "gap_rms_mm"].iloc[0])
+    left = left_mm[np.isfinite(left_mm).all(axis=1)]
+    after = gap_rms((left**2).sum(axis=1) - noise**2)
+    share = (np.nan if kind == "given_model" else _share(start, after)), np.nan, np.nan
+    label = {name: own[name] for name in ("step", "added", "effects")} | {"trajectory": "*", "kind": kind}
+    sizes = _sizes(left) | {"noise_rms_mm": noise, "gap_rms_mm": after}
+    return label | sizes | dict(zip(CLOSED, share, strict=True))
+
+
 def _label(number, step, trajectory, kind):
     """What a row of `gap_shrink` is about."""
     effects = "+".join(step.effects) or "none"

@@ -16,6 +16,8 @@ from rrru.gap.terms import EACH, SAME, per_leg, spread
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
 _HALF_WAVES, _WHITE = 3.0, 0.01
+# what the points see less of than this, as a share of what they see best, they do not see
+_UNSEEN = 1e-12
 
 
 def spectrum(wave):
@@ -81,16 +83,31 @@ class Whitened:
         """Grams of the levels that have been asked for."""
         return {}
 
+    def _white(self, level):
+        """Whitened columns (m, k), of which the first p are the calibration's; variances; and p."""
+        (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+        own = self.noise.variance(wave, lengths(self.run)) / unit**2
+        variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
+        return (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1]), variance, p
+
+    def of_calibration(self, level):
+        """Covariance (p, p) of the deviations at a level (an index) where all coefficients are known.
+
+        And by how much they follow each coefficient (p, k).
+        """
+        white, _, p = self._white(level)
+        basis, triangle = np.linalg.qr(white[:, :p])
+        inverse = np.linalg.pinv(triangle, rcond=_UNSEEN)
+        follows = -inverse @ (basis.T @ white[:, p:-1])
+        return inverse @ inverse.T, np.concatenate([follows, follows @ self.layout[1]], axis=1)
+
     def gram(self, level):
         """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
 
         The calibration is projected out.
         """
         if level not in self._made:
-            (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
-            own = self.noise.variance(wave, lengths(self.run)) / unit**2
-            variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
-            white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
+            white, variance, p = self._white(level)
             basis, triangle = np.linalg.qr(white[:, :p])
             rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
             gram, sums = rest.T @ rest, self.layout[1]

@@ -5,30 +5,30 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
-_STEPS, _REACHED_MM = 60, 1e-9
-# longest step as a share of the drives' ranges
-_LONGEST_STEP = 0.3
+# an inverse has at most so many steps, and the longest is so large a share of the drives' ranges
+_STEPS, _REACHED_MM, _LONGEST_STEP = 60, 1e-9, 0.3
 
 
-def searched(robot, freedoms, position_mm, turn, twists, exactly):
-    """Actuator values (n, K) for positions (n, 3) of the tool by Newton's method from the home pose, NaN without end.
+def drives_at(robot, place, start, twists, nearest=True):
+    """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
-    freedoms: as ranks of `_drive_step`; turn (n, 3, 3): orientations to come near to; twists (n or 1, sites, 6);
-    exactly: else positions are met as nearly as the drives can.
+    place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
+    them; start: actuator values (n, K) and positions (n, 3) near which to look; nearest: whether positions may be met
+    as nearly as the drives can.
     """
-    actuators = np.tile(robot.legs.home_drives, (len(position_mm), 1)).astype(float)
-    poses = robot.solve(actuators, np.tile(robot.legs.home_mm, (len(position_mm), 1)))
-    left = np.full(len(position_mm), np.inf)
+    (position, wanted), (actuators, near) = place, start
+    poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
     low, high = np.asarray(robot.drive_range, dtype=float).T
     for _ in range(_STEPS):
         rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
         if not len(rows):
             break
-        at = robot.map(actuators[rows], poses.of(rows), twists)
-        lack = position_mm[rows] - robot.measured(at.poses, twists)
-        turning = Rotation.from_matrix(turn[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
-        step, held = _drive_step(at, freedoms, lack, turning)
-        if not exactly:
+        own = twists[rows] if len(twists) > 1 else twists
+        at = robot.map(actuators[rows], poses.of(rows), own)
+        lack = position[rows] - robot.measured(at.poses, own)
+        turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+        step, held = drive_step(at, robot.freedoms, lack, turning)
+        if nearest:
             # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
             lack = (at.drive_response @ step[:, :, None])[:, :, 0]
         left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
@@ -39,7 +39,7 @@ def searched(robot, freedoms, position_mm, turn, twists, exactly):
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
 
-def _drive_step(at, ranks, lack_mm, turning_rad):
+def drive_step(at, ranks, lack_mm, turning_rad):
     """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
 
     ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have. With the

@@ -28,12 +28,21 @@ class Place:
     placement: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Where a leg was cut to end in a bar: the joint behind the bar, by its name, and the bar's line in its frame."""
+
+    behind: str
+    along: np.ndarray
+
+
 class Chains:
     """The legs of an Assembly as chains of joints.
 
     driven: MuJoCo's numbers of joints in the order of the driven values; offsets: by joint what is added to its value.
 
-    legs: the chains; assembly; parts: Places by part; sites: of the Moves, by their names.
+    legs: the chains; assembly; parts: Places by part; sites: of the Moves, by their names; seats: by site the placement
+    of the joint's frame in the Move's.
     """
 
     def __init__(self, assembly, driven, offsets):
@@ -41,7 +50,7 @@ class Chains:
         self._offsets = offsets
         names = [f"leg {k}" for k in range(1, len(assembly.paths) + 1)] if len(assembly.paths) > 1 else ["arm"]
         self._taken = {WORLD, TOOL, PLATFORM, *(f"{name} {end}" for name in names for end in ("ball", "bar", "end"))}
-        self._made, self.parts, self.legs = {}, {}, ()
+        self._made, self.parts, self.legs, self.seats = {}, {}, (), {}
         self.sites = {name: self._unique(name) for name in assembly.moves}
         base = Joint(self._unique("base"))
         for name, path in zip(names, assembly.paths, strict=True):
@@ -84,11 +93,13 @@ class Chains:
             x /= np.linalg.norm(x)
             turn = np.stack([x, np.cross(move.axis, x), move.axis], axis=1)
         if key not in self._made:
-            own = placement @ placed(turn=turn)
+            seat = placed(turn=turn)
             drive = self._drives.get(move.joint)
             axis = move.axis if np.array_equal(turn, np.eye(3)) else Z
             if offset := self._offsets.get(move.joint, 0.0):
-                own = own @ (placed(turn=turn_about(axis, offset)) if move.kind == "R" else placed(offset * axis))
+                seat = seat @ (placed(turn=turn_about(axis, offset)) if move.kind == "R" else placed(offset * axis))
+            own = placement @ seat
+            self.seats[self.sites[move.name]] = seat
             home = 0.0 if drive is not None else move.home
             self._made[key] = Joint(self.sites[move.name], move.kind, axis, own[:3, 3], own[:3, :3], drive, home)
         return self._made[key], placed(turn=turn.T)
@@ -107,25 +118,25 @@ class Chains:
 
 
 def with_bars(legs):
-    """The legs of Legs, those that end in bars as such, at the home pose."""
+    """The legs of Legs, those that end in bars as such, at the home pose, and of these the Cuts by number."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
     ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
     alone = {group[0] for group in groups_of(legs) if len(group) == 1}
-    return tuple(
-        _with_bar(leg, ways[k], legs.driven(actuators)[0]) if k in alone else leg for k, leg in enumerate(legs.legs)
-    )
+    drives = legs.driven(actuators)[0]
+    each = [_with_bar(leg, ways[k], drives) if k in alone else (leg, None) for k, leg in enumerate(legs.legs)]
+    return tuple(leg for leg, _ in each), {number: cut for number, (_, cut) in enumerate(each) if cut}
 
 
 def _with_bar(leg, way, drives):
-    """A leg as one that ends in a bar, if it does; way: its Walk at the driven values `drives`."""
+    """A leg as one that ends in a bar and its Cut, None if it does not; way: its Walk at the driven values `drives`."""
     first = next((k for k, joint in enumerate(leg.joints) if joint.passive), None)
     tail = range(first or 0, len(leg.joints) - 1)
     slides = [k for k in tail if leg.joints[k].kind == "P"]
     turns = [k for k in tail if leg.joints[k].passive and leg.joints[k].kind == "R"]
     if first is None or len(turns) + len(slides) < len(tail) or len(turns) not in (5, 6) or len(slides) > 1:
-        return leg
+        return leg, None
     if rank_of(np.stack([screw(leg.joints[k], way.axes[k], way.places[k])[0] for k in turns], axis=1)) != 5:
-        return leg
+        return leg, None
     for cut in [sum(k < slides[0] for k in turns)] if slides else (2, 3):
         near, far = (_meeting(way, part) for part in (turns[:cut], turns[cut:]))
         if near is None or far is None:
@@ -134,14 +145,16 @@ def _with_bar(leg, way, drives):
         if slides:
             slide, axis = leg.joints[slides[0]], way.axes[slides[0]][0]
             if slide.drive is None or np.linalg.norm(far - near - length * axis) > _ALONG * length:
-                return leg
+                return leg, None
             length, drive = length - drives[slide.drive], slide.drive
         at = leg.joints[first]
         own = way.turns[first][0].T @ (near - way.places[first][0])
         seat = Joint(f"{leg.name} ball", "fixed", Z, at.shift_mm + at.turn @ own)
         bar = Bar(float(length), way.turn[0].T @ (far - way.place[0]), drive)
-        return replace(leg, joints=(*leg.joints[:first], seat), bar=bar)
-    return leg
+        line = (far - near) / np.linalg.norm(far - near)
+        behind = Cut(leg.joints[turns[cut]].name, way.turns[turns[cut]][0].T @ line)
+        return replace(leg, joints=(*leg.joints[:first], seat), bar=bar), behind
+    return leg, None
 
 
 def _meeting(way, joints):

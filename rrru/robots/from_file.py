@@ -11,26 +11,17 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import from_urdf as urdf_files
-from rrru.robots.closure import Closure
-from rrru.robots.closure_kernel import ARM_MM
-from rrru.robots.free_motion import free_motions
-from rrru.robots.from_chains import Chains, with_bars
-from rrru.robots.from_couplings import coupling, of_equalities, of_mimics
+from rrru.robots.from_couplings import of_equalities, of_mimics
 from rrru.robots.from_lumps import lumps_of
 from rrru.robots.from_mjcf import MM, Assembly
-from rrru.robots.from_seams import undone
+from rrru.robots.from_structure import structure_of
 from rrru.robots.general import GeneralRobot
 from rrru.robots.hands import shared_joints, with_hands
-from rrru.robots.legs import Drive, Legs, Parts, unit_twist
-from rrru.robots.walk import Poses, Twists, bar_ends, walk
+from rrru.robots.legs import Drive, Parts, unit_twist
 
-# a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
-# where more joints than needed do not fit each other; below the last it is not closed at all
-_OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
 # a drive without limits works this far about its home value
 _RANGE = {"rad": 1.0, "mm": 100.0}
 _UNITS = {"R": "rad", "P": "mm"}
@@ -51,6 +42,12 @@ def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **o
             raise ConfigError(f"{file}: tips {', '.join(tips or ()) or 'none'}; allowed: two or more, and no tip")
         arms = {hand: from_urdf(path, base, link, home, **options) for hand, link in tips.items()}
         return with_hands(arms, shared_joints(arms), carries)
+    return _robot(*urdf_parts(file, base, tip, home), options)
+
+
+def urdf_parts(path, base=None, tip=None, home=None):
+    """The Assembly of a URDF's chain, its driven joints as `structure_of` wants them, and what follows them."""
+    file = _existing(path)
     urdf = urdf_files.read(file)
     model, known = urdf.model, {urdf.model.joint(j).name: j for j in range(urdf.model.njnt)}
     first, last = (model.body(name).id for name in urdf_files.ends(urdf, base, tip, file))
@@ -73,7 +70,7 @@ def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **o
             raise assembly.error(urdf.odd[link])
     follows = of_mimics(assembly, urdf.mimics)
     servos = {move.joint: [] for move in assembly.moves.values() if move.joint not in follows}
-    return _robot(assembly, servos, follows, options)
+    return assembly, servos, follows
 
 
 def from_mjcf(path, platform, **options):
@@ -84,6 +81,11 @@ def from_mjcf(path, platform, **options):
     closed. options: of GeneralRobot. The platform's frame is its body's. Raises ConfigError for what cannot be read or
     is no robot.
     """
+    return _robot(*mjcf_parts(path, platform), options)
+
+
+def mjcf_parts(path, platform):
+    """The Assembly of an MJCF, its driven joints as `structure_of` wants them, and what follows them."""
     file = _existing(path)
     try:
         spec = mujoco.MjSpec.from_file(str(file))
@@ -97,7 +99,7 @@ def from_mjcf(path, platform, **options):
     home = model.key_qpos[0] if model.nkey else model.qpos0
     assembly = Assembly(model, file, 0, model.body(platform).id, home)
     servos = _servos(assembly)
-    return _robot(assembly, servos, of_equalities(assembly, servos), options)
+    return assembly, servos, of_equalities(assembly, servos)
 
 
 def _existing(path):
@@ -148,27 +150,15 @@ def _robot(assembly, servos, follows, options):
     known = {one.name for one in fields(GeneralRobot) if one.init} - {"legs", "parts", "lumps"}
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
-    if not assembly.paths:
-        raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
-    if not servos:
-        raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
-    offsets = {joint: one.offset for joint, one in follows.items()}
-    chains, home = Chains(assembly, [*servos, *follows], offsets), undone(assembly.home_of(assembly.base))
-    pose = home @ assembly.home_of(assembly.platform)
-    every = [next(m for m in assembly.moves.values() if m.joint == joint) for joint in (*servos, *follows)]
-    driven = every[: len(servos)]
-    values = np.array([move.home for move in driven])
-    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3], coupling=coupling(servos, follows))
-    gravity = home[:3, :3] @ assembly.model.opt.gravity
-    up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
-    legs = _closed(assembly, replace(open_legs, legs=with_bars(open_legs)), options.get("up", up))
+    structure = structure_of(assembly, servos, follows, options.get("up"))
+    chains, legs, each = structure.chains, structure.legs, structure.driven
     bars = [leg for leg in legs.legs if leg.bar]
     arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
-    defaults = {"name": assembly.file.stem, "up": up} | ({"angle_arm_mm": arm} if arm else {})
-    ranges = np.array([_range(assembly, move, servos[move.joint]) for move in driven])
-    drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(every)])
+    defaults = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
+    ranges = np.array([_range(assembly, move, servos[move.joint]) for move in each[: len(servos)]])
+    drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(each)])
     parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
-    own = {"legs": legs, "parts": parts, "drive_range": ranges, "lumps": lumps_of(chains, open_legs, legs)}
+    own = {"legs": legs, "parts": parts, "drive_range": ranges, "lumps": lumps_of(chains, structure.open_legs, legs)}
     return GeneralRobot(**defaults | own | options)
 
 
@@ -205,42 +195,3 @@ def _drive(legs, number, move, site):
             return Drive(f"{move.origin}_{unit}", unit, leg.bar_sites[0], unit_twist(0))
     axis, none = next(joint.axis for joint in legs.joints if joint.name == site), np.zeros(3)
     return Drive(f"{move.origin}_{unit}", unit, site, np.concatenate([none, axis] if unit == "rad" else [axis, none]))
-
-
-def _closed(assembly, legs, up):
-    """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
-    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
-    gaps = _gaps(legs, start)
-    if gaps.max() > _OPEN_MM:
-        joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
-        text = f"the leg through {joints} misses the platform by {gaps.max():.3f} mm at the home pose"
-        raise assembly.error(f"{text}; allowed: up to {_OPEN_MM:g} mm; a keyframe may set it")
-    if free := free_motions(legs, up):
-        text = f"body {assembly.body_name(assembly.platform)} is free to {'; '.join(free)} at the home pose"
-        raise assembly.error(f"{text}; allowed: legs that hold it with locked drives")
-    if gaps.max() < _CLOSED_MM:
-        return legs
-    poses = Closure(legs).solve(legs.home_drives[None], start)
-    left = _gaps(legs, poses).max() if poses.closed.all() else gaps.max()
-    if left > _LEFT_MM:
-        raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_LEFT_MM:g} mm")
-    homes = dict(zip((joint.name for joint in legs.passive_joints), poses.passive[0], strict=True))
-    chains = tuple(
-        replace(leg, joints=tuple(replace(j, home=homes[j.name]) if j.passive else j for j in leg.joints))
-        for leg in legs.legs
-    )
-    return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
-
-
-def _gaps(legs, poses):
-    """What every leg lacks (legs,) in mm at one pose with drives at home, angles counted in the arm."""
-    result, actuators, twists = [], legs.home_drives[None], Twists(legs)
-    for leg in legs.legs:
-        way = walk(legs, leg, actuators, poses.passive, twists)
-        if leg.bar:
-            near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
-            result.append(abs(length[0] - np.linalg.norm(far - near)))
-        else:
-            off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
-            result.append(np.linalg.norm(way.place - poses.position_mm) + ARM_MM * off)
-    return np.array(result)

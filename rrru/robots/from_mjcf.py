@@ -17,6 +17,46 @@ from rrru.robots.legs import X, Y, Z
 
 MM = 1000.0
 _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
+# two joints are on one line within this, in m and rad
+_SAME = 1e-9
+
+
+def plays_of(model):
+    """Joints that are the play of driven ones: of the same body, kind and line, with a range and without an actuator.
+
+    They stand in the middle; by joint the driven one.
+    """
+    kinds = [int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)]
+    driven = {
+        int(j) for j, kind in zip(model.actuator_trnid[:, 0], model.actuator_trntype, strict=True) if kind in kinds
+    }
+    result = {}
+    for joint in set(np.flatnonzero(model.jnt_limited).tolist()) - driven:
+        for other in driven:
+            same = model.jnt_bodyid[joint] == model.jnt_bodyid[other] and model.jnt_type[joint] == model.jnt_type[other]
+            if same and _on_one_line(model, joint, other):
+                result[joint] = other
+    return result
+
+
+def _on_one_line(model, joint, other):
+    """Whether two joints of a body move about or along one line."""
+    axis, apart = model.jnt_axis[other], model.jnt_pos[joint] - model.jnt_pos[other]
+    slides = model.jnt_type[joint] == _JOINT.mjJNT_SLIDE
+    off = 0.0 if slides else np.linalg.norm(np.cross(axis, apart))
+    return bool(np.linalg.norm(np.cross(axis, model.jnt_axis[joint])) < _SAME and off < _SAME)
+
+
+def ends_of(model, k):
+    """Both bodies of a connect or weld, and the placements on them that it holds together."""
+    data = model.eq_data[k]
+    first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+    if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE:
+        at = [placed(MM * model.site_pos[s], turn_of(model.site_quat[s])) for s in (first, second)]
+        return int(model.site_bodyid[first]), at[0], int(model.site_bodyid[second]), at[1]
+    if model.eq_type[k] == _EQ.mjEQ_CONNECT:
+        return first, placed(MM * data[:3]), second, placed(MM * data[3:6])
+    return first, placed(MM * data[3:6], turn_of(data[6:10])), second, placed(MM * data[:3])
 
 
 class Assembly:
@@ -34,7 +74,7 @@ class Assembly:
         self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
         if self.frames[platform][0] == base:
             raise self.error(f"body {self.body_name(platform)} is fixed to the base; allowed: a body that moves")
-        self._names = set()
+        self._names, self._plays = set(), plays_of(model)
         connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
         self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
         for k, kind in kinds.items():
@@ -64,27 +104,16 @@ class Assembly:
         """Placement of a body at home in MuJoCo's world."""
         return placed(MM * self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
 
-    def _ends(self, k):
-        """Both bodies of a connect or weld, and the placements on them that it holds together."""
-        model, data = self.model, self.model.eq_data[k]
-        first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE:
-            at = [placed(MM * model.site_pos[s], turn_of(model.site_quat[s])) for s in (first, second)]
-            return int(model.site_bodyid[first]), at[0], int(model.site_bodyid[second]), at[1]
-        if model.eq_type[k] == _EQ.mjEQ_CONNECT:
-            return first, placed(MM * data[:3]), second, placed(MM * data[3:6])
-        return first, placed(MM * data[3:6], turn_of(data[6:10])), second, placed(MM * data[:3])
-
-    def _own(self, body):
+    def own(self, body):
         """Placement of a body in its parent's, joints at zero."""
         return placed(MM * self.model.body_pos[body], turn_of(self.model.body_quat[body]))
 
     def _frames(self, welds):
         """Part and placement there of every body, the parts named after base and platform first."""
         near = {body: [] for body in range(self.model.nbody)}
-        fixed = [(int(self.model.body_parentid[b]), b, self._own(b)) for b in near if b and self._jointless(b)]
+        fixed = [(int(self.model.body_parentid[b]), b, self.own(b)) for b in near if b and self._jointless(b)]
         for k in welds:
-            first, at_first, second, at_second = self._ends(k)
+            first, at_first, second, at_second = ends_of(self.model, k)
             fixed.append((first, second, at_first @ undone(at_second)))
         for first, second, placement in fixed:
             near[first].append((second, placement))
@@ -110,11 +139,11 @@ class Assembly:
             if not count or model.jnt_type[first] == _JOINT.mjJNT_FREE:
                 continue
             (near, before), (far, after) = self.frames[int(model.body_parentid[body])], self.frames[body]
-            items = [before @ self._own(body)]
+            items = [before @ self.own(body)]
             for joint in range(first, first + count):
-                items += self._joint_items(joint)
+                items += self._joint_items(joint) if joint not in self._plays else []
             if near != far:
-                result.append(Seam(near, far, (*items, undone(after))))
+                result.append(Seam(near, far, (*items, undone(after)), body))
         return result
 
     def _joint_items(self, joint):
@@ -132,19 +161,23 @@ class Assembly:
         """Seams of connects, those of the same two parts taken together."""
         groups = {}
         for k in connects:
-            first, at_first, second, at_second = self._ends(k)
+            first, at_first, second, at_second = ends_of(self.model, k)
             (near, before), (far, after) = self.frames[first], self.frames[second]
             near_mm, far_mm = (before @ at_first)[:3, 3], (after @ at_second)[:3, 3]
             if near > far:
                 near, far, near_mm, far_mm = far, near, far_mm, near_mm
             if near != far:
-                groups.setdefault((near, far), []).append((self.eq_name(k), near_mm, far_mm))
-        return [Seam(near, far, tuple(self._connect_items(near, far, group))) for (near, far), group in groups.items()]
+                groups.setdefault((near, far), []).append((k, near_mm, far_mm))
+        return [
+            Seam(*parts, tuple(self._connect_items(*parts, group)), connects=tuple(k for k, *_ in group))
+            for parts, group in groups.items()
+        ]
 
     def _connect_items(self, near, far, group):
-        """Placements and Moves of all connects (name, point of near, point of far) of two parts."""
+        """Placements and Moves of all connects (number, point of near, point of far) of two parts."""
         turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
-        (name, near_mm, far_mm), *others = group
+        (first, near_mm, far_mm), *others = group
+        name = self.eq_name(first)
         if not others:
             return self._ball_items(name, near_mm, turn, far_mm)
         if len(others) > 1:
@@ -152,7 +185,9 @@ class Assembly:
             raise self.error(f"{len(group)} connects between {bodies}; allowed: one, two for a hinge, or a weld")
         along, own = others[0][1] - near_mm, others[0][2] - far_mm
         if min(np.linalg.norm(along), np.linalg.norm(own)) < 1e-6:
-            raise self.error(f"connects {name} and {others[0][0]} are at one point; allowed: two points make a hinge")
+            raise self.error(
+                f"connects {name} and {self.eq_name(others[0][0])} are at one point; allowed: two points make a hinge"
+            )
         along, own = along / np.linalg.norm(along), turn @ own / np.linalg.norm(own)
         cross, cosine = np.cross(own, along), own @ along
         skew = np.cross(np.eye(3), cross)

@@ -26,11 +26,16 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """What joins two parts: placements and Moves, in their order from the part `near` to the part `far`."""
+    """What joins two parts: placements and Moves, in their order from the part `near` to the part `far`.
+
+    body: MuJoCo's number of the body whose joints these are, None for connects, whose numbers are `connects`.
+    """
 
     near: int
     far: int
     items: tuple
+    body: int | None = None
+    connects: tuple = ()
 
     def other(self, part):
         """The other one of both parts."""

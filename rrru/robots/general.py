@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import geometric_numbers
-from rrru.robots.drive_step import bar_lengths, end_of, searched
+from rrru.robots.drive_step import bar_lengths, drives_at, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
@@ -176,7 +176,7 @@ class GeneralRobot(Robot):
     @property
     def orients(self):
         """Whether its drives can orient its platform beside moving it."""
-        return self._freedoms[1] > 0
+        return self.freedoms[1] > 0
 
     @property
     def size_mm(self):
@@ -197,7 +197,9 @@ class GeneralRobot(Robot):
         if self._bars_only:
             place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
             return bar_lengths(self.legs, self.drive_range, place, twists)
-        return searched(self, self._freedoms, position, wanted, twists, deviations is None)
+        count = len(position)
+        start = np.tile(self.legs.home_drives, (count, 1)).astype(float), np.tile(self.legs.home_mm, (count, 1))
+        return drives_at(self, (position, wanted), start, twists, deviations is not None)
 
     def own_load(self, _masses, motion, poses):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
@@ -223,7 +225,7 @@ class GeneralRobot(Robot):
         return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
 
     @cached_property
-    def _freedoms(self):
+    def freedoms(self):
         """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
         actuators, position = (part[:10] for part in self._workspace())
         poses = self.solve(actuators, position)

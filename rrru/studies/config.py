@@ -47,6 +47,14 @@ def own_robot_file(dimensions):
     return next((Path(dimensions[key]) for key in ("urdf", "mjcf") if key in dimensions), None)
 
 
+def corrected_kind(config, section):
+    """What the file of a campaign's robot is written back as, "xml" or "urdf"; "" for a robot without such a file."""
+    own = config["robots"].get(section["robot"], {})
+    if "mjcf" in own:
+        return "xml"
+    return "urdf" if "urdf" in own and "tips" not in own else ""
+
+
 def nominal(config, name):
     """The robot of a campaign with the calibration's bounds."""
     return robot(config, config["campaigns"][name]) | {"bounds": config["calibration"]["bounds"]}

@@ -4,7 +4,7 @@ import pandas as pd
 
 from rrru.figures.drawing import draw_all
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.schemas import tables_of
+from rrru.gap.schemas import TABLES, tables_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
 from rrru.store import tables
@@ -20,10 +20,17 @@ def main(settings, inputs, outputs):
     robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)
-    points = result.tables.pop("gap_points")
+    if "corrected" in outputs:
+        # MuJoCo is loaded where a file is written only
+        from rrru.gap.corrected_model import write_corrected
+
+        result = write_corrected(result, settings["robot"]["dimensions"], masses, outputs["corrected"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
-    frames = {name: frame.assign(campaign=settings["campaign"]) for name, frame in frames.items()}
-    frames["gap_points"] = points
+    keys = {table.name: table.key for table in TABLES}
+    frames = {
+        name: frame.assign(campaign=settings["campaign"]) if "campaign" in keys[name] else frame
+        for name, frame in frames.items()
+    }
     tables.write_all(tables_of(nominal), frames, outputs)
     options = settings["options"] | {"z_down": nominal.z_down}
     draw_all(settings["figures"], {name: outputs[name] for name in frames}, options, outputs)

@@ -16,6 +16,12 @@ GAP_FIGURE = {
 }
 
 
+def diagnosed_as(kind):
+    """Pattern of the campaigns whose robot's file is written back as this kind, "" for those without one."""
+    names = (name for name, section in DIAGNOSED.items() if parts.corrected_kind(config, section) == kind)
+    return "|".join(names) or "(?!)"
+
+
 # one job per campaign, its figure included: starting another would take longer than drawing it. It sees the
 # measurements and what the configuration says of the robot
 rule diagnose:
@@ -26,12 +32,33 @@ rule diagnose:
         **drawn(GAP_FIGURE, "figures/{campaign}"),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
+    wildcard_constraints:
+        campaign=diagnosed_as(""),
     params:
         settings=diagnosed,
         own_effects=own_effects_digests(),
         code=code("diagnose", GAP_FIGURE),
     script:
         "../../scripts/diagnose.py"
+
+
+# a robot that came as a file goes back as one, with what was found
+use rule diagnose as diagnose_mjcf with:
+    output:
+        **named([*GAP_TABLES, "gap_points", "corrected_drives"], part),
+        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        corrected=f"{RESULTS}/campaigns/{{campaign}}/corrected.xml",
+    wildcard_constraints:
+        campaign=diagnosed_as("xml"),
+
+
+use rule diagnose as diagnose_urdf with:
+    output:
+        **named([*GAP_TABLES, "gap_points", "corrected_drives"], part),
+        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        corrected=f"{RESULTS}/campaigns/{{campaign}}/corrected.urdf",
+    wildcard_constraints:
+        campaign=diagnosed_as("urdf"),
 
 
 use rule gather as gather_gap with:

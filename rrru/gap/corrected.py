@@ -1,0 +1,99 @@
+"""The user's own file with what a diagnosis has found, and how far that closes the gap.
+
+Every effect that changes nothing but constant numbers is geometry, as the calibration's numbers are; `drive_compliance`
+is the stiffness of the drives and `backlash` their play. Anything else a file cannot hold; nor does it know of loads
+that it does not carry itself. The model stands in the frame of the measurements. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.gap.details import parameter_rows
+from rrru.gap.uncertainty import one_sigma_steps
+from rrru.robots.file_changes import Found
+from rrru.robots.to_mjcf import to_mjcf
+from rrru.robots.to_urdf import to_urdf
+
+# what a drive's numbers in a file are, by the effect and the stem of its parameters
+_COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
+_HALF = 0.5
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A corrected file.
+
+    text; not_in_model: what it cannot hold, in words; found: what there is to hold; in_file: values by parameter of the
+    effects that it holds beside geometry.
+    """
+
+    text: str
+    not_in_model: tuple
+    found: Found
+    in_file: dict = field(default_factory=dict)
+
+
+def found_of(attribution):
+    """The Found of an attribution, and the names of its effects that no file holds."""
+    case, state = attribution.case, attribution.state
+    library, sites = case.library, case.mechanism.legs.sites
+    constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
+    constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
+    twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
+    steps, coordinates = one_sigma_steps(attribution)
+    spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
+    for key, twist in constant.items():
+        moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])
+        spread = spread + np.stack([one.twists[0] - twist[0] for one in moved])
+    moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
+    numbers, count = parameter_rows(attribution), len(case.mechanism.parts.drives)
+    loads = np.nan_to_num(np.abs(case.motion.drive_load)).max(axis=0)
+    found = Found(
+        {sites[k]: twists[k] for k in moves},
+        {sites[k]: spread[:, k] for k in moves},
+        _places(case),
+        tuple(case.mechanism.tool_mm),
+        _of_drives(numbers, *_COMPLIANCE, count),
+        _of_drives(numbers, *_PLAY, count),
+        dict(enumerate(loads.tolist())),
+    )
+    held = {name for name, _ in constant} | {_COMPLIANCE[0], _PLAY[0]}
+    return found, [name for name, _ in state.effects if name not in held]
+
+
+def _of_drives(numbers, effect, stem, count):
+    """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
+    own = numbers[numbers["effect"] == effect].set_index("parameter")
+    return {k: tuple(own.loc[f"{stem}{k + 1}", ["value", "standard_error"]]) for k in range(count) if len(own)}
+
+
+def _places(case):
+    """Places (3,) on the platform, before what was found, of the reflectors that were found, by site."""
+    fitted = set(getattr(case.mechanism.reads, "fitted", ()))
+    if not fitted:
+        return {}
+    on_world = rows.on_the_world(case.measurements)
+    frame = case.measurements if on_world is None else case.measurements[~on_world]
+    places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
+    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in fitted}
+
+
+def corrected(attribution, section, folder):
+    """The Corrected file of an attribution for a folder; section: the robot's entry in the configuration.
+
+    Raises ConfigError for a file whose bodies do not all stand in it as such.
+    """
+    found, others = found_of(attribution)
+    if attribution.posterior.probability_unexplained > _HALF:
+        others.append("unexplained")
+    if "urdf" in section:
+        chain = {key: section.get(key) for key in ("base", "tip", "home")}
+        text, lost = to_urdf(section["urdf"], found, folder, **chain)
+        return Corrected(text, (*others, *lost), found)
+    text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
+    drives = ((*_COMPLIANCE, found.compliance), (*_PLAY, found.play))
+    held = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
+    return Corrected(text, (*others, *lost), found, held)

@@ -1,0 +1,105 @@
+"""Compensation table: which drive values bring the robot, as diagnosed, to where it is commanded. mm and rad.
+
+The grid fills the box about the measured points as far as one of these is near; it is the only thing to go by where no
+model file can hold what was found. The robot is at rest, as warm as at the campaign's end.
+"""
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import Contribution
+from rrru.robots.drive_step import drives_at
+
+# lines of the grid along each axis, and how far a measured point may be, in its steps
+_LINES, _NEAR = 7, 1.0
+# extents below this are none
+_FLAT_MM = 1e-6
+# how far the drives come from, longer than any play
+_APPROACH = {"rad": 0.1, "mm": 5.0}
+# a drive's error changes with the drive so slowly that two looks settle it
+_LOOKS = 3
+_SAME = 1e-12
+
+
+def corrected_drives(attribution, masses):
+    """Rows of `corrected_drives` of an attribution; masses: of the robot."""
+    case = attribution.case
+    robot, known = case.mechanism, case.used
+    commands, drives = rows.command(case.measurements)[known], rows.actuators(case.measurements, robot)[known]
+    position, nearest = _grid(commands)
+    stated = robot.solve(drives[nearest], commands[nearest])
+    turn = stated.turn
+    nominal = drives_at(robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False)
+    reached = np.isfinite(nominal).all(axis=1)
+    position, turn, nominal = position[reached], turn[reached], nominal[reached]
+    payload = float(np.nan_to_num(case.motion.payload_kg[known]).max(initial=0.0))
+    end_s = float(np.nanmax(case.motion.time_s, initial=0.0))
+    found = {}
+    for approach in (-1, 1):
+        told = nominal
+        for _ in range(_LOOKS):
+            motion = at_rest(robot, masses, (position, told, payload, end_s), approach)
+            twists = robot.twists(attribution.state.deviations) + _change(attribution, motion)
+            told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
+        found[approach] = told
+    if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < _SAME:
+        found = {0: found[1]}
+    place = rows.vector_columns("command", position)
+    vectors = Rotation.from_matrix(turn).as_rotvec().reshape(-1, 3)
+    place |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
+    given = dict(zip(robot.parts.columns, nominal.T, strict=True))
+    frames = [
+        pd.DataFrame({"point": np.arange(1, len(position) + 1), "approach": side} | place | given).assign(
+            **{f"corrected_{name}": value for name, value in zip(robot.parts.columns, told.T, strict=True)},
+            payload_kg=payload,
+            time_s=end_s,
+        )
+        for side, told in found.items()
+    ]
+    table = pd.concat(frames, ignore_index=True)
+    return table[np.isfinite(table.to_numpy(dtype=float)).all(axis=1)].reset_index(drop=True)
+
+
+def _grid(commands):
+    """Points (g, 3) of the box about commands (n, 3) that one of these is near, and its number (g,)."""
+    low, high = commands.min(axis=0), commands.max(axis=0)
+    lines = [np.linspace(a, b, _LINES) if b - a > _FLAT_MM else np.array([a]) for a, b in zip(low, high, strict=True)]
+    points = np.stack([axis.ravel() for axis in np.meshgrid(*lines, indexing="ij")], axis=1)
+    step = np.maximum((high - low) / (_LINES - 1), _FLAT_MM)
+    far, number = cKDTree(commands / step).query(points / step, p=np.inf)
+    return points[far <= _NEAR], number[far <= _NEAR]
+
+
+def at_rest(robot, masses, state, approach):
+    """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side."""
+    position, drive, payload, end_s = state
+    count, nothing = len(position), np.zeros_like(position)
+    before = drive - approach * np.array([_APPROACH[unit] for unit in robot.parts.units])
+    path = np.stack([before, drive], axis=1).reshape(2 * count, -1)
+    course = Course(
+        position_mm=position,
+        drive=drive,
+        path_drive=path,
+        path_index=2 * np.arange(count) + 1,
+        time_s=np.full(count, end_s),
+        velocity_mm_s=nothing,
+        acceleration_mm_s2=nothing,
+        payload_kg=np.full(count, payload),
+        drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
+    )
+    return make_motion(robot, masses, course)
+
+
+def _change(attribution, motion):
+    """Twists of the effects of an attribution's state that a robot at rest has."""
+    state, library = attribution.state, attribution.case.library
+    change = Contribution(motion.robot.twists())
+    for key in state.effects:
+        needs = getattr(library[key[0]], "needs", ())
+        if all(np.isfinite(getattr(motion, need)).all() for need in needs):
+            change = change + state.contribution(library, key, motion)
+    return change.twists

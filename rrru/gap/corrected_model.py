@@ -1,0 +1,139 @@
+"""A robot's file as it came and as corrected, read again and driven along the campaign. In mm and rad."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.effects.library import active_effects
+from rrru.effects.protocol import together
+from rrru.errors import ConfigError, SimulationError, UnreachableError
+from rrru.gap.corrected import corrected
+from rrru.gap.corrected_drives import corrected_drives
+from rrru.gap.shrink import model_row
+from rrru.plant.mujoco_robot import MujocoRobot
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.file_changes import placement_of
+from rrru.robots.legs import TOOL, WORLD
+from rrru.robots.walk import Poses
+
+# a simulation takes about a tenth of a second a point: no more of them are driven, from the first on
+_MOST_DRIVEN = 300
+
+
+def write_corrected(diagnosis, section, masses, file):
+    """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
+
+    section: the robot's entry in the configuration; masses: the robot's.
+    """
+    file, attribution = Path(file), diagnosis.attribution
+    written = corrected(attribution, section, file.resolve().parent)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(written.text)
+    shrink = diagnosis.tables["gap_shrink"]
+    more, why = gap_rows(attribution, written, section, file, shrink)
+    notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
+    verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(written.not_in_model)}
+    tables = diagnosis.tables | {
+        "gap_shrink": pd.concat([shrink, more], ignore_index=True),
+        "corrected_drives": corrected_drives(attribution, masses),
+    }
+    return replace(diagnosis, verdict=verdict, tables=tables)
+
+
+def gap_rows(attribution, corrected, section, file, shrink):
+    """Rows of `gap_shrink`: of the robot's file as it came, and of the Corrected one, and why MuJoCo did not drive it.
+
+    section: the robot's entry in the configuration; file: the corrected one; shrink: the other rows. MuJoCo drives an
+    MJCF, up to 300 points of the campaign, with what loads and drives it itself; where it cannot, and of a URDF, both
+    are closed at the drive values that the numbers in the file lead to.
+    """
+    key = "mjcf" if "mjcf" in section else "urdf"
+    models = [
+        ("given_model", _robot(attribution.case, section), {}),
+        ("corrected_model", _robot(attribution.case, section | {key: str(file)}), corrected.in_file),
+    ]
+    files, why = (section[key], file), ""
+    try:
+        if key == "urdf":
+            raise ConfigError("a URDF has no actuators")
+        poses = [
+            _simulated(attribution.case, robot, Path(one), section["platform"])
+            for (_, robot, _), one in zip(models, files, strict=True)
+        ]
+    except (ConfigError, SimulationError, UnreachableError) as error:
+        why = f"corrected model not driven: {error}"
+        poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
+    result = []
+    for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
+        twists = twists + _instrument(attribution.case, robot, corrected.found, kind == "corrected_model")
+        left = attribution.case.by_other(robot, own, twists)
+        result.append(model_row(shrink, kind, left, attribution.case.noise_mm))
+    return pd.DataFrame(result), why
+
+
+def _robot(case, section):
+    """The robot of a file."""
+    robot = make_mechanism(case.mechanism.name, section, parameter_set="frame")
+    return robot.reading(case.mechanism.reads)
+
+
+def _simulated(case, robot, file, platform):
+    """Poses (n) of an MJCF that MuJoCo drives along the campaign, NaN beyond what is driven, and no twists."""
+    motion, count = case.motion, min(len(case.motion), _MOST_DRIVEN)
+    first = replace(
+        motion,
+        **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WHOLE},
+    )
+    poses, _ = MujocoRobot(robot, file, platform).posed(first, first.position_mm)
+    whole = _nowhere(robot, len(motion))
+    for name in ("position_mm", "turn", "residual_mm", "closed"):
+        getattr(whole, name)[:count] = getattr(poses, name)
+    return whole, robot.twists()
+
+
+_WHOLE = ("robot", "path_drive")
+
+
+def _nowhere(robot, count):
+    """Poses (n) that are unknown."""
+    passive = np.zeros((count, len(robot.legs.passive_joints)))
+    return Poses(
+        np.full((count, 3), np.nan),
+        np.full((count, 3, 3), np.nan),
+        passive,
+        np.full(count, np.inf),
+        np.zeros(count, dtype=bool),
+    )
+
+
+def _closed(case, robot, effects):
+    """Poses (n) of a robot closed at the drive values of the campaign and what effects add, and its twists."""
+    acting = active_effects(effects, robot)
+    change = together(acting, replace(case.motion, robot=robot)) if acting else None
+    twists = robot.twists() + (change.twists if acting else 0.0)
+    actuators, command = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    return robot.solve(actuators, command, twists), twists
+
+
+def _instrument(case, robot, found, corrected):
+    """Twists (1, sites, 6) of what is read: the reflectors' places, and the tool's where it is corrected or these are.
+
+    The frame is the file's, so that reflectors beside the robot are moved by it.
+    """
+    result, numbers = robot.twists(), robot.legs.site_numbers
+    named = set(found.reflectors) | ({TOOL} if corrected or found.reflectors or case.mechanism.reads.turned else set())
+    for name in named & set(found.twists):
+        result[0, numbers[name]] = found.twists[name]
+    on_world = rows.on_the_world(case.measurements)
+    if on_world is not None:
+        frame = case.measurements[on_world]
+        places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
+        world = placement_of(found.twists.get(WORLD, np.zeros(6)))
+        for name in pd.unique(sites):
+            nominal = places[np.flatnonzero(sites == name)[0]]
+            own = nominal + found.twists.get(name, np.zeros(6))[:3]
+            result[0, numbers[name], :3] = world[:3, :3] @ own + world[:3, 3] - nominal
+    return result

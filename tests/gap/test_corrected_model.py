@@ -1,0 +1,141 @@
+"""The corrected file of a diagnosed campaign, and the compensation table, against the robot that was measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.effects.library import active_effects
+from rrru.effects.protocol import together
+from rrru.gap.corrected_drives import at_rest
+from rrru.gap.corrected_model import write_corrected
+from rrru.gap.diagnose import MeasuredRobot, diagnose
+from rrru.gap.schemas import tables_of
+from rrru.gap.settings import GapSettings
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.dynamics import Masses
+from rrru.robots.from_file import from_mjcf
+from rrru.store import tables
+from rrru.studies import setup
+from tests.robots.mjcf import ARM, HEXAPOD
+
+_MASSES, _NOISE_MM, _NOISE_RAD = Masses(0.0, 0.0, 0.0), 0.005, 2e-5
+_SECTIONS = {"hexapod": {"mjcf": str(HEXAPOD), "platform": "plate"}, "arm": {"urdf": str(ARM)}}
+_EFFECTS = {
+    "hexapod": {"backlash": {f"width{k}": 0.06 for k in range(1, 7)}},
+    "arm": {
+        "backlash": {f"width{k}": 6e-4 for k in range(1, 7)},
+        "encoder_eccentricity": {f"amplitude{k}": 4e-4 for k in (1, 2, 3)},
+    },
+}
+
+
+@dataclass(frozen=True)
+class _Campaign:
+    robot: object
+    errors: dict
+    effects: dict
+    frame: object
+    found: object
+    file: object
+
+
+def _campaign(name, folder, points):
+    section, generator = _SECTIONS[name], np.random.default_rng(3)
+    robot = make_mechanism(name, section, parameter_set="full")
+    parameters, (x, y, z) = robot.parameters, robot.legs.home_mm.tolist()
+    errors = {p.name: generator.normal() * (0.3 if p.unit == "mm" else 5e-4) for p in parameters}
+    lines = {"start_mm": [x - 50.0, y, z], "end_mm": [x + 50.0, y, z + 10.0], "offsets_y_mm": [-40.0, 0.0, 40.0]}
+    masses = dict.fromkeys(("platform_mass_kg", "forearm_mass_kg", "arm_mass_kg"), 0.0)
+    virtual = {
+        "name": name,
+        "seed": 1,
+        "robot": {"errors": errors, "effects": _EFFECTS[name], **masses},
+        "trajectories": {"lines": lines | {"points": points}},
+        "passes": [{"reverse": reverse, "payload_kg": 0.0} for reverse in (False, True)],
+        "motion": {"speed_mm_s": 50.0, "acceleration_mm_s2": 500.0, "dwell_s": 1.0},
+        "noise_mm": _NOISE_MM,
+        "noise_rad": _NOISE_RAD,
+    }
+    nominal = {"name": name, "dimensions": section, "parameter_set": "full"}
+    frame, _ = setup.virtual_campaign(nominal, virtual).run()
+    known = MeasuredRobot(setup.measured_robot(nominal, frame), _MASSES, _NOISE_MM, name, _NOISE_RAD)
+    effects = (*_EFFECTS[name], "drive_compliance", "thermal_growth")
+    result = diagnose(frame, known, GapSettings(effects, draws=20))
+    file = folder / f"corrected.{'xml' if 'mjcf' in section else 'urdf'}"
+    return _Campaign(robot, errors, _EFFECTS[name], frame, write_corrected(result, section, _MASSES, file), file)
+
+
+@pytest.fixture(scope="module")
+def hexapod(tmp_path_factory):
+    return _campaign("hexapod", tmp_path_factory.mktemp("hexapod"), 14)
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    return _campaign("arm", tmp_path_factory.mktemp("arm"), 25)
+
+
+def _rows(campaign, kind):
+    shrink = campaign.found.tables["gap_shrink"]
+    return shrink[shrink["kind"] == kind].iloc[-1]
+
+
+def test_mujoco_drives_the_corrected_hexapod_along_its_campaign_to_the_noise(hexapod):
+    verdict = hexapod.found.verdict
+    assert verdict["effects"] == "backlash" and verdict["not_in_model"] == "" and "not driven" not in verdict["notes"]
+    before, after = _rows(hexapod, "given_model"), _rows(hexapod, "corrected_model")
+    assert before["rms_mm"] > 0.3 and after["rms_mm"] < 1.2 * np.sqrt(3.0) * _NOISE_MM
+    assert after["share_closed"] > 0.9
+
+
+def test_the_corrected_file_alone_stands_where_the_calibrated_robot_does(hexapod):
+    attribution = hexapod.found.attribution
+    robot = attribution.case.mechanism
+    actuators = rows.actuators(hexapod.frame, robot)
+    expected = robot.forward(actuators, attribution.state.deviations, rows.command(hexapod.frame))
+    again = from_mjcf(hexapod.file, "plate").forward(actuators, guess_mm=rows.command(hexapod.frame))
+    np.testing.assert_allclose(again, expected, rtol=0.0, atol=1e-6)
+
+
+def test_what_a_urdf_cannot_hold_is_named_and_left_in_its_gap(arm):
+    verdict = arm.found.verdict
+    assert set(verdict["effects"].split("+")) == {"backlash", "encoder_eccentricity"}
+    assert verdict["not_in_model"].startswith("encoder_eccentricity; play of axis1")
+    assert "corrected model not driven: a URDF has no actuators" in verdict["notes"]
+    after, resimulated = _rows(arm, "corrected_model"), _rows(arm, "resimulated")
+    assert resimulated["rms_mm"] < 1.2 * np.sqrt(3.0) * _NOISE_MM
+    assert 3.0 * resimulated["rms_mm"] < after["rms_mm"] < _rows(arm, "given_model")["rms_mm"]
+
+
+@pytest.mark.parametrize("name", ["hexapod", "arm"])
+def test_corrected_drives_bring_the_measured_robot_to_where_it_is_commanded(name, request):
+    """Its true errors and effects, those of the law of play included, driven there from either side."""
+    campaign = request.getfixturevalue(name)
+    table, robot = campaign.found.tables["corrected_drives"], campaign.robot
+    (schema,) = (one for one in tables_of(robot) if one.name == "corrected_drives")
+    assert set(schema.names) == set(table.columns)
+    tables.check(schema, table)
+    assert set(table["approach"]) == {-1, 1} and len(table) > 50
+    low, high = (getattr(rows.command(campaign.frame), edge)(axis=0) for edge in ("min", "max"))
+    assert ((rows.command(table) >= low - 1e-9) & (rows.command(table) <= high + 1e-9)).all()
+    off = {}
+    for prefix in ("", "corrected_"):
+        lengths = []
+        for approach, own in table.groupby("approach"):
+            drives, place = own[[prefix + column for column in robot.parts.columns]].to_numpy(), rows.command(own)
+            motion = at_rest(robot, _MASSES, (place, drives, 0.0, 0.0), approach)
+            twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
+            lengths.append(np.linalg.norm(robot.measured(robot.solve(drives, place, twists), twists) - place, axis=1))
+        off[prefix] = np.sqrt(np.mean(np.concatenate(lengths) ** 2))
+    assert off[""] > 0.3 and off["corrected_"] < 0.05 * off[""]
+
+
+def test_standard_errors_of_the_calibration_hold_the_truth(hexapod):
+    mechanism, numbers = hexapod.found.attribution.case.mechanism, hexapod.found.tables["gap_parameters"]
+    own = numbers[numbers["effect"] == "calibration"].set_index("parameter")
+    truth = mechanism.identifiable(hexapod.errors)
+    off = np.array([own.loc[key, "value"] - value for key, value in truth.items()])
+    scaled = off / own.loc[list(truth), "standard_error"].to_numpy()
+    assert np.abs(scaled).max() < 4.0 and 0.5 < np.sqrt(np.mean(scaled**2)) < 1.6

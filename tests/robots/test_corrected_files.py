@@ -1,0 +1,249 @@
+"""Robots written back as MJCF and URDF: read again, by this package and by MuJoCo, they stand where errors put them."""
+
+from dataclasses import replace
+from itertools import pairwise
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+from rrru.robots.delta import Delta
+from rrru.robots.file_changes import Found
+from rrru.robots.from_file import from_mjcf, from_urdf
+from rrru.robots.from_mjcf import plays_of
+from rrru.robots.lumps import driven_loads
+from rrru.robots.mjcf_home import closed_qpos
+from rrru.robots.rrru3 import Rrru3
+from rrru.robots.to_mjcf import to_mjcf
+from rrru.robots.to_urdf import to_urdf
+from tests.robots.mjcf import (
+    ARM,
+    CRANKED,
+    CRANKED_JOINTS,
+    GEOM,
+    HEXAPOD,
+    delta_mjcf,
+    file_of,
+    mjcf,
+    rrru3_mjcf,
+    rrs3_mjcf,
+    servos,
+)
+
+_MODELS = {
+    "cranked": (lambda folder: mjcf(folder, CRANKED, actuators=servos(*CRANKED_JOINTS)), "tip"),
+    "jointed platform": (lambda folder: mjcf(folder, CRANKED, actuators=servos(*CRANKED_JOINTS)), "c"),
+    "hexapod": (lambda _: HEXAPOD, "plate"),
+    "welds": (lambda folder: rrru3_mjcf(folder, Rrru3()), "plate"),
+    "loose rods": (lambda folder: delta_mjcf(folder, Delta(), "loose"), "plate"),
+    "rods of the plate": (lambda folder: delta_mjcf(folder, Delta(), "plate"), "plate"),
+}
+_CHAINS = (None, None), ("base_link", "flange"), ("upper_arm", "wrist"), ("tool0", "base_link")
+_seeds = st.integers(0, 2**32 - 1)
+
+
+def _drawn(robot, seed):
+    """Errors at every site but the tool, about a millimetre and a few milliradians, as twists (1, sites, 6)."""
+    twists = np.random.default_rng(seed).standard_normal((1, len(robot.legs.sites), 6)) * [
+        1.0,
+        1.0,
+        1.0,
+        3e-3,
+        3e-3,
+        3e-3,
+    ]
+    twists[:, robot.legs.site_numbers["tool"]] = 0.0
+    return twists
+
+
+def _found(robot, twists, **more):
+    return Found(dict(zip(robot.legs.sites, twists[0], strict=True)), **more)
+
+
+def _written(folder, text, suffix="xml"):
+    return file_of(folder, text, f"corrected.{suffix}")
+
+
+def _check(robot, again, twists, seed):
+    """Places and turns of a robot with errors are those of the one that was read again."""
+    low, high = robot.drive_range.T
+    actuators = robot.legs.home_drives + 0.1 * (high - low) * (np.random.default_rng(seed).random((10, len(low))) - 0.5)
+    poses = robot.solve(actuators, np.tile(robot.legs.home_mm, (10, 1)), twists)
+    others = again.solve(actuators, np.tile(again.legs.home_mm, (10, 1)))
+    assert poses.closed.all()
+    np.testing.assert_allclose(again.measured(others, again.twists()), robot.measured(poses, twists), rtol=0, atol=1e-6)
+    world = Rotation.from_rotvec(twists[0, robot.legs.site_numbers["world"], 3:]).as_matrix()
+    np.testing.assert_allclose(others.turn, world @ poses.turn, rtol=0.0, atol=1e-9)
+    return actuators, robot.measured(poses, twists)
+
+
+@pytest.mark.parametrize("name", _MODELS)
+@settings(max_examples=4, deadline=None)
+@given(seed=_seeds)
+def test_an_mjcf_holds_errors_of_all_its_sites(name, tmp_path_factory, seed):
+    folder = tmp_path_factory.mktemp("mjcf")
+    make, platform = _MODELS[name]
+    file = make(folder)
+    robot = from_mjcf(file, platform)
+    twists = _drawn(robot, seed)
+    text, lost = to_mjcf(file, platform, _found(robot, twists), folder)
+    again = from_mjcf(_written(folder, text), platform)
+    assert not lost and again.legs.sites == robot.legs.sites
+    _check(robot, again, twists, seed)
+
+
+@pytest.mark.parametrize("chain", _CHAINS)
+@settings(max_examples=4, deadline=None)
+@given(seed=_seeds)
+def test_a_urdf_holds_errors_of_all_its_sites(chain, tmp_path_factory, seed):
+    folder = tmp_path_factory.mktemp("urdf")
+    robot = from_urdf(ARM, *chain)
+    twists = _drawn(robot, seed)
+    text, lost = to_urdf(ARM, _found(robot, twists), folder, *chain)
+    assert not lost
+    _check(robot, from_urdf(_written(folder, text, "urdf"), *chain), twists, seed)
+
+
+def test_mujoco_stands_where_the_calibrated_arm_does(tmp_path):
+    robot = from_urdf(ARM)
+    twists = _drawn(robot, 3)
+    path = _written(tmp_path, to_urdf(ARM, _found(robot, twists), tmp_path)[0], "urdf")
+    spec = mujoco.MjSpec.from_file(str(path))
+    spec.compiler.fusestatic = False
+    spec.compiler.boundmass = spec.compiler.boundinertia = 1e-12
+    model = spec.compile()
+    actuators, places = _check(robot, from_urdf(path), twists, 4)
+    data = mujoco.MjData(model)
+    for values, place in zip(actuators, places, strict=True):
+        data.qpos[:] = values
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(1000.0 * data.body("tool0").xpos, place, rtol=0.0, atol=1e-6)
+
+
+def test_mujoco_closes_the_corrected_hexapod_where_the_calibrated_one_stands(tmp_path):
+    robot = from_mjcf(HEXAPOD, "plate")
+    twists = _drawn(robot, 5)
+    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", _found(robot, twists), tmp_path)[0])
+    model = mujoco.MjModel.from_xml_path(str(path))
+    actuators, places = _check(robot, from_mjcf(path, "plate"), twists, 6)
+    data, held = mujoco.MjData(model), [model.joint(f"leg{k}").id for k in range(1, 7)]
+    for values, place in zip(actuators, places, strict=True):
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        data.qpos[model.jnt_qposadr[held]] = values / 1000.0
+        data.qpos[:] = closed_qpos(model, data.qpos, held)
+        mujoco.mj_kinematics(model, data)
+        np.testing.assert_allclose(1000.0 * data.body("plate").xpos, place, rtol=0.0, atol=1e-6)
+
+
+def test_the_keyframe_is_closed_and_has_a_place_for_every_joint(tmp_path):
+    robot = from_mjcf(HEXAPOD, "plate")
+    found = _found(
+        robot, _drawn(robot, 7), play={k: (0.05, 1e-3) for k in range(6)}, loads=dict.fromkeys(range(6), 50.0)
+    )
+    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", found, tmp_path)[0])
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+    assert len(plays_of(model)) == 6 and np.abs(data.efc_pos[: data.ne]).max() < 1e-11
+    assert from_mjcf(path, "plate").parts.columns == robot.parts.columns
+
+
+@pytest.mark.parametrize(("side", "axis"), [("rods", "y"), ("plate", "y")])
+def test_axes_of_a_ball_joint_that_do_not_meet_are_named(tmp_path, side, axis):
+    file = rrs3_mjcf(tmp_path, side)
+    twist = {f"ball2 {axis}": np.array([0.3, 0.2, 0.1, 0.0, 0.0, 0.0])}
+    text, lost = to_mjcf(file, "plate", Found(twist), tmp_path)
+    assert [one.partition(":")[0] for one in lost] == [f"ball2 {axis}"]
+    assert "corrected" not in text
+
+
+def test_what_is_written_beside_the_numbers(tmp_path):
+    """The user's names and comments, what stood there, and standard errors."""
+    step = {"axis3": np.array([[0.0, 0.0, 0.02, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 3e-4, 0.0, 0.0]])}
+    found = Found({"axis3": np.array([0.0, 0.0, 0.4, 1e-3, 0.0, 0.0])}, step)
+    text, _ = to_urdf(ARM, found, tmp_path)
+    changed = [line for line in text.splitlines() if line not in ARM.read_text().splitlines()]
+    note, origin = changed
+    was = 'was xyz="0 0 0.52"'
+    assert note.strip() == f"<!-- corrected: xyz +- 0 0 2e-05 m, turn about own axes +- 0.0003 0 0 rad; {was} -->"
+    assert '<origin xyz="0 0 0.5204" rpy="0.001 0 0"/>' in origin
+    untouched, _ = to_mjcf(HEXAPOD, "plate", Found({}), tmp_path)
+    assert ElementTree.canonicalize(untouched, strip_text=True) == ElementTree.canonicalize(
+        HEXAPOD.read_text(), strip_text=True
+    )
+
+
+def test_tool_and_reflectors_are_frames_on_the_platform(tmp_path):
+    robot = replace(from_mjcf(HEXAPOD, "plate"), tool_mm=(10.0, 0.0, 30.0))
+    tool, own = np.array([1.0, 2.0, 3.0, 0.01, -0.02, 0.03]), np.array([0.5, -0.5, 0.2, 0.0, 0.0, 0.0])
+    found = Found({"tool": tool, "ball": own}, reflectors={"ball": np.array([60.0, 0.0, 40.0])}, tool_mm=robot.tool_mm)
+    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", found, tmp_path)[0])
+    model = mujoco.MjModel.from_xml_path(str(path))
+    turn = Rotation.from_rotvec(tool[3:])
+    np.testing.assert_allclose(1000.0 * model.site("measured_tool").pos, [11.0, 2.0, 33.0], atol=1e-9)
+    np.testing.assert_allclose(model.site("measured_tool").quat, turn.as_quat(scalar_first=True), atol=1e-9)
+    expected = np.array([11.0, 2.0, 33.0]) + turn.apply([50.0, 0.0, 10.0]) + own[:3]
+    np.testing.assert_allclose(1000.0 * model.site("ball").pos, expected, atol=1e-9)
+    arm, _ = to_urdf(ARM, replace(found, tool_mm=(0.0, 0.0, 0.0)), tmp_path)
+    place = next(one for one in ElementTree.fromstring(arm).iter("joint") if one.get("name") == "measured_tool_mount")
+    assert place.find("parent").get("link") == "tool0" and place.find("origin").get("xyz") == "0.001 0.002 0.003"
+
+
+def test_a_servo_gives_way_by_its_load_over_the_stiffness_found(tmp_path):
+    robot = from_mjcf(HEXAPOD, "plate")
+    softness = np.array([1.0, 2.0, 1.5, 0.8, 1.2, 0.5]) * 1e-3
+    found = Found({}, compliance={k: (one, 1e-5) for k, one in enumerate(softness)})
+    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", found, tmp_path)[0])
+    model = mujoco.MjModel.from_xml_path(str(path))
+    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1e3 / softness)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 6000)
+    legs, still = np.array([[1000.0 * data.joint(f"leg{k}").qpos[0] for k in range(1, 7)]]), np.zeros((1, 6))
+    poses = robot.solve(legs, robot.legs.home_mm[None])
+    load = driven_loads(robot, (legs, still, still), poses, np.array([0.0, 0.0, -9810.0]))
+    np.testing.assert_allclose(legs[0], softness * load[0], rtol=2e-3)
+
+
+_CRANK = (
+    f'<body name="crank"><joint name="crank" axis="0 1 0"/>{GEOM}<body name="tip" pos="0.2 0 0">{GEOM}</body></body>'
+)
+
+
+@pytest.mark.parametrize(("kp", "friction_alone"), [(2e4, False), (1e3, True)])
+def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp, friction_alone):
+    """Between limits or by friction alone, against gravity: both ends of a slow swing are apart by the width found."""
+    option = '<option timestep="0.0002" integrator="implicitfast"/>'
+    actuator = f'<position joint="crank" kp="{kp}" kv="{20 if friction_alone else 60}"/>'
+    file = mjcf(tmp_path, _CRANK, actuators=actuator, more=option)
+    load = 1000.0 * 9.81 * 0.3 * 0.2
+    found = Found({}, play={0: (1e-3, 1e-5)}, loads={0: load})
+    path = _written(tmp_path, to_mjcf(file, "tip", found, tmp_path)[0])
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert bool(len(plays_of(model))) is not friction_alone
+    data, places = mujoco.MjData(model), []
+    for start, end in pairwise((0.0, 0.02, 0.01, 0.0, 0.01)):
+        for control in np.concatenate([np.linspace(start, end, 4000), np.full(2000, end)]):
+            data.ctrl[:] = control
+            mujoco.mj_step(model, data)
+        places.append(float(data.qpos[: model.njnt].sum()))
+    _, down, _, up = places
+    assert down - up == pytest.approx(1e-3, rel=0.03)
+
+
+def test_what_the_files_cannot_hold_is_said(tmp_path):
+    both = {"compliance": {1: (1e-8, 1e-9)}, "play": {4: (1e-4, 1e-6)}}
+    assert to_urdf(ARM, Found({}, **both), tmp_path)[1] == ("compliance of axis2", "play of axis5")
+    file = mjcf(tmp_path, _CRANK, actuators='<motor joint="crank"/>')
+    assert to_mjcf(file, "tip", Found({}, compliance={0: (1e-8, 1e-9)}), tmp_path)[1] == (
+        "compliance of crank: it has 0 position servos, not one",
+    )
+    file = mjcf(tmp_path, f"<frame>{_CRANK}</frame>", actuators=servos("crank"))
+    with pytest.raises(ConfigError, match=r"robot\.xml: it has <frame>; allowed .* bodies written out"):
+        to_mjcf(file, "tip", Found({}), tmp_path)
