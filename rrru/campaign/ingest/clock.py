@@ -14,7 +14,7 @@ def tells_clock(cells, pattern):
 
 
 def seconds(cells, rows, theirs, pattern, problems):
-    """Seconds (n,) since the first of n cells, NaN where one is noted.
+    """Seconds (n,) since the earliest of n cells, NaN where one is noted.
 
     pattern: of strptime, such as "%d.%m.%Y %H:%M:%S"; None takes ISO 8601 alone, as no other order of day and month
     can be told. Local times are taken as they stand: a clock that is put back shows as time that runs backwards.
@@ -32,7 +32,7 @@ def seconds(cells, rows, theirs, pattern, problems):
     if len(zoned) > 1:
         problems.add("time", column=theirs, value="times with and without a zone", allowed="all of one kind")
         return np.full(len(times), np.nan)
-    start = known[0] if known else None
+    start = min(known, default=None)
     return np.array([np.nan if time is None else (time - start).total_seconds() for time in times])
 
 
