@@ -11,10 +11,11 @@ from rrru.campaign.ingest.formats import Format
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.noise import read_noise
 from rrru.errors import ConfigError, IngestError
+from rrru.fit.campaign_noise import campaign_noise
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.samples import FILES, SAMPLES, section
 from tests.places import DATA
-from tests.schemas import check
+from tests.schemas import check_measurements
 
 ROBOT = Rrru3()
 COMMAND = [f"command_{axis}_mm" for axis in "xyz"]
@@ -48,7 +49,7 @@ def distances(position):
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_sample_holds_the_campaign_that_it_was_written_from(name, source):
     table = read(name).measurements
-    check("measurements", table[[column for column in table if not column.startswith(("noise", "temperature"))]])
+    check_measurements(ROBOT, table)
     assert np.abs(table[COMMAND].to_numpy() - source[COMMAND].to_numpy()).max() < 1e-9
     off = distances(table[MEASURED].to_numpy()) - distances(source[MEASURED].to_numpy())
     assert np.abs(off).max() < 2e-4
@@ -65,6 +66,8 @@ def test_the_spread_of_a_reading_is_half_its_expanded_uncertainty():
     medians = [np.median(raw[f"U(95) {axis}  [mm]"]) / 2.0 for axis in "XYZ"]
     assert read_noise(table) == pytest.approx(np.sqrt(np.mean(np.square(medians))))
     assert table["temperature_c"].tolist() == raw["Temperature  [°C]"].tolist()
+    assert campaign_noise(ROBOT, table, (None, None))[::2] == (read_noise(table), "readings")
+    assert campaign_noise(ROBOT, table, (0.05, None))[::2] == (0.05, "given")
     assert read_noise(read("spatial_analyzer").measurements) is None
 
 
