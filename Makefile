@@ -3,11 +3,17 @@ PYTHON ?= python3
 CORES ?= 2
 BIN = .venv/bin
 
-.PHONY: results test lint lock
+.PHONY: results check-data test lint lock
 
 results: .venv/ready
 	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
 	$(BIN)/snakemake --cores $(CORES)
+
+# what is in a file of measurements: make check-data FILE=tracker.csv ROBOT=rrru3 [COMMANDS=commands.csv] [CONFIG=mine.yaml]
+check-data: .venv/ready
+	$(if $(FILE),,$(error say which file: make check-data FILE=tracker.csv ROBOT=rrru3))
+	@$(BIN)/python -m rrru.studies.incoming.check_data "$(FILE)" $(if $(ROBOT),--robot "$(ROBOT)") \
+	  $(if $(COMMANDS),--commands "$(COMMANDS)") $(if $(CONFIG),--configfile $(CONFIG))
 
 test: .venv/ready
 	$(BIN)/python -m pytest

@@ -39,6 +39,27 @@ def repeat_noise(measurements):
     return (float(np.sqrt((deviation**2).sum() / freedom)) if freedom else np.nan), freedom
 
 
+def typical(axes):
+    """One deviation of spreads of single readings, an array of any length per axis: medians, then root mean square.
+
+    Single readings may be far worse than the rest.
+    """
+    return float(np.sqrt(np.mean([np.nanmedian(axis) ** 2 for axis in axes])))
+
+
+def read_noise(measurements):
+    """Noise per axis in mm that the instrument stated with its readings, None where it stated none.
+
+    # ASSUME one size for all points: what a model lacks is larger than what the readings' spreads differ by, and
+    weights would hang the fit on the points that the tracker sees best.
+    """
+    axes = [f"noise_{axis}_mm" for axis in "xyz"]
+    if not set(axes) <= set(measurements):
+        return None
+    known = measurements.loc[rows.usable(measurements), axes].dropna()
+    return typical(known.to_numpy().T) if len(known) else None
+
+
 def estimate(measurements, residual_mm, columns, readings=None):
     """Noise per axis in mm, of orientations at their arm, and where they are from.
 

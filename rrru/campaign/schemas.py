@@ -23,7 +23,7 @@ One row per commanded point: what was commanded and what the instrument saw. Aft
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
 target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
-world.
+world. Where the file has them there are noise_x_mm, the reading's standard deviation, and temperature_c.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -81,8 +81,9 @@ near_singularity       int    points with status near_singularity
 unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma
 noise_rad              float? noise of measured orientations per axis, 1 sigma; null where none was measured
-noise_from             str    given: by the configuration; repeats: pooled over repeated points; high_frequency: from
-    the residuals along the path of a fit of all points {given, repeats, high_frequency}
+noise_from             str    given: by the configuration; readings: median of what the file states of each reading;
+    repeats: pooled over repeated points; high_frequency: from the residuals along the path of a fit of all points
+    {given, readings, repeats, high_frequency}
 platform_mass_kg       float? the real robot's platform, as given; null where it was not
 registration_rms_mm    float? residual of the frame registration; null where the frame was the robot's
 registration_max_mm    float? largest residual of the frame registration
@@ -100,6 +101,7 @@ _MORE = (
         "measured_r{}_rad",
         "measured orientation, rotation vector, robot frame",
     ),
+    ("measured_z_mm", "noise_{}_mm", "standard deviation of the reading along the instrument's axis"),
     ("measured_z_mm", "target_{}_mm", "nominal place of the reflector on the platform"),
 )
 
@@ -112,7 +114,9 @@ def measurement_table(robot, names=()):
     columns = [*table.columns[:first], *own, *table.columns[last:]]
     more = {after: [] for after, *_ in _MORE}
     for after, name, text in _MORE:
-        more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", "_r" in name) for axis in "xyz"]
+        nullable = not name.startswith("target")
+        more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", nullable) for axis in "xyz"]
+    more["measured_z_mm"].append(Column("temperature_c", "float64", "temperature, as the file states it", True))
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
     fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
     more["measured_z_mm"].append(fixed_to)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.noise import estimate
+from rrru.campaign.noise import estimate, read_noise
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
@@ -32,15 +32,18 @@ def campaign_noise(
     given: tuple[float | None, float | None],
     use_near_singularity: bool = True,
 ) -> Noise:
-    """The Noise of a campaign: of what is not given, see `rrru.campaign.noise.estimate`.
+    """The Noise of a campaign: of what is not given, see `rrru.campaign.noise`.
 
     given: of positions in mm and of orientations in rad, None where nobody states it. Raises ConfigError where there
     are too few points to estimate it.
     """
     noise_mm, noise_rad = given
+    known = "given"
+    if noise_mm is None:
+        noise_mm, known = read_noise(measurements), "readings"
     turned = rows.has_turns(measurements)
     if noise_mm is not None and (noise_rad or not turned):
-        return Noise(noise_mm, noise_rad if noise_rad and turned else np.nan, "given")
+        return Noise(noise_mm, noise_rad if noise_rad and turned else np.nan, known)
     residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
     if residuals is None:
         raise ConfigError("too few usable points to estimate noise_mm; give it")
@@ -48,4 +51,4 @@ def campaign_noise(
     left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
     found_mm, found_turned, source = estimate(used, left, columns, residuals.readings)
     found_rad = noise_rad or found_turned / robot.angle_arm_mm
-    return Noise(found_mm, found_rad, source) if noise_mm is None else Noise(noise_mm, found_rad, "given")
+    return Noise(found_mm, found_rad, source) if noise_mm is None else Noise(noise_mm, found_rad, known)

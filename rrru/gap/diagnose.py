@@ -29,7 +29,7 @@ from rrru.robots.robot import Robot
 from rrru.seeds import stream
 
 # fewer points fit any effect, and left-out ones are extrapolated
-_POINTS_PER_PARAMETER = 3
+POINTS_PER_PARAMETER = 3
 # what an effect may lose on left-out points before it is ruled out
 _VETO_NATS = 3.0
 _HALF = 0.5
@@ -85,7 +85,7 @@ def diagnose(
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
-    least = _POINTS_PER_PARAMETER * len(nominal.parameters)
+    least = POINTS_PER_PARAMETER * len(nominal.parameters)
     if len(case) < least:
         whose = f"campaign {robot.campaign}: " if robot.campaign else ""
         raise FitError(f"{whose}{case.count} usable points are too few for a diagnosis; allowed: at least {least}")

@@ -115,8 +115,16 @@ def check_files(config):
         own = own_robot_file(entry(config, "robots", section["robot"], f"campaigns.{name}"))
         if own and not own.is_file():
             raise ConfigError(f"robots.{section['robot']}: there is no file {own}")
-        if "ingest" in section and not Path(section["ingest"]).is_file():
-            raise ConfigError(f"campaigns.{name}.ingest: there is no file {section['ingest']}")
+        for key, file in zip(("ingest", "commands"), ingested_files(section), strict=False):
+            if not Path(file).is_file():
+                raise ConfigError(f"campaigns.{name}.{key}: there is no file {file}")
+
+
+def ingested_files(section):
+    """Files that a campaign's section ingests: that of the measurements and that of the commands, if any."""
+    commands = section.get("commands", {})
+    commands = commands.get("file") if isinstance(commands, dict) else commands
+    return [file for file in (section.get("ingest"), commands) if file]
 
 
 def entry(config, section, name, asked_by):

@@ -18,7 +18,8 @@ def main(settings, inputs, outputs):
         notes, registration = (), None
     else:
         # what reads files is not small, and virtual campaigns do not need it
-        from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+        from rrru.campaign.ingest.campaign_file import ingest
+        from rrru.campaign.ingest.spec import IngestSpec
 
         ingested = ingest(IngestSpec.from_config(section), robot)
         measurements, truth = ingested.measurements, pd.DataFrame(columns=_columns("truth"))

@@ -2,6 +2,7 @@
 
 import pandas as pd
 
+from rrru.campaign.noise import read_noise
 from rrru.figures.drawing import draw_all
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES, tables_of
@@ -17,6 +18,7 @@ def main(settings, inputs, outputs):
     measurements, masses = tables.read(inputs["measurements"]), Masses(**settings["masses"])
     nominal = setup.measured_robot(settings["robot"], measurements)
     noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
+    noise["noise_mm"] = noise["noise_mm"] or read_noise(measurements)
     robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)

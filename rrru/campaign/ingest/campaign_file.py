@@ -1,80 +1,25 @@
 """Ingest of a measured campaign: an instrument's CSV or parquet file becomes a measurement table or is refused."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.ingest.cells import read_cells
 from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution
-from rrru.campaign.ingest.columns import MM, RAD, REQUIRED, convert, known_columns, resolve
+from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resolve
+from rrru.campaign.ingest.commands import with_commands
+from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS, Sheet
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
+from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError
 from rrru.robots.robot import Robot
-
-_CHOICES = {
-    "unit": tuple(MM),
-    "angle_unit": tuple(RAD),
-    "frame": ("robot", "register"),
-    "extra_columns": ("refuse", "ignore"),
-    "elbow": ("out", "in"),
-}
-
-
-@dataclass(frozen=True)
-class IngestSpec:
-    """How to read a measurement file; raises ConfigError for a setting that does not exist.
-
-    columns: our name -> the file's column name, absent = the same name. unit: of the file's positions ("mm", "m",
-    "inch"; speeds are mm/s, payloads kg). angle_unit: "rad" or "deg". frame: of the measured positions; "register"
-    solves the six numbers between it and the robot frame from `registration_points`, pairs (run, point), none for all.
-    extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
-    places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
-    that stand beside the robot, their places in its frame.
-    """
-
-    path: str
-    columns: Mapping[str, str] = field(default_factory=dict)
-    unit: str = "mm"
-    angle_unit: str = "rad"
-    frame: str = "robot"
-    registration_points: tuple = ()
-    extra_columns: str = "refuse"
-    elbow: str = "out"
-    targets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
-    world_targets: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        theirs, points = [*self.columns.values()], self.registration_points
-        given = {key: getattr(self, key) for key in _CHOICES}
-        wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(_CHOICES[key])}" for key in _CHOICES]
-        wrong = [text for text, key in zip(wrong, _CHOICES, strict=True) if given[key] not in _CHOICES[key]]
-        doubled = [name for name in theirs if theirs.count(name) > 1]
-        wrong += [f"columns gives {name!r} two meanings; allowed: one of our names per column" for name in doubled]
-        if points and self.frame != "register":
-            wrong.append(f"registration_points with frame {self.frame!r}; allowed: frame register")
-        if not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in points):
-            wrong.append(f"registration_points {points!r}; allowed: pairs (run, point)")
-        if wrong:
-            raise ConfigError(f"ingest of {self.path}: {wrong[0]}")
-
-    @classmethod
-    def from_config(cls, section: Mapping[str, Any]) -> Self:
-        """From a campaign's section of the configuration, whose key `ingest` is the path."""
-        given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
-        points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
-        places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
-        beside = tuple(given.pop("world_targets", ()))
-        return cls(section["ingest"], registration_points=points, targets=places, world_targets=beside, **given)
 
 
 @dataclass(frozen=True)
@@ -126,14 +71,15 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     for key in spec.columns:
         if key not in known:
             raise ConfigError(f"ingest of {spec.path}: columns has the key {key!r}; allowed: {', '.join(known)}")
-    problems, notes = Problems(spec.path), []
-    names, rows, cells = read_cells(Path(spec.path), problems)
-    found, extra = resolve(spec, names, mechanism, problems)
+    problems = Problems(spec.path)
+    cells = with_commands(spec, read_cells(Path(spec.path), spec.format, problems), problems)
+    found, extra = resolve(spec, cells, mechanism, problems)
+    notes = list(cells.notes)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
-    frame = convert(spec, mechanism, found, cells, rows, problems)
+    frame = convert(spec, mechanism, found, cells, problems)
     drives = mechanism.parts.columns
-    if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(names)) < len(names):
+    if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(cells.names)) < len(cells.names):
         problems.refuse()
     if not set(COMMAND) <= set(frame):
         problems.refuse()
@@ -208,6 +154,7 @@ def _table(
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    extra = [name for name in (*TURNS["command"], *TURNS["measured"], "target", *TARGET, "target_on") if name in frame]
+    optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
+    extra = [name for name in optional if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes

@@ -7,16 +7,17 @@ from decimal import Decimal
 import numpy as np
 import pandas as pd
 
+from rrru.campaign.ingest.clock import seconds, tells_clock
 from rrru.campaign.ingest.orientations import check_orientations
-from rrru.campaign.ingest.sheet import COMMAND, MEASURED, QUATERNIONS, TURNS, drive_name
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, QUATERNIONS, TURNS, drive_name
+from rrru.campaign.ingest.spec import MM, RAD
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
-_GROUPS = (*TURNS.values(), *QUATERNIONS.values())
-_MORE = ("target", *(name for group in _GROUPS for name in group))
+_GROUPS = (*TURNS.values(), *QUATERNIONS.values(), NOISE)
+# name joins a file of commands
+_MORE = ("target", "name", "temperature_c", *(name for group in _GROUPS for name in group))
 _TEXT = ("trajectory", "target")
 _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
-MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
-RAD = {"rad": 1.0, "deg": np.pi / 180.0}
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
@@ -30,6 +31,8 @@ _LIMITS = {
     "time_s": (lambda v: (v >= 0) & (v <= 1e6), "0 to 1e6 s since the campaign's start"),
     "speed_mm_s": (lambda v: (v > 0) & (v <= 2e4), "above 0 and up to 20000 mm/s"),
     "payload_kg": (lambda v: (v >= 0) & (v <= 1e3), "0 to 1000 kg"),
+    "temperature_c": (lambda v: (v >= -60) & (v <= 100), "-60 to 100 degrees C"),
+    **dict.fromkeys(NOISE, (lambda v: (v > 0) & (v <= 100), "above 0 and up to 100 mm")),
 }
 
 
@@ -38,18 +41,20 @@ def known_columns(mechanism):
     return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_MORE)
 
 
-def resolve(spec, names, mechanism, problems):
-    """{our name: the file's name} of the columns that the file has, and its columns that nobody declared.
+def resolve(spec, cells, mechanism, problems):
+    """{our name: the file's name} of the columns that a file's Cells have, and those that nobody declared.
 
     Missing columns, repeated ones and, unless `extra_columns` is "ignore", undeclared ones are noted.
     """
-    drives = mechanism.parts.columns
+    drives, names = mechanism.parts.columns, cells.names
     for name in sorted({name for name in names if names.count(name) > 1}):
         value = f"{names.count(name)} columns of this name"
         problems.add("repeated column", column=name, value=value, allowed="each name once")
-    wanted = {ours: spec.columns.get(ours, ours) for ours in known_columns(mechanism)}
+    taken = set(spec.columns.values())
+    means = {ours: theirs for ours, theirs in cells.means.items() if theirs not in taken}
+    wanted = {ours: spec.columns.get(ours, means.get(ours, ours)) for ours in known_columns(mechanism)}
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
-    extra = [name for name in names if name not in found.values()]
+    extra = [name for name in names if name not in (*found.values(), *cells.unused)]
     # drive values tell where the robot was sent as well
     sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():
@@ -64,23 +69,24 @@ def resolve(spec, names, mechanism, problems):
         given = ", ".join(found[name] for name in group if name in found)
         if 0 < sum(name in found for name in group) < len(group):
             allowed = f"all of {', '.join(group)}, or none"
-            problems.add("missing column", column=given, value="a part of an orientation", allowed=allowed)
+            part = "a part of the noise" if group is NOISE else "a part of an orientation"
+            problems.add("missing column", column=given, value=part, allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
         for name in dict.fromkeys(extra):
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
-            advice = f"{_advice(_nearest(name, unused), name)}; extra_columns: ignore leaves the others out"
-            allowed = f"{', '.join(wanted)}{advice}"
+            advice = _advice(_nearest(name, unused), name)
+            allowed = f"extra_columns: ignore, which leaves it out{advice}; known: {', '.join(wanted)}"
             problems.add("unknown column", column=shown, value="a column that nobody declared", allowed=allowed)
     return found, extra
 
 
-def convert(spec, mechanism, found, cells, rows, problems):
+def convert(spec, mechanism, found, told, problems):
     """Frame of our columns in mm and rad, indexed by the row numbers (n,); NaN, or "" as a name, where a cell is noted.
 
-    found: {our name: the file's name}; cells: {the file's name: cells (n,) that are text, numbers or None}. An optional
-    column without any value is left out.
+    found: {our name: the file's name}; told: the file's Cells. An optional column without any value is left out.
     """
+    cells, rows = told.cells, told.rows
     measured = [found[name] for name in MEASURED if name in found]
     missed = np.array([bool(measured) and all(_blank(cells[name][i]) for name in measured) for i in range(len(rows))])
     for row in np.asarray(rows)[missed]:
@@ -90,17 +96,22 @@ def convert(spec, mechanism, found, cells, rows, problems):
     filled = {ours for ours, theirs in found.items() if ours in needed or not all(map(_blank, cells[theirs]))}
     drives = {drive.column: drive.unit for drive in mechanism.parts.drives}
     filled |= set(drives) if filled & set(drives) else set()
-    factor = dict.fromkeys((*COMMAND, *MEASURED), MM[spec.unit])
+    factor = dict.fromkeys((*COMMAND, *MEASURED, *NOISE), MM[spec.unit])
     factor |= {name: MM[spec.unit] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
+    factor |= {ours: told.factors[theirs] for ours, theirs in found.items() if theirs in told.factors}
     frame = pd.DataFrame(index=pd.Index(rows))
     blank = _blank_groups(found, cells, len(rows))
     for ours, theirs in found.items():
         if ours in _TEXT:
             names = _names(ours, cells[theirs], rows, theirs, problems)
             frame[ours] = pd.Series(names, index=frame.index, dtype=object)
-        elif ours in filled:
+        elif ours == "time_s" and ours in filled and tells_clock(cells[theirs], spec.time_format):
+            frame[ours] = seconds(cells[theirs], rows, theirs, spec.time_format, problems)
+        elif ours in filled and ours != "name":
             skipped = missed & (ours in MEASURED) | blank.get(ours, False)
-            frame[ours] = factor.get(ours, 1.0) * _numbers(cells[theirs], rows, theirs, skipped, problems)
+            scale = factor.get(ours, 1.0) * told.spreads.get(theirs, 1.0)
+            numbers = _numbers(cells[theirs], rows, theirs, skipped, problems, theirs in told.commas)
+            frame[ours] = scale * numbers
     _check_limits(frame, found, problems)
     return check_orientations(frame, found, problems)
 
@@ -126,28 +137,36 @@ def _check_limits(frame, found, problems):
         frame.loc[beyond, name] = np.nan
 
 
-def _numbers(cells, rows, theirs, skip, problems):
-    """Column (n,) of floats; NaN where a cell is skipped or noted as no number."""
+def _numbers(cells, rows, theirs, skip, problems, comma):
+    """Column (n,) of floats; NaN where a cell is skipped or noted as no number; comma: texts have decimal commas."""
     values = np.full(len(cells), np.nan)
     for i in np.flatnonzero(~skip):
-        if fault := _fault(cells[i]):
+        if fault := _fault(cells[i], comma):
             problems.add(f"no number in {theirs}", row=rows[i], column=theirs, value=_shown(cells[i]), allowed=fault)
         else:
-            values[i] = float(cells[i])
+            values[i] = _number(cells[i], comma)
     return values
 
 
-def _fault(cell):
+def _number(cell, comma):
+    """A cell's number."""
+    return float(cell.replace(",", ".") if comma and isinstance(cell, str) else cell)
+
+
+def _fault(cell, comma):
     """What a cell should hold that does not hold a finite number, else None."""
     if _blank(cell):
         return "a number; drop a row that lacks one"
     if isinstance(cell, str):
-        if _DECIMAL_COMMA.fullmatch(cell.strip()):
+        text = cell.strip()
+        if comma and "." in text and _NUMBER.fullmatch(text):
+            return "a number with a decimal comma, as the format says, not a point"
+        if not comma and _DECIMAL_COMMA.fullmatch(text):
             return "a number with a decimal point, not a comma"
-        number = _NUMBER.fullmatch(cell.strip())
+        number = _NUMBER.fullmatch(text.replace(",", ".") if comma else text)
     else:
         number = isinstance(cell, (int, float, Decimal)) and not isinstance(cell, bool)
-    return None if number and abs(float(cell)) < _LARGEST else "a finite number"
+    return None if number and abs(_number(cell, comma)) < _LARGEST else "a finite number"
 
 
 def _names(ours, cells, rows, theirs, problems):

@@ -5,8 +5,8 @@ from itertools import permutations, product
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.columns import MM
 from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, position_text
+from rrru.campaign.ingest.spec import MM
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
 DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}

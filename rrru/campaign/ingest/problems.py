@@ -14,6 +14,7 @@ class Problems:
     def __init__(self, file):
         self._file = str(file)
         self._by_kind = defaultdict(list)
+        self._elsewhere = {}
 
     def __bool__(self):
         return bool(self._by_kind)
@@ -25,7 +26,15 @@ class Problems:
             "value": _short(value),
             "allowed": _short(allowed),
         }
-        self._by_kind[kind].append({"file": self._file, "row": None if row is None else int(row), **texts})
+        file, row = self._file, None if row is None else int(row)
+        if column is not None and column.partition(", ")[0] in self._elsewhere:
+            file, rows = self._elsewhere[column.partition(", ")[0]]
+            row = rows.get(row)
+        self._by_kind[kind].append({"file": file, "row": row, **texts})
+
+    def elsewhere(self, file, columns, rows):
+        """Columns stand in another file, whose rows are given by those of this one."""
+        self._elsewhere |= dict.fromkeys(columns, (str(file), rows))
 
     def refuse(self):
         """Raise IngestError if there is any problem."""

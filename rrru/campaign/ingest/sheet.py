@@ -16,6 +16,7 @@ TURNS = {name: tuple(f"{name}_r{axis}_rad" for axis in AXES) for name in ("comma
 QUATERNIONS = {name: tuple(f"{name}_q{part}" for part in "xyzw") for name in TURNS}
 _DRIVE_NAMES = {frozenset({"rad"}): "drive angles", frozenset({"mm"}): "slider positions"}
 MEASURED = tuple(f"measured_{axis}_mm" for axis in AXES)
+NOISE = tuple(f"noise_{axis}_mm" for axis in AXES)
 TARGET = tuple(f"target_{axis}_mm" for axis in AXES)
 
 

@@ -14,7 +14,8 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.campaign.ingest.campaign_file import ingest
+from rrru.campaign.ingest.spec import IngestSpec
 from rrru.errors import ConfigError, FitError, IngestError
 from rrru.gap.attribute import with_arm
 from rrru.gap.case import Case

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from rrru.campaign.ingest.columns import MM, RAD
 from rrru.campaign.ingest.sheet import MEASURED, QUATERNIONS
+from rrru.campaign.ingest.spec import MM, RAD
+from rrru.campaign.noise import typical
 from rrru.errors import ConfigError, IngestError
 from rrru.studies.real.series import Series
 
@@ -85,7 +86,7 @@ def in_file(text: str, whole: pd.DataFrame) -> str:
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:
     """Noise per axis that the instrument states: of positions in mm and of orientations in rad, None where it does not.
 
-    Medians over the rows of each axis, since single readings may be far worse than the rest; root mean square of axes.
+    See `rrru.campaign.noise.typical`.
     """
     result = []
     for key, scales, unit in (("position_std", MM, "unit"), ("rotation_std", RAD, "rotation_unit")):
@@ -95,7 +96,7 @@ def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float
             for target, reading in series.section["readings"].items()
             for name in reading.get(key, ())
         ]
-        result.append(float(np.sqrt(np.mean([np.nanmedian(axis) ** 2 for axis in axes]))) if axes else None)
+        result.append(typical(axes) if axes else None)
     return result[0], result[1]
 
 

@@ -80,7 +80,7 @@ def assert_problem(problems, row, column, value, allowed):
 
 
 FILES = {
-    "not there": (None, "nothing.csv", "no such file", "an existing .csv or .parquet file"),
+    "not there": (None, "nothing.csv", "no such file", "an existing file"),
     "empty": (b"", "f.csv", "an empty file", CSV),
     "only line ends": ("\n\n \n", "f.csv", "an empty file", CSV),
     "only a header": (LINES[0] + "\n\n", "f.csv", "a header (run, trajectory,", "one row per measured point"),
@@ -90,7 +90,7 @@ FILES = {
         TEXT.replace(",", ";").replace(".", ","),
         "f.csv",
         "semicolons between",
-        "sep=';', decimal=','",
+        'format: {kind: csv, separator: ";", decimal: ","}',
     ),
     "tabs": (TEXT.replace(",", "\t"), "f.csv", "tabs between the fields", "commas between the fields"),
     "decimal commas": (
@@ -133,8 +133,9 @@ FILES = {
         "a whole parquet",
     ),
     "a parquet file without rows": (FIELD.head(0), "f.parquet", "and no row", "one row per measured point"),
-    "an unknown extension": (TEXT, "f.xlsx", "the extension '.xlsx'", ".csv or .parquet"),
-    "no extension": (TEXT, "f", "the extension ''", ".csv or .parquet"),
+    "an unknown extension": (TEXT, "f.txt", "the extension '.txt'", ".csv, .parquet, .xlsx, or the format stated"),
+    "no extension": (TEXT, "f", "the extension ''", "spatial_analyzer"),
+    "a CSV named .xlsx": (TEXT, "f.xlsx", "run,trajectory", "an .xlsx workbook"),
 }
 
 
@@ -148,7 +149,7 @@ def test_a_file_that_is_not_what_it_should_be(case, tmp_path):
 
 def test_a_directory(tmp_path):
     (tmp_path / "f.csv").mkdir()
-    assert_problem(problems_of(None, tmp_path), None, None, "a directory", "a .csv or .parquet file")
+    assert_problem(problems_of(None, tmp_path), None, None, "a directory", "a file of measurements")
 
 
 NO_NUMBER = "a finite number"

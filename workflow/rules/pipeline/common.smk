@@ -67,8 +67,8 @@ def reads(*keys):
 
 
 def campaign_file(wildcards):
-    """The file of an ingested campaign, nothing for a virtual one."""
-    return config["campaigns"][wildcards.campaign].get("ingest", [])
+    """The files of an ingested campaign, nothing for a virtual one."""
+    return parts.ingested_files(config["campaigns"][wildcards.campaign])
 
 
 def campaign_settings(wildcards):

@@ -1,0 +1,107 @@
+"""What was commanded, from a second file: lists of trackers hold what was measured alone.
+
+The rows of both files are joined by the points' names where both have them, else by their order. Names that stand
+once in every trajectory, as the groups of a point list have them, are told apart by these.
+"""
+
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+from rrru.campaign.ingest.formats import read_cells
+from rrru.campaign.ingest.problems import Problems
+
+_ONE = "all"
+
+
+def with_commands(spec, measured, problems):
+    """The Cells of a file with the columns of `spec.commands` beside its own.
+
+    A list of a tracker in which nobody names trajectories is one. Raises IngestError where the files do not belong
+    together.
+    """
+    if spec.commands is not None:
+        told = Problems(spec.commands)
+        commanded = read_cells(Path(spec.commands), spec.commands_format, told)
+        told.refuse()
+        measured = _joined(spec, measured, commanded, problems)
+    name = spec.columns.get("trajectory", measured.means.get("trajectory", "trajectory"))
+    if measured.means and name not in measured.names and "trajectory" not in spec.columns:
+        notes = (*measured.notes, f"no column trajectory: all points count as one, {_ONE}")
+        cells = {**measured.cells, "trajectory": [_ONE] * len(measured.rows)}
+        return replace(measured, names=[*measured.names, "trajectory"], cells=cells, notes=notes)
+    return measured
+
+
+def _joined(spec, measured, commanded, problems):
+    """Cells of both, a row per measured one; the commands' names of trajectories count before those of a list."""
+    keys, own = _keys(spec, measured, commanded)
+    for name in own:
+        if name in measured.names:
+            value = f"a column of this name here and in {spec.commands}"
+            problems.add("repeated column", column=name, value=value, allowed="each name in one of the files")
+    problems.refuse()
+    at, note = _places(spec.commands, keys, measured, commanded, problems)
+    problems.refuse()
+    problems.elsewhere(spec.commands, own, {row: commanded.rows[i] for row, i in zip(measured.rows, at, strict=True)})
+    group = measured.means.get("trajectory") if _column(spec, commanded, "trajectory") else None
+    means = {ours: theirs for ours, theirs in measured.means.items() if theirs != group}
+    return replace(
+        measured,
+        names=[*measured.names, *own],
+        cells={**measured.cells, **{name: [commanded.cells[name][i] for i in at] for name in own}},
+        means={**commanded.means, **means},
+        factors={**commanded.factors, **measured.factors},
+        spreads={**commanded.spreads, **measured.spreads},
+        commas=measured.commas | commanded.commas,
+        unused=(*measured.unused, *commanded.unused, *((group,) if group else ())),
+        notes=(*measured.notes, *commanded.notes, note),
+    )
+
+
+def _column(spec, cells, ours):
+    """The file's name of a column of ours, None where it has none."""
+    name = spec.columns.get(ours, ours)
+    return name if name in cells.cells else cells.means.get(ours)
+
+
+def _keys(spec, measured, commanded):
+    """Names of the points of both files, None where one has none, and the commands' columns that are added."""
+    columns = [_column(spec, cells, "name") for cells in (measured, commanded)]
+    own = [name for name in commanded.names if name != columns[1]]
+    if None in columns:
+        return None, own
+    files = (measured, commanded)
+    names = [[str(name).strip() for name in cells.cells[column]] for cells, column in zip(files, columns, strict=True)]
+    groups = [_column(spec, cells, "trajectory") for cells in files]
+    if len(set(names[1])) < len(names[1]) and None not in groups:
+        paths = (cells.cells[column] for cells, column in zip(files, groups, strict=True))
+        names = [
+            [f"{str(path).strip()} {name}" for path, name in zip(each, own_names, strict=True)]
+            for each, own_names in zip(paths, names, strict=True)
+        ]
+    return names, own
+
+
+def _places(file, keys, measured, commanded, problems):
+    """Place of each measured row's command among the commanded ones, and what was done to find it."""
+    rows = len(measured.rows)
+    if keys is None:
+        if rows != len(commanded.rows):
+            value = f"{rows} measured rows and {len(commanded.rows)} commands in {file}, joined by their order"
+            problems.refuse_now(value=value, allowed="as many rows in both, or a column `name` of the points in both")
+        return range(rows), f"commands of {file} joined by their order: no names of points in both files"
+    names, known = keys
+    if names == known:
+        return range(rows), f"commands of {file} joined by name and order"
+    for name in (name for name, count in Counter(known).items() if count > 1):
+        value, allowed = f"the point {name!r} twice in {file}", "each name once, or the same names in the same order"
+        problems.add("commands", column="name", value=value, allowed=allowed)
+    place = {name: i for i, name in enumerate(known)}
+    for row, name in zip(measured.rows, names, strict=True):
+        if name not in place:
+            allowed = f"a point of {file}: {', '.join(known[:5])}, ..."
+            problems.add("commands", row=row, column="name", value=repr(name), allowed=allowed)
+    left = len(set(known) - set(names))
+    more = f"; {left} of its points were not measured" if left else ""
+    return [place.get(name, 0) for name in names], f"commands of {file} joined by the points' names{more}"

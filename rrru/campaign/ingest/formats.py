@@ -1,0 +1,76 @@
+"""The formats of measurement files: which one a file has, and its cells read in it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, Self
+
+from rrru.campaign.ingest.cells import Cells, read_bytes, text_cells
+from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.trackers import leica_cells, spatial_analyzer_cells
+from rrru.campaign.ingest.workbooks import parquet_cells, xlsx_cells
+from rrru.errors import ConfigError
+
+# reader of a file's bytes by kind, and keys that the kind knows
+_READERS = {
+    "csv": (text_cells, ("separator", "decimal")),
+    "leica": (leica_cells, ("separator", "decimal")),
+    "spatial_analyzer": (spatial_analyzer_cells, ("separator", "decimal")),
+    "xlsx": (xlsx_cells, ("sheet",)),
+    "parquet": (parquet_cells, ()),
+}
+KINDS = tuple(_READERS)
+# kinds that a file's ending tells
+_ENDINGS = {".csv": "csv", ".parquet": "parquet", ".xlsx": "xlsx"}
+
+
+@dataclass(frozen=True)
+class Format:
+    """How a file is written; raises ConfigError for what does not exist.
+
+    kind: one of KINDS, None as the file's ending says; separator: between fields of a text, None: a comma, or of a
+    point list what it has; decimal: "." or ","; sheet: of a workbook, None where it has one alone.
+    """
+
+    kind: str | None = None
+    separator: str | None = None
+    decimal: str = "."
+    sheet: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind is not None and self.kind not in KINDS:
+            raise ConfigError(f"format is {self.kind!r}; allowed: {', '.join(KINDS)}")
+        if self.decimal not in (".", ","):
+            raise ConfigError(f"decimal is {self.decimal!r}; allowed: '.' or ','")
+        if self.separator is not None and (len(self.separator) != 1 or self.separator in '"\r\n.'):
+            raise ConfigError(f"separator is {self.separator!r}; allowed: one character, such as ';' or '\\t'")
+        if self.decimal == "," and self.separator == ",":
+            raise ConfigError("separator and decimal are both ','; allowed: two characters")
+
+    @classmethod
+    def from_config(cls, section: str | Mapping[str, Any] | None) -> Self:
+        """From the name of a kind, or a mapping of kind, separator, decimal and sheet."""
+        return cls(section) if section is None or isinstance(section, str) else cls(**section)
+
+    def kind_of(self, path: Path, problems: Problems) -> str:
+        """The kind of a file; refuses one whose ending tells none."""
+        kind = self.kind or _ENDINGS.get(path.suffix.lower())
+        if kind is None:
+            allowed = f"{', '.join(_ENDINGS)}, or the format stated: format: {' or '.join(KINDS)}"
+            problems.refuse_now(value=f"the extension {path.suffix!r}", allowed=allowed)
+        _, keys = _READERS[kind]
+        given = {"separator": self.separator, "decimal": self.decimal if self.decimal == "," else None}
+        given["sheet"] = self.sheet
+        for key, value in given.items():
+            if value is not None and key not in keys:
+                raise ConfigError(f"ingest of {path}: format {kind} has no {key}; allowed: {', '.join(keys) or 'none'}")
+        return kind
+
+
+def read_cells(path: Path, how: Format, problems: Problems) -> Cells:
+    """The Cells of a file; raises IngestError where it is not what its format says."""
+    data = read_bytes(path, problems)
+    kind = how.kind_of(path, problems)
+    reader, keys = _READERS[kind]
+    return partial(reader, **{key: getattr(how, key) for key in keys})(data, problems)

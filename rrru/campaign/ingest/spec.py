@@ -1,0 +1,85 @@
+"""How to read a measurement file: what the configuration says of it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Self
+
+import numpy as np
+
+from rrru.campaign.ingest.formats import Format
+from rrru.errors import ConfigError
+
+MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
+RAD = {"rad": 1.0, "deg": np.pi / 180.0}
+_AS_IT_ENDS = Format()
+_CHOICES = {
+    "unit": tuple(MM),
+    "angle_unit": tuple(RAD),
+    "frame": ("robot", "register"),
+    "extra_columns": ("refuse", "ignore"),
+    "elbow": ("out", "in"),
+}
+
+
+@dataclass(frozen=True)
+class IngestSpec:
+    """How to read a measurement file; raises ConfigError for a setting that does not exist.
+
+    columns: our name -> the file's column name, absent = the same name. unit: of the file's positions ("mm", "m",
+    "inch"; speeds are mm/s, payloads kg). angle_unit: "rad" or "deg". frame: of the measured positions; "register"
+    solves the six numbers between it and the robot frame from `registration_points`, pairs (run, point), none for all.
+    extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
+    places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
+    that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
+    with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
+    day in `time_s`.
+    """
+
+    path: str
+    columns: Mapping[str, str] = field(default_factory=dict)
+    unit: str = "mm"
+    angle_unit: str = "rad"
+    frame: str = "robot"
+    registration_points: tuple = ()
+    extra_columns: str = "refuse"
+    elbow: str = "out"
+    targets: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    world_targets: tuple[str, ...] = ()
+    format: Format = _AS_IT_ENDS
+    commands: str | None = None
+    commands_format: Format = _AS_IT_ENDS
+    time_format: str | None = None
+
+    def __post_init__(self) -> None:
+        theirs, points = [*self.columns.values()], self.registration_points
+        given = {key: getattr(self, key) for key in _CHOICES}
+        wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(_CHOICES[key])}" for key in _CHOICES]
+        wrong = [text for text, key in zip(wrong, _CHOICES, strict=True) if given[key] not in _CHOICES[key]]
+        doubled = [name for name in theirs if theirs.count(name) > 1]
+        wrong += [f"columns gives {name!r} two meanings; allowed: one of our names per column" for name in doubled]
+        if points and self.frame != "register":
+            wrong.append(f"registration_points with frame {self.frame!r}; allowed: frame register")
+        if not all(isinstance(pair, (tuple, list)) and len(pair) == 2 for pair in points):
+            wrong.append(f"registration_points {points!r}; allowed: pairs (run, point)")
+        if wrong:
+            raise ConfigError(f"ingest of {self.path}: {wrong[0]}")
+
+    @classmethod
+    def from_config(cls, section: Mapping[str, Any]) -> Self:
+        """From a campaign's section of the configuration, whose key `ingest` is the path."""
+        given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
+        points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
+        places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
+        beside = tuple(given.pop("world_targets", ()))
+        commands = given.pop("commands", None)
+        commands = commands if isinstance(commands, Mapping) else {"file": commands}
+        return cls(
+            section["ingest"],
+            registration_points=points,
+            targets=places,
+            world_targets=beside,
+            format=Format.from_config(given.pop("format", None)),
+            commands=commands["file"],
+            commands_format=Format.from_config(commands.get("format")),
+            **given,
+        )

@@ -1,0 +1,208 @@
+"""What is in a file of measurements, what will be used, what is missing and costs, and the overlay to paste.
+
+python -m rrru.studies.incoming.check_data FILE --robot rrru3 [--commands FILE] [--configfile mine.yaml]
+"""
+
+import argparse
+import sys
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import yaml
+
+from rrru.campaign.ingest.campaign_file import ingest
+from rrru.campaign.ingest.columns import REQUIRED, resolve
+from rrru.campaign.ingest.commands import with_commands
+from rrru.campaign.ingest.formats import read_cells
+from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
+from rrru.errors import ConfigError, IngestError, RrruError
+from rrru.studies import config as parts
+from rrru.studies import setup
+from rrru.studies.incoming.costs import costs, without_times
+from rrru.studies.incoming.guess import guess_clock, guess_columns, guess_format
+
+_SHOWN = 8
+_OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found of a file.
+
+    section: the campaign's section that is proposed; lines: what is said of it; refused: the problems that stay with
+    it, empty where ingest takes the file.
+    """
+
+    section: dict
+    lines: tuple[str, ...]
+    refused: tuple[dict, ...] = ()
+
+    @property
+    def overlay(self):
+        """The overlay to paste."""
+        name = "".join(one if one.isalnum() or one in "_-" else "_" for one in Path(self.section["ingest"]).stem)
+        return {"campaigns": {name: self.section}}
+
+
+def check_file(file, config, robot=None, commands=None):
+    """The Check of a file for a robot of the configuration.
+
+    A campaign of the configuration with this file is taken as it stands, and what it lacks is proposed. Raises
+    IngestError for a file that cannot be read and ConfigError for a robot that does not exist.
+    """
+    section = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
+    told = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
+    section = {"robot": None, "ingest": str(file)} | section | told
+    if section["robot"] not in config["robots"]:
+        known = ", ".join(config["robots"])
+        raise ConfigError(f"robot is {section['robot']!r}; allowed: {known}, or one of your own with --configfile")
+    mechanism = setup.mechanism(parts.robot(config, section))
+    for key, name in (("format", "ingest"), ("commands", "commands")):
+        section = _with_format(section, key, name)
+    cells, section = _with_columns(section, mechanism)
+    section, result, refused = _fitting(section, mechanism)
+    lines = [_content(section, cells), *_used(section, cells, mechanism)]
+    if result is None:
+        lines += [f"cost: {one}" for one in without_times(config, mechanism) if "time_s" in lines[-1]]
+    else:
+        lines += [f"note: {note}" for note in result.notes]
+        lines += [f"cost: {one}" for one in costs(result.measurements, config, section)]
+    return Check(section, tuple(lines), refused)
+
+
+def _with_format(section, key, name):
+    """The section with the format of the measured file, or that of the commands, if it needs one."""
+    given = section.get(name)
+    if given is None or (key in section and key == "format") or isinstance(given, dict):
+        return section
+    path = Path(given)
+    try:
+        found = guess_format(path, Problems(path))
+    except OSError:
+        return section
+    if found is None:
+        return section
+    return section | ({"format": found} if key == "format" else {"commands": {"file": given, "format": found}})
+
+
+def _with_columns(section, mechanism):
+    """Cells of the file, and the section with the columns that look like ours."""
+    spec = IngestSpec.from_config(section)
+    problems = Problems(spec.path)
+    cells = read_cells(Path(spec.path), spec.format, problems)
+    files = [cells]
+    if spec.commands:
+        files.append(read_cells(Path(spec.commands), spec.commands_format, Problems(spec.commands)))
+    columns = dict(section.get("columns", {}))
+    for one in files:
+        columns |= guess_columns(one, mechanism, columns)
+    section = section | ({"columns": columns} if columns else {})
+    clock = columns.get("time_s", cells.means.get("time_s", "time_s"))
+    pattern = next(filter(None, (guess_clock(one, clock) for one in files)), None)
+    if pattern and "time_format" not in section:
+        section = section | {"time_format": pattern}
+    spec = IngestSpec.from_config(section)
+    cells = with_commands(spec, cells, Problems(spec.path))
+    _, extra = resolve(replace(spec, extra_columns="ignore"), cells, mechanism, Problems(spec.path))
+    return cells, section | ({"extra_columns": "ignore"} if extra else {})
+
+
+def _fitting(section, mechanism):
+    """The section with the first units and frame under which ingest takes the file, what it makes of it, problems.
+
+    Units and frame that are stated stay. Where none fits the problems are those of the section as it is.
+    """
+    choices = {"frame": ("robot", "register"), "unit": tuple(MM), "angle_unit": tuple(RAD)}
+    usual = {key: values[0] for key, values in choices.items()}
+    open_choices = [((section[key],) if key in section else values) for key, values in choices.items()]
+    refused = ()
+    for values in product(*open_choices):
+        chosen = dict(zip(choices, values, strict=True))
+        stated = {key: value for key, value in chosen.items() if key in section or value != usual[key]}
+        try:
+            return section | stated, ingest(IngestSpec.from_config(section | stated), mechanism), ()
+        except IngestError as error:
+            refused = refused or error.problems
+    return section, None, refused
+
+
+def _content(section, cells):
+    """What the file is."""
+    kind = section.get("format") or "as its ending says"
+    more = f", commands from {section['commands']}" if "commands" in section else ""
+    return f"{section['ingest']}: {len(cells.rows)} rows, {len(cells.names)} columns, format {kind}{more}"
+
+
+def _used(section, cells, mechanism):
+    """Which columns are used as what, left out, missing."""
+    spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
+    found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
+    same = [ours for ours, theirs in found.items() if ours == theirs]
+    if same:
+        yield f"used: {', '.join(same)}"
+    yield from (f"used: {theirs!r} as {ours}" for ours, theirs in found.items() if ours != theirs)
+    left = [*cells.unused, *extra]
+    if left:
+        yield f"left out: {', '.join(left)}"
+    drives = set(mechanism.parts.columns) <= set(found)
+    missing = [ours for ours in REQUIRED if ours not in found and not (drives and ours.startswith("command"))]
+    if missing:
+        yield f"missing, and needed: {', '.join(missing)}"
+    if any(name.startswith("command") for name in missing):
+        other = f"the drives' values ({', '.join(mechanism.parts.columns)})"
+        yield f"where the robot was sent stands in no column: give a second file with --commands, or {other}"
+    optional = [ours for ours in _OPTIONAL if ours not in found]
+    if optional:
+        yield f"missing: {', '.join(optional)}"
+
+
+def read_config(overlays, base="config.yaml"):
+    """The configuration under overlays; raises ConfigError for what is no YAML mapping."""
+    config = {}
+    for file in (base, *overlays):
+        try:
+            section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a YAML file") from error
+        if not isinstance(section, dict):
+            raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
+        config = _merged(config, section)
+    return config
+
+
+def _merged(below, above):
+    """A mapping under another one."""
+    both = {
+        key: _merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
+        for key, value in above.items()
+    }
+    return below | both
+
+
+def main(arguments=None):
+    """Print the check of a file; the exit code is 1 where ingest would refuse it, 2 where there is nothing to say."""
+    parser = argparse.ArgumentParser(prog="check_data", description=__doc__.splitlines()[0])
+    parser.add_argument("file")
+    parser.add_argument("--robot", help="entry of robots: in the configuration")
+    parser.add_argument("--commands", help="second file with what was commanded")
+    parser.add_argument("--configfile", nargs="*", default=[], help="overlays of config.yaml")
+    given = parser.parse_args(arguments)
+    try:
+        found = check_file(given.file, read_config(given.configfile), given.robot, given.commands)
+    except RrruError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print("\n".join(found.lines))
+    for problem in found.refused[:_SHOWN]:
+        print(f"refused: {IngestError([problem])}")
+    if len(found.refused) > _SHOWN:
+        print(f"refused: {len(found.refused) - _SHOWN} problems more")
+    print("\noverlay to paste:\n")
+    print(yaml.safe_dump(found.overlay, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110))
+    return 1 if found.refused else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

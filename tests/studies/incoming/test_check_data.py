@@ -1,0 +1,152 @@
+"""What is said of a file before anything runs is right, and the proposed overlay reads the file."""
+
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rrru.campaign.ingest.campaign_file import ingest
+from rrru.campaign.ingest.spec import IngestSpec
+from rrru.robots.rrru3 import Rrru3
+from rrru.studies.incoming.check_data import check_file, main, read_config
+from tests.campaign.ingest.samples import SAMPLES, section
+from tests.places import DATA, ROOT
+
+ROBOT = Rrru3()
+CONFIG = read_config([], ROOT / "config.yaml") | {"campaigns": {}}
+SCHEMA = yaml.safe_load((ROOT / "workflow" / "schemas" / "config.schema.yaml").read_text())
+FIELD = pd.read_csv(DATA / "field_09.csv")
+LENGTHS = [f"{name}_{axis}_mm" for name in ("command", "measured") for axis in "xyz"]
+
+
+def proposed(found):
+    """The only section of the overlay as it is read from what is printed."""
+    overlay = yaml.safe_load(yaml.safe_dump(found.overlay))
+    jsonschema.validate(overlay["campaigns"], SCHEMA["properties"]["campaigns"] | {"$defs": SCHEMA["$defs"]})
+    return next(iter(overlay["campaigns"].values()))
+
+
+def checked(frame, folder, robot="rrru3", **config):
+    """The check of a file that holds a frame."""
+    frame.to_csv(folder / "mine.csv", index=False)
+    return check_file(folder / "mine.csv", CONFIG | config, robot)
+
+
+def costs(found):
+    """What is said of costs."""
+    return [line.removeprefix("cost: ") for line in found.lines if line.startswith("cost: ")]
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_the_proposed_overlay_reads_a_sample_as_its_own_declaration_does(name):
+    own = section(name)
+    found = check_file(own["ingest"], CONFIG, "rrru3", own.get("commands"))
+    assert found.refused == ()
+    table = ingest(IngestSpec.from_config(proposed(found)), ROBOT).measurements
+    pd.testing.assert_frame_equal(table, ingest(IngestSpec.from_config(own), ROBOT).measurements)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "turned"), [("m", 1e-3, False), ("inch", 1.0 / 25.4, True), ("mm", 1.0, True)]
+)
+def test_units_frame_and_names_are_proposed(unit, factor, turned, tmp_path):
+    frame = FIELD.copy()
+    if turned:
+        measured = [f"measured_{axis}_mm" for axis in "xyz"]
+        frame[measured] = frame[measured].to_numpy()[:, [1, 2, 0]] + 2000.0
+    frame[LENGTHS] *= factor
+    degrees = [f"theta{k}_rad" for k in (1, 2, 3)]
+    frame[degrees] = np.degrees(frame[degrees])
+    names = {"trajectory": "Path", "time_s": "Time [s]", "command_x_mm": "Goal X", "measured_y_mm": "Meas Y"}
+    found = checked(frame.rename(columns=names), tmp_path)
+    chosen = proposed(found)
+    assert chosen["columns"] == names and chosen["angle_unit"] == "deg"
+    assert (chosen.get("unit", "mm"), chosen.get("frame", "robot")) == (unit, "register" if turned else "robot")
+    table = ingest(IngestSpec.from_config(chosen), ROBOT).measurements
+    assert np.allclose(table[LENGTHS[:3]], FIELD[LENGTHS[:3]], rtol=0.0, atol=1e-6)
+
+
+def test_a_file_that_holds_everything_costs_nothing(tmp_path):
+    found = checked(
+        FIELD, tmp_path, campaigns={"a": {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "noise_mm": 0.02}}
+    )
+    assert costs(found) == [] and found.refused == ()
+    assert proposed(found) == {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "noise_mm": 0.02}
+
+
+def test_what_lacks_times_is_named(tmp_path):
+    said = " ".join(costs(checked(FIELD.drop(columns="time_s"), tmp_path)))
+    unseen = [part for part in said.split("cannot be seen: ")[1:] if "time_s" in part]
+    assert {word for word in ("thermal_growth", "servo_lag", "backlash") if any(word in part for part in unseen)} == {
+        "thermal_growth",
+        "servo_lag",
+    }
+
+
+def test_what_is_driven_once_with_one_payload_is_told(tmp_path):
+    once = FIELD[(FIELD["run"] == 1)]
+    drive = once[[f"theta{k}_rad" for k in (1, 2, 3)]]
+    same = [name for name in drive if (np.diff(drive[name]) > 0).all() or (np.diff(drive[name]) < 0).all()]
+    assert same
+    said = costs(checked(once, tmp_path))
+    for text in ("one payload", "no place is measured in two runs", "nobody states the noise"):
+        assert any(text in one for one in said), text
+    assert any(one.startswith("always approached from one side") and all(name in one for name in same) for one in said)
+
+
+def test_too_few_points_for_a_diagnosis_are_told(tmp_path):
+    assert costs(checked(FIELD.head(10), tmp_path))[0].startswith("no diagnosis: ")
+
+
+def test_a_list_without_commands_says_what_to_give(tmp_path):
+    found = check_file(section("leica")["ingest"], CONFIG, "rrru3")
+    assert any("--commands" in line for line in found.lines)
+    assert {problem["column"] for problem in found.refused} == {f"command_{axis}_mm" for axis in "xyz"}
+
+
+def test_names_that_look_like_nothing_are_not_guessed(tmp_path):
+    found = checked(FIELD.rename(columns={"measured_x_mm": "blue"}), tmp_path)
+    assert "columns" not in found.section and any(problem["column"] == "measured_x_mm" for problem in found.refused)
+
+
+def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    assert main(["data/field_12.csv", "--robot", "rrru3"]) == 0
+    text = capsys.readouterr().out
+    overlay = yaml.safe_load(text.partition("overlay to paste:")[2])
+    assert overlay == {"campaigns": {"field_12": {"robot": "rrru3", "ingest": "data/field_12.csv"}}}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nothere.csv", "--robot", "rrru3"], "no such file"),
+        (["data", "--robot", "rrru3"], "a directory"),
+        (["data/field_02.csv"], "robot is None; allowed: rrru3"),
+        (["data/field_01.csv", "--robot", "rrru9"], "robot is 'rrru9'"),
+        (["data/field_01.csv", "--robot", "rrru3", "--configfile", "nothere.yaml"], "nothere.yaml"),
+        (["data/field_01.csv", "--robot", "rrru3", "--configfile", "Makefile"], "allowed: a YAML file"),
+        (["data/field_01.csv", "--robot", "rrru3", "--commands", "nothere.csv"], "nothere.csv: got no such file"),
+    ],
+)
+def test_what_cannot_be_checked_is_told_without_a_traceback(arguments, said, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    assert main(arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@given(
+    data=st.one_of(st.binary(max_size=200), st.text(alphabet="xyzXYZ/,;\t\n [m]1.-", max_size=200).map(str.encode)),
+    ending=st.sampled_from([".csv", ".txt", ".xlsx", ".parquet", ""]),
+)
+def test_any_file_at_all_is_told(data, ending, tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    path = Path(tmp_path, f"any{ending}")
+    path.write_bytes(data)
+    assert main([str(path), "--robot", "rrru3"]) in (1, 2)
