@@ -2,7 +2,7 @@
 
 Python runs, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
 shell's lines `snakemake` is run dry, and `make` says what it would do. A comment `<!-- file: name -->` before a block
-is the name that a reader saves it under. `text` is not for running.
+is the name that a reader saves it under. Keys under "# part of a campaign" are tried in one. `text` is not for running.
 """
 
 import re
@@ -10,6 +10,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import textwrap
 
 import pandas as pd
 import pytest
@@ -19,6 +20,9 @@ from tests.workflow.folder import dry_run, link
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
 _BLOCK = re.compile(r"(?:<!-- file: (\S+) -->\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+
+
+_PART, _CAMPAIGN = "# part of a campaign\n", "campaigns:\n  my_run:\n    robot: rrru3\n    ingest: my_file.csv\n"
 
 
 def blocks(page):
@@ -60,6 +64,8 @@ def _try(kind, text, folder, name):
         told = subprocess.run(command, input=text, cwd=folder, capture_output=True, text=True, check=False)
         assert told.returncode == 0, f"{text}\n{told.stderr}"
     elif kind == "yaml":
+        if text.startswith(_PART):
+            text = _CAMPAIGN + textwrap.indent(text, "    ")
         (folder / name).write_text(text)
         code, output = dry_run(folder, overlays=(name,))
         assert code == 0, f"{text}\n{output}"
