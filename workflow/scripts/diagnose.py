@@ -1,13 +1,14 @@
-"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figure."""
+"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figures."""
 
 import pandas as pd
 
 from rrru.figures.drawing import draw_all
+from rrru.gap.answer import answer
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import tables_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
-from rrru.store import tables
+from rrru.store import facts, tables
 from rrru.store.job import run
 from rrru.studies import setup
 
@@ -20,6 +21,7 @@ def main(settings, inputs, outputs):
     robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)
+    facts.write(answer(settings["campaign"], result.verdict, result.tables), outputs["verdict"])
     points = result.tables.pop("gap_points")
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     frames = {name: frame.assign(campaign=settings["campaign"]) for name, frame in frames.items()}

@@ -30,6 +30,11 @@ def part(name, campaign="{campaign}"):
     return f"{RESULTS}/campaigns/{campaign}/{name}.parquet"
 
 
+def verdict(campaign="{campaign}"):
+    """Path of one campaign's answer for scripts."""
+    return f"{RESULTS}/campaigns/{campaign}/verdict.json"
+
+
 def table(name):
     """Path of a table of the whole study."""
     return f"{RESULTS}/tables/{name}.parquet"
@@ -46,8 +51,9 @@ def named(names, place=table):
 
 
 def drawn(figures, folder="figures"):
-    """Paths of figures as PDF and PNG, by name."""
-    return {f"{name}_{kind}": f"{RESULTS}/{folder}/{name}.{kind}" for name in figures for kind in ("pdf", "png")}
+    """Paths of figures as PDF, PNG and SVG, by name."""
+    kinds = ("pdf", "png", "svg")
+    return {f"{name}_{kind}": f"{RESULTS}/{folder}/{name}.{kind}" for name in figures for kind in kinds}
 
 
 def shown(figures):
@@ -107,7 +113,7 @@ def diagnosed(wildcards):
         "noise_rad": section.get("noise_rad"),
         "noise_known": section.get("noise_known", False),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
-        "figures": GAP_FIGURE,
+        "figures": GAP_FIGURES,
         "options": {"campaign": wildcards.campaign},
         **reads("seed", "gap"),
     }

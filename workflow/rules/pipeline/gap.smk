@@ -11,25 +11,27 @@ GAP_TABLES = [
     "gap_next_runs",
     "gap_next_poses",
 ]
-GAP_FIGURE = {
-    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"])
+GAP_FIGURES = {
+    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"]),
+    "gap_map": ("rrru.figures.gap:where", ["gap_verdicts", "gap_points"]),
 }
 
 
-# one job per campaign, its figure included: starting another would take longer than drawing it. It sees the
+# one job per campaign, its figures included: starting another would take longer than drawing them. It sees the
 # measurements and what the configuration says of the robot
 rule diagnose:
     input:
         measurements=part("measurements"),
     output:
         **named([*GAP_TABLES, "gap_points"], part),
-        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        verdict=verdict(),
+        **drawn(GAP_FIGURES, "figures/{campaign}"),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
         settings=diagnosed,
         own_effects=own_effects_digests(),
-        code=code("diagnose", GAP_FIGURE),
+        code=code("diagnose", GAP_FIGURES),
     script:
         "../../scripts/diagnose.py"
 
@@ -47,6 +49,7 @@ rule gap:
     input:
         named(GAP_TABLES).values(),
         [f"{RESULTS}/figures/{campaign}/gap.png" for campaign in DIAGNOSED],
+        [verdict(campaign) for campaign in DIAGNOSED],
 
 
 TARGETS += rules.gap.input
