@@ -67,9 +67,13 @@ def short(value):
     return shown.replace("-", MINUS)
 
 
-def grid(frame, key, title, table=None, path=""):
-    """A Grid of a frame; table: the Table whose columns it has, for what they mean, None where there is none."""
+def grid(frame, key, title, table=None, path="", heads=None):
+    """A Grid of a frame.
+
+    table: the Table whose columns it has, for what they mean, None where there is none; heads: words of single columns.
+    """
     meaning = {column.name: column.description for column in table.columns} if table else {}
-    columns = [Column(n, words(n), meaning.get(n, ""), pd.api.types.is_numeric_dtype(frame[n])) for n in frame]
+    heads = {name: words(name) for name in frame} | (heads or {})
+    columns = [Column(n, heads[n], meaning.get(n, ""), pd.api.types.is_numeric_dtype(frame[n])) for n in frame]
     rows = [[text(value) for value in row] for row in frame.itertuples(index=False)]
     return Grid(key, title, table.description if table else "", path, columns, rows)

@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
+from rrru.report.compare_unseen import over_runs
+
 _PARTS = ("effect", "scatter", "runs", "unexplained")
 
 
@@ -30,6 +32,7 @@ def gap_difference(first, second):
         _row(name, *(_interval(side, part.get(name)) for side, part in zip((first, second), listed, strict=True)))
         for name in names
     ]
+    rows = [row for row in rows if row["a_rms_mm"] > 0.0 or row["b_rms_mm"] > 0.0]
     return GapDifference(pd.DataFrame(rows), float(2.0 * norm.sf(abs(apart) / error)) if error > 0.0 else 1.0)
 
 
@@ -42,10 +45,8 @@ def _square(side):
     """Mean square of the gap, noise taken out, and its standard error over the runs."""
     points = side.frames["gap_points"].query("used")
     size = (points[[f"before_{axis}_mm" for axis in "xyz"]] ** 2).sum(axis=1)
-    runs = size.groupby(points["run"]).agg(["mean", "size"])
-    mean, weight = size.mean(), runs["size"] / len(size)
-    error = np.sqrt((weight**2 * (runs["mean"] - mean) ** 2).sum() * len(runs) / max(len(runs) - 1, 1))
-    return float(mean - side.verdict["noise_rms_mm"] ** 2), float(error)
+    mean, error = over_runs(size, points["run"])
+    return mean - side.verdict["noise_rms_mm"] ** 2, error
 
 
 def _interval(side, part):

@@ -7,10 +7,13 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import pandas as pd
+
 from rrru.errors import ConfigError, RrruError
 from rrru.gap.answer import probability, readable, rounded
 from rrru.report import cells, compare, page
 from rrru.report.compare_gap import gap_difference
+from rrru.report.compare_unseen import same_points, unseen
 
 _RESULTS = "results"
 # less likely by chance than this counts as a difference
@@ -74,16 +77,18 @@ def _chapter(first, second):
     compare.check(one, other)
     calibration = compare.widest(one, other)
     found, gap = compare.difference(one, other, calibration), gap_difference(one, other)
-    unseen, shared = compare.unseen(one, other, calibration), compare.shared(one, other)
-    sentences = [_numbers(found, shared), *_gap(one, other, gap), _better(one, other, unseen)]
+    judged, shared = unseen(one, other, calibration), same_points(one, other)
+    sentences = [_numbers(found, shared), *_gap(one, other, gap), *_better((one, other), judged)]
     key = "-".join(dict.fromkeys(campaign for _, campaign in (first, second)))
-    tables = {"numbers": ("Fitted numbers", found.rows), "gap": ("What the miss is made of", gap.rows)}
-    if unseen is not None:
-        tables["unseen"] = ("Errors at points that neither has seen", unseen.rows)
-    grids = [cells.grid(_headed(frame, names), f"{key}-{name}", title) for name, (title, frame) in tables.items()]
-    return Chapter(
-        key, f"{names[0]} beside {names[1]}", sentences, _points(one, other, unseen, calibration, shared), grids
-    )
+    shown = [("Fitted numbers", found.rows), ("What the miss is made of, with 95 % intervals", gap.rows)]
+    if judged:
+        rows = pd.concat([place.rows for place in judged], ignore_index=True)
+        shown.append(("Errors at points that neither has seen", rows))
+    grids = [
+        cells.grid(frame, f"{key}-{number}", title, heads=_heads(frame, names))
+        for number, (title, frame) in enumerate(shown, start=1)
+    ]
+    return Chapter(key, f"{names[0]} beside {names[1]}", sentences, _points(judged, calibration, shared), grids)
 
 
 def _numbers(found, shared):
@@ -92,7 +97,8 @@ def _numbers(found, shared):
     if known.empty:
         return "The fitted numbers cannot be compared: none has a standard error on both sides."
     largest = known.loc[known["in_errors"].abs().idxmax()]
-    measure = f"chi-square {found.chi_square:.1f} with {found.freedom} numbers, by chance {_chance(found.chance)}"
+    square = f"chi-square {cells.short(found.chi_square)} with {found.freedom} numbers"
+    measure = f"{square}, by chance with probability {_chance(found.chance)}"
     most = f"most {largest['parameter']}, by {abs(largest['in_errors']):.1f} standard errors"
     said = "differ by more than their errors" if found.chance < _LEVEL else "do not differ beyond their errors"
     beside = f" Both share {shared} measured points, so that the true chi-square is no smaller." if shared else ""
@@ -111,40 +117,53 @@ def _gap(one, other, gap):
     differs = list(gap.rows.loc[gap.rows["differs"], "part"])
     said = "differ" if gap.chance < _LEVEL else "do not differ beyond chance"
     parts = f" Parts that differ: {', '.join(map(readable, differs))}." if differs else ""
-    yield f"As a whole the two {said} (by chance {_chance(gap.chance)}).{parts}"
+    yield f"As a whole the two {said} (by chance with probability {_chance(gap.chance)}).{parts}"
 
 
-def _better(one, other, unseen):
-    """Which side foretells better."""
-    if unseen is None:
-        return "Which one foretells better cannot be said: there are no points that neither has seen."
-    sizes = f"{rounded(unseen.rms_mm[0])} mm against {rounded(unseen.rms_mm[1])} mm"
-    where, chance = f"On {unseen.points} points that neither has seen", f"by chance {_chance(unseen.chance)}"
-    if unseen.chance >= _LEVEL:
-        return f"{where} they are equally good, but for chance ({sizes}; {chance})."
-    better = one.name if unseen.better_mm2 > 0.0 else other.name
-    return f"{where} {better} is better: {sizes} ({chance})."
+def _better(sides, judged):
+    """Which side foretells better, campaign by campaign, and what follows."""
+    winners = []
+    for place in judged:
+        sizes = f"{rounded(place.rms_mm[0])} mm against {rounded(place.rms_mm[1])} mm"
+        where = f"On {place.points} points of {place.campaign} that neither has seen"
+        clear = place.chance < _LEVEL
+        winners.append((sides[0] if place.gain_mm2 > 0.0 else sides[1]) if clear else None)
+        said = f"{winners[-1].name} is better" if clear else "they are equally good, but for chance"
+        yield f"{where} {said}: {sizes} (by chance with probability {_chance(place.chance)})."
+    yield f"Which to trust: {_trusted(sides, winners)}"
 
 
-def _points(one, other, unseen, calibration, shared):
+def _trusted(sides, winners):
+    """The advice that follows from who is better on whose points."""
+    distinct = {side.name for side in winners if side}
+    if not winners:
+        return "cannot be said, there are no points that neither has seen."
+    if not distinct:
+        return "either; these points do not tell them apart."
+    if len(distinct) == 1:
+        return f"{distinct.pop()}."
+    if winners == list(sides):
+        return "each on its own measurements: the robot or its frame has changed in between, or these are two robots."
+    return "neither: each is worse on its own measurements than the other."
+
+
+def _points(judged, calibration, shared):
     """Which points the comparison was made on."""
-    if unseen is None:
-        return ""
-    counts = unseen.rows.groupby("place", sort=False)["points"].sum()
-    listed = " and ".join(f"{count} of {place}" for place, count in counts.items())
+    listed = " and ".join(f"{place.points} of {place.campaign}" for place in judged) or "none"
     same = " Points that both have measured are left out of both fits." if shared else ""
     return (
-        f"The points: {listed}, of the set {calibration!r}. Each is foretold by the other campaign's calibration, which "
-        "has not seen it, and by its own campaign's, fitted again without the trajectory, run or stretch that it lies "
-        f"on.{same} Chance is counted over the runs."
+        f"The points: {listed}, of the set {calibration!r}. Each is foretold by the other campaign's calibration, "
+        "which has not seen it, and by its own campaign's, fitted again without the trajectory, run or stretch of it."
+        f"{same} Chance is counted over the runs. Standard errors hold if the model lacks nothing: where effects are "
+        "named, fitted numbers may differ for these."
     )
 
 
-def _headed(frame, names):
-    """The frame with the sides' names for a and b."""
+def _heads(frame, names):
+    """Words of the columns of both sides: their names for a and b."""
     own = {"a": names[0], "b": names[1]}
-    heads = {name: f"{own[name[0]]} {name[2:]}".strip() for name in frame if name.partition("_")[0] in own}
-    return frame.rename(columns=heads)
+    sides = [name for name in frame if name.partition("_")[0] in own]
+    return {name: f"{own[name[0]]} {cells.words(name[2:])}".strip() for name in sides}
 
 
 def _chance(value):
