@@ -16,20 +16,22 @@ def test_a_number_keeps_four_digits(value):
     assert float(text.replace(cells.MINUS, "-")) == pytest.approx(value, rel=5.001e-4, abs=1e-300) and len(text) < 12
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(True, "yes"), (np.bool_(False), "no"), (None, "–"), (np.nan, "–"), (0.0, "0"), (-3, "\N{MINUS SIGN}3")]
-    + [(0.25, "0.25"), (1234.5, "1234"), (2.0, "2"), ("a-b", "a-b"), (np.inf, "inf")],
+_CELLS = (
+    *((True, "yes"), (np.bool_(False), "no"), (None, "–"), (np.nan, "–"), (0.0, "0"), (-3, "\N{MINUS SIGN}3")),
+    *((0.25, "0.25"), (1234.5, "1234"), (2.0, "2"), ("a-b", "a-b"), (np.inf, "inf")),
 )
+_HEADS = (
+    *(("gap_rms_mm", "gap rms (mm)"), ("speed_mm_s", "speed (mm/s)"), ("points", "points")),
+    *(("share_low", "share low"), ("per_travel_um_per_mm", "per travel (µm/mm)"), ("benefit_percent", "benefit (%)")),
+)
+
+
+@pytest.mark.parametrize(("value", "text"), _CELLS)
 def test_cells_are_short(value, text):
     assert cells.text(value) == text
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [("gap_rms_mm", "gap rms (mm)"), ("speed_mm_s", "speed (mm/s)"), ("points", "points"), ("share_low", "share low")]
-    + [("per_travel_um_per_mm", "per travel (µm/mm)"), ("benefit_percent", "benefit (%)")],
-)
+@pytest.mark.parametrize(("name", "words"), _HEADS)
 def test_a_column_is_named_in_words(name, words):
     assert cells.words(name) == words
 
