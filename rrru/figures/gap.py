@@ -4,6 +4,7 @@ from textwrap import wrap
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import choose, gap_budget, gap_map, style
@@ -20,6 +21,8 @@ _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
 # width that the maps get, and the most that a page is high
 _MAP_MM, _MOST_MM = 74.0, 238.0
 _BUDGET_MM = 16.0
+# steps of the arrows' scale: more numbers run into one another
+_TICKS = 5
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
@@ -76,7 +79,8 @@ def _map(figure, panels, used, verdict, z_down, mark=""):
     arrows, beyond, factor = gap_map.draw(panels, used, worst, z_down)
     panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst spot")
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
-    figure.colorbar(arrows, ax=panels["side view"], **place).set_label("measured minus calibrated sim (mm)")
+    bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
+    bar.set_label("measured minus calibrated sim (mm)")
 
 
 def _sized(points, campaign):

@@ -98,10 +98,15 @@ def _parts(budget):
             _WORDS.get(part["kind"], readable(part["part"])),
             _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
             round(100.0 * part["share"] / whole, 2),
-            f"{100 * part['share']:.0f} % ({100 * max(part['share_low'], 0):.0f} to {100 * part['share_high']:.0f})",
+            f"{_percent(part['share'])} % ({_percent(part['share_low'])} to {_percent(part['share_high'])})",
         )
         for number, part in enumerate([*effects, *others])
     ]
+
+
+def _percent(share):
+    """A share as a number of per cent; what effects that imitate each other have too much is left out."""
+    return f"{100.0 * min(max(share, 0.0), 1.0):.0f}"
 
 
 def _steps(facts):

@@ -11,17 +11,19 @@ _UNITS = {unit: unit for unit in ("mm", "rad", "deg", "s", "kg", "nats")}
 _UNITS |= {"mm_s": "mm/s", "percent": "%", "um": "µm", "um_per_mm": "µm/mm", "px": "pixel"}
 _UNIT = re.compile(rf"_({'|'.join(sorted(_UNITS, key=len, reverse=True))})$")
 _DIGITS = 4
+# letters of a text that needs a wide column, and a wider one
+_LONG, _LONGER = 40, 150
 MINUS = "\N{MINUS SIGN}"
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column's head: name in the file, words, hint, and whether it holds numbers."""
+    """A column's head: name in the file, words, hint, and its look: "n" for numbers, "w" and "x" for long texts."""
 
     name: str
     words: str
     hint: str
-    number: bool
+    look: str
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,11 @@ def grid(frame, key, title, table=None, path="", heads=None):
     """
     meaning = {column.name: column.description for column in table.columns} if table else {}
     heads = {name: words(name) for name in frame} | (heads or {})
-    columns = [Column(n, heads[n], meaning.get(n, ""), pd.api.types.is_numeric_dtype(frame[n])) for n in frame]
     rows = [[text(value) for value in row] for row in frame.itertuples(index=False)]
+    longest = [max(map(len, cells), default=0) for cells in zip(*rows, strict=True)] or [0] * len(frame.columns)
+    looks = [
+        "n" if pd.api.types.is_numeric_dtype(frame[n]) else "x" if size > _LONGER else "w" * (size > _LONG)
+        for n, size in zip(frame, longest, strict=True)
+    ]
+    columns = [Column(n, heads[n], meaning.get(n, ""), look) for n, look in zip(frame, looks, strict=True)]
     return Grid(key, title, table.description if table else "", path, columns, rows)

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Shown:
-    """A table: its name, its title, the columns shown (all where empty) and the rows (a query; all where empty)."""
+    """A table: its name, its title, the columns shown, as far as they are there (all where empty),
+    and the rows (a query; all where empty).
+    """
 
     name: str
     title: str
@@ -143,7 +145,12 @@ SECTIONS = (
             ("delta_images", "What the camera sees"),
         ),
         tables=(
-            Shown("delta_calibrations", "Calibrations"),
+            Shown(
+                "delta_calibrations",
+                "Calibrations",
+                "variant source measure planes poses equations rank condition residual_rms_mm plane_mean_mm "
+                "plane_max_mm base_mean_mm base_max_mm",
+            ),
             Shown("delta_draws", "Over other draws of chance"),
             Shown("delta_robots", "Over other robots"),
             Shown("delta_camera", "The camera"),
@@ -155,7 +162,12 @@ SECTIONS = (
         "Linear deltas from what their owners measured, beside the answer saved with them.",
         figures=(("printers", "Every printer"),),
         tables=(
-            Shown("printers", "Printers"),
+            Shown(
+                "printers",
+                "Printers",
+                "printer source verdict reason cause suspect heights distances height_rms_fitted_mm "
+                "distance_rms_fitted_mm arm_standard_error_mm notes",
+            ),
             Shown("printer_causes", "Causes tried"),
             Shown("printer_readings", "Readings"),
         ),

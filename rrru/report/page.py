@@ -111,7 +111,8 @@ class Results:
         if frame is None:
             return None
         frame = frame.query(shown.rows) if shown.rows else frame
-        frame = frame[shown.columns.split()] if shown.columns else frame.dropna(axis="columns", how="all")
+        columns = [name for name in shown.columns.split() or frame if name in frame]
+        frame = frame[columns].dropna(axis="columns", how="all")
         place = self.place(shown.name).relative_to(self.folder)
         made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place))
         return made if made.rows else None

@@ -41,5 +41,5 @@ def test_a_grid_says_what_its_columns_mean():
     frame = pd.DataFrame({"campaign": ["a"], "rank": [1], "probability": [0.5]})
     made = cells.grid(frame, "key", "Title", table, heads={"rank": "place"})
     assert [column.words for column in made.columns] == ["campaign", "place", "probability"]
-    assert [column.number for column in made.columns] == [False, True, True]
+    assert [column.look for column in made.columns] == ["", "n", "n"]
     assert made.columns[1].hint == "1: most probable" and made.rows == [["a", "1", "0.5"]]

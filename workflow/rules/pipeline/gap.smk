@@ -24,8 +24,8 @@ rule diagnose:
         measurements=part("measurements"),
     output:
         **named([*GAP_TABLES, "gap_points"], part),
-        verdict=verdict(),
         **drawn(GAP_FIGURES, "figures/{campaign}"),
+        verdict=verdict(),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     params:
