@@ -81,6 +81,11 @@ def probability(value):
     return "more than 0.99" if value > 0.995 else "less than 0.01" if value < 0.005 else f"{value:.2f}"
 
 
+def percent(share):
+    """A share in per cent; what effects that imitate each other have too much is left out."""
+    return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
+
+
 def _row(values, names):
     """Some entries of a mapping."""
     return {name: values[name] for name in names}
@@ -119,7 +124,7 @@ def _causes(facts):
     if sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + _WORTH:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
-        share = _percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
+        share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
             said.append(f"Beside that {share} is systematic and like no effect of the library.")
         else:
@@ -133,7 +138,7 @@ def _causes(facts):
 
 def _cause(effect, follow):
     """One effect: its share, name, leg, sizes and meaning."""
-    share = f"{_percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
+    share = f"{percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
     leg = f" in leg {effect['legs']}" if effect["legs"].isdigit() else ""
     sizes = _sizes(effect["parameters"])
     size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
@@ -156,7 +161,7 @@ def _scatter(facts):
     share = sum(part["share"] for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
     if share < _WORTH:
         return []
-    return [f"{_percent(share)} does not repeat from pass to pass: no model can take that away."]
+    return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
 
 
 def _left(facts):
@@ -184,8 +189,3 @@ def _contest(separates):
     first, second = (set(side.split("+")) for side in separates.split(" / "))
     sides = [" + ".join(map(readable, sorted(one - other))) for one, other in ((first, second), (second, first))]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
-
-
-def _percent(share):
-    """A share in per cent, no more than all."""
-    return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"

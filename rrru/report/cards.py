@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import probability, readable, rounded
+from rrru.gap.answer import percent, probability, readable, rounded
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
 _EFFECTS = ("blue", "sky", "green", "pink", "yellow")
@@ -82,7 +82,7 @@ def _short(facts):
     if facts["unexplained"]:
         share = next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained")
         named.append(("something unexplained", share))
-    causes = ", ".join(words if share is None else f"{words} {100 * share:.0f} %" for words, share in named)
+    causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
 
@@ -98,15 +98,10 @@ def _parts(budget):
             _WORDS.get(part["kind"], readable(part["part"])),
             _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
             round(100.0 * part["share"] / whole, 2),
-            f"{_percent(part['share'])} % ({_percent(part['share_low'])} to {_percent(part['share_high'])})",
+            f"{percent(part['share'])} ({percent(part['share_low'])} to {percent(part['share_high'])})",
         )
         for number, part in enumerate([*effects, *others])
     ]
-
-
-def _percent(share):
-    """A share as a number of per cent; what effects that imitate each other have too much is left out."""
-    return f"{100.0 * min(max(share, 0.0), 1.0):.0f}"
 
 
 def _steps(facts):
