@@ -1,6 +1,6 @@
 """Every code block of README and docs does what a reader would do with it.
 
-Python runs, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
+A page's Python runs as one program, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
 shell's lines `snakemake` is run dry, and `make` says what it would do. A comment `<!-- file: name -->` before a block
 is the name that a reader saves it under. Keys under "# part of a campaign" are tried in one. `text` is not for running.
 """
@@ -57,33 +57,41 @@ def _shell(line, folder):
     return dry_run(folder, *told[:split], overlays=tuple(told[split + 1 :]))
 
 
-def _try(kind, text, folder, name):
-    """Run one block."""
-    if kind == "python":
-        command = [sys.executable, "-"]
-        told = subprocess.run(command, input=text, cwd=folder, capture_output=True, text=True, check=False)
-        assert told.returncode == 0, f"{text}\n{told.stderr}"
-    elif kind == "yaml":
-        if text.startswith(_PART):
-            text = _CAMPAIGN + textwrap.indent(text, "    ")
-        (folder / name).write_text(text)
-        code, output = dry_run(folder, overlays=(name,))
-        assert code == 0, f"{text}\n{output}"
-    elif kind == "sh":
-        for line in text.splitlines():
-            code, output = _shell(line, folder)
-            assert code == 0, f"{line}\n{output}"
+def _overlay(text, folder, name):
+    """Plan a run with an overlay."""
+    if text.startswith(_PART):
+        text = _CAMPAIGN + textwrap.indent(text, "    ")
+    (folder / name).write_text(text)
+    code, output = dry_run(folder, overlays=(name,))
+    assert code == 0, f"{text}\n{output}"
+
+
+def _commands(text, folder):
+    """Say what every line would do."""
+    for line in text.splitlines():
+        code, output = _shell(line, folder)
+        assert code == 0, f"{line}\n{output}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_blocks_of_a_page_do_what_they_say(page, results, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     _readers_folder(tmp_path, results)
+    program = []
     for name, kind, text in blocks(page):
         assert kind in ("python", "yaml", "sh", "text", "json", "xml"), f"{page.name}: a block of language {kind!r}"
         if name:
             (tmp_path / name).write_text(text)
-        _try(kind, text, tmp_path, name or "mine.yaml")
+        if kind == "python":
+            program.append(text)
+        elif kind == "yaml":
+            _overlay(text, tmp_path, name or "mine.yaml")
+        elif kind == "sh":
+            _commands(text, tmp_path)
+    told = subprocess.run(
+        [sys.executable, "-"], input="\n".join(program), cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 0, told.stderr
 
 
 def test_every_link_of_a_page_leads_somewhere():
