@@ -1,8 +1,9 @@
 """Every code block of README and docs does what a reader would do with it.
 
-A page's Python runs as one program, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
-shell's lines `snakemake` is run dry, and `make` says what it would do. A comment `<!-- file: name -->` before a block
-is the name that a reader saves it under. Keys under "# part of a campaign" are tried in one. `text` is not for running.
+A page's Python runs as one program, beside the results of the workflow's shared run. YAML is an overlay of which a dry
+run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell's lines `snakemake` is run dry, and
+`make` says what it would do. A comment `<!-- file: name -->` before a block is the name that a reader saves it under.
+`text` is not for running.
 """
 
 import re
