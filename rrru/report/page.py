@@ -1,6 +1,7 @@
 """The report: one HTML file that needs nothing else, from what lies in a folder of results."""
 
 import base64
+import html
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -71,12 +72,15 @@ class Results:
         return None if frame is None or frame.empty else frame
 
     def campaigns(self):
-        """Campaigns that have an answer, measured ones first."""
-        found = [place.parent.name for place in sorted(self.folder.glob("campaigns/*/verdict.json"))]
-        sources = self.sources()
-        order = {True: 0, False: 1}
-        found = [name for name in found if self.campaign in (None, name)]
-        return sorted(found, key=lambda name: (order.get(sources.get(name, "").startswith("file"), 1), name))
+        """Campaigns that the last run has diagnosed, measured ones first."""
+        frame, sources = self.frame("gap_verdicts"), self.sources()
+        names = [] if frame is None else frame["campaign"]
+        return sorted(names, key=lambda name: (not sources.get(name, "").startswith("file"), name))
+
+    def owners(self):
+        """Whose figures belong here: what lies beside them may be of an earlier run."""
+        frame = self.frame("real_verdicts")
+        return {self.reproduced, *self.campaigns(), *(() if frame is None else frame["dataset"])}
 
     def sources(self):
         """Where each campaign came from, by name."""
@@ -103,7 +107,9 @@ class Results:
             self.glyphs.update(drawn.glyphs)
             return Picture(key, title, caption, drawn.markup, drawn.width)
         data = base64.b64encode(place.with_suffix(".png").read_bytes()).decode()
-        return Picture(key, title, caption, f'<img alt="{title}" src="data:image/png;base64,{data}">', drawn.width)
+        return Picture(
+            key, title, caption, f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}">', drawn.width
+        )
 
     def grid(self, shown):
         """A table of the page, None where there is nothing to show."""
@@ -165,7 +171,8 @@ def _own(results, name, title):
     folder = results.folder / "figures"
     found = [place.relative_to(folder).with_suffix("") for place in sorted(folder.rglob(f"{name}.svg"))]
     whose = [(str(place), place.parent.name or results.reproduced) for place in found]
-    return [(place, f"{own}: {title}") for place, own in whose if results.campaign in (None, own)]
+    known = results.owners() if results.campaign is None else {results.campaign}
+    return [(place, f"{own}: {title}") for place, own in whose if own in known]
 
 
 def _trust(results):
