@@ -36,7 +36,10 @@ def with_spectra(case, linear, terms):
     linear: about the state that the terms of a hypothesis, fitted beside them, have led to.
     """
     library, held = dict(case.library), {term.effect for term in terms}
-    open_ones = [e for e in library.values() if (e.coordinates.spectra or _waits(e)) and e.name not in held]
+    # a rough function of the drives' values holds all waves
+    broad = any(library[term.effect].coordinates.broad for term in terms)
+    waiting = [e for e in library.values() if e.coordinates.spectra or (_waits(e) and not broad)]
+    open_ones = [e for e in waiting if e.name not in held]
     if not open_ones:
         return case, []
     known = [term for term in terms if term.effect not in UNKNOWN]
