@@ -206,8 +206,8 @@ class Effect:
     needs: fields of Motion without which the law says nothing; along_drives: of a law that changes nothing but actuator
     values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
-    law that has them; spoils: of a law about the measuring and not about the robot, why a calibration that leaves it
-    out is wrong.
+    law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
+    calibration that leaves it out is wrong.
     """
 
     name: str
@@ -218,6 +218,7 @@ class Effect:
     spoils: str = ""
     along_drives: Callable[[Motion], list[np.ndarray]] | None = None
     with_waves: Callable[..., "Effect"] | None = None
+    waves: tuple[tuple[int, float], ...] = ()
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""
