@@ -23,7 +23,7 @@ One row per commanded point: what was commanded and what the instrument saw. Aft
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
 target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
-world.
+world; where it was stated temperature_c.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -116,6 +116,7 @@ def measurement_table(robot, names=()):
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
     fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
     more["measured_z_mm"].append(fixed_to)
+    more["payload_kg"] = [Column("temperature_c", "float64", "temperature of the robot, degrees Celsius")]
     for after, added in more.items():
         at = [column.name for column in columns].index(after) + 1
         columns[at:at] = [column for column in added if column.name in names]

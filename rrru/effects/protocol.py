@@ -40,7 +40,8 @@ class Motion:
     in N mm or force in N of the loads on each drive, positive in the drive's sense; follower_load (n, f): on each joint
     that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
-    how far the drives went from the stop before to this one, NaN where the robot does not stop at its points.
+    how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
+    temperature_c (n,): of the robot.
     """
 
     robot: Any
@@ -59,6 +60,7 @@ class Motion:
     across: np.ndarray
     base_moment: np.ndarray
     last_move: np.ndarray
+    temperature_c: np.ndarray
 
     def __len__(self) -> int:
         return len(self.drive)

@@ -12,7 +12,7 @@ from rrru.campaign.ingest.sheet import COMMAND, MEASURED, QUATERNIONS, TURNS, dr
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
 _GROUPS = (*TURNS.values(), *QUATERNIONS.values())
-_MORE = ("target", *(name for group in _GROUPS for name in group))
+_MORE = ("target", "temperature_c", *(name for group in _GROUPS for name in group))
 _TEXT = ("trajectory", "target")
 _BEFORE_DRIVES, _AFTER_DRIVES = ("run", "point", "time_s"), ("speed_mm_s", "payload_kg")
 MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
@@ -30,6 +30,7 @@ _LIMITS = {
     "time_s": (lambda v: (v >= 0) & (v <= 1e6), "0 to 1e6 s since the campaign's start"),
     "speed_mm_s": (lambda v: (v > 0) & (v <= 2e4), "above 0 and up to 20000 mm/s"),
     "payload_kg": (lambda v: (v >= 0) & (v <= 1e3), "0 to 1000 kg"),
+    "temperature_c": (lambda v: (v >= -50) & (v <= 100), "-50 to 100 degrees Celsius"),
 }
 
 
