@@ -77,9 +77,10 @@ def calibrate(case):
 
 def with_arm(case, noise_mm=None, noise_rad=None):
     """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
-    positions, turned, _ = _rough(case, calibrate(case))
-    positions, turned = noise_mm or positions, noise_rad or turned / case.arm_mm
-    return replace(case, arm_mm=positions / turned)
+    if not (noise_mm and noise_rad):
+        positions, turned, _ = _rough(case, calibrate(case))
+        noise_mm, noise_rad = noise_mm or positions, noise_rad or turned / case.arm_mm
+    return replace(case, arm_mm=noise_mm / noise_rad)
 
 
 def with_beside(case):
