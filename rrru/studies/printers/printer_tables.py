@@ -35,7 +35,7 @@ def tables(printers, settings):
         labels = {"printer": printer.name, "source": printer.source, "evidence": groups[printer.name]}
         labels |= {"heights": len(printer.height_mm), "distances": len(printer.distance_mm)}
         try:
-            result = fit_printer(printer, settings["stopping_step"])
+            result = fit_printer(printer, settings["stopping_step"], settings["level"])
             left = left_out(result)
         except FitError as error:
             rows["printers"].append(labels | _NOT_FITTED | {"reason": str(error)})
