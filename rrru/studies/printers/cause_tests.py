@@ -13,104 +13,17 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import optimize, special
+from scipy import optimize
 
-from rrru.fit.identifiability import RANK_TOLERANCE
+from rrru.studies.printers.cause_columns import cause_columns
 from rrru.studies.printers.printer_fit import PrinterFit
+from rrru.studies.printers.weighing import Weighing, mean_p
 
 BAD_READING = "bad_reading"
 # ASSUME noise of a height over that of a distance: a probe is a quarter as bad as calipers to as bad, and a factor of 2
 # on either side so that the level holds at these ends too
 _RATIOS = np.geomspace(0.125, 2.0, 9)
 _POWER, _DRAWS, _SEED = 0.9, 500, 1
-# Ptt3's numbers of a leg
-_SLIDER, _ARM, _RISE, _SWING = 0, 1, 4, 5
-
-
-def cause_columns(result):
-    """Change (n, k) of the readings of a PrinterFit by each cause, and the unit of its number where k is 1, by name.
-
-    Arms, towers that lean (three angles outwards, three sideways), and carriages' steps of other lengths, per tower.
-    With distances: calipers with a wrong scale or offset, and a measured object that is stretched along x, shrunk along
-    y, and skewed.
-    """
-    residuals, deviations = result.residuals, result.fit.deviations
-    n, m = len(residuals.height_mm), len(residuals.distance_mm)
-    places = residuals.places(deviations)
-    gradient = residuals.gradient(places)
-    moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, deviations)
-    by_leg = np.einsum("rna,nalc->rlc", gradient, moved)
-    columns = {}
-    if not m:
-        columns["arms"] = by_leg[..., _ARM], ""
-    else:
-        distances = np.concatenate([np.zeros(n), residuals.distance_mm])[:, None]
-        between = places[n : n + m] - places[n + m :]
-        x, y, _ = between.T
-        shape = np.stack([x**2 - y**2, 2.0 * x * y], axis=1) / np.linalg.norm(between, axis=1, keepdims=True)
-        columns["caliper_scale"] = distances, "mm/mm"
-        columns["caliper_offset"] = np.sign(distances), "mm"
-        columns["object_shape"] = np.concatenate([np.zeros((n, 2)), shape]), ""
-    columns["step_scale"] = np.einsum("rna,nal,nl->rl", gradient, moved[..., _SLIDER], residuals.actuators), ""
-    columns["tower_lean"] = np.concatenate([by_leg[..., _RISE], by_leg[..., _SWING]], axis=1), ""
-    return columns
-
-
-@dataclass(frozen=True)
-class Weighing:
-    """Readings under one ratio of noises.
-
-    weight (n,): of every reading; absorbed (n, a): orthonormal basis of weighted readings that the fit absorbs; volume:
-    logarithm of the weights' product over the weighted columns' volume, the likelihood's factor without data.
-    """
-
-    weight: np.ndarray
-    absorbed: np.ndarray
-    volume: float
-
-    @classmethod
-    def of(cls, jacobian, weight):
-        """The weighing of a fit with columns (n, p)."""
-        basis, triangle = np.linalg.qr(jacobian * weight[:, None])
-        return cls(weight, basis, np.log(weight).sum() - np.log(np.abs(np.diag(triangle))).sum())
-
-    def left(self, readings):
-        """Readings (..., n) weighted, less what the fit absorbs."""
-        weighted = readings * self.weight
-        return weighted - (weighted @ self.absorbed) @ self.absorbed.T
-
-    def basis(self, columns):
-        """Orthonormal basis (n, r) of what the fit does not absorb of columns (n, k), and its volume's logarithm."""
-        scale = np.linalg.norm(columns * self.weight[:, None], axis=0)
-        basis, size, _ = np.linalg.svd(self.left((columns / scale).T).T, full_matrices=False)
-        kept = size > RANK_TOLERANCE
-        return basis[:, kept], np.log(size[kept]).sum() + np.log(scale).sum()
-
-    def single(self):
-        """Bases (n, n, 1) of every reading by itself, zero for one that the fit absorbs whole, and their volumes'."""
-        free = np.eye(len(self.weight)) - self.absorbed @ self.absorbed.T
-        size = np.linalg.norm(free, axis=1, keepdims=True)
-        seen = size > RANK_TOLERANCE
-        volume = np.log(np.where(seen, size, 1.0)[:, 0] * self.weight)
-        return np.where(seen, free / size, 0.0)[..., None], volume
-
-    def beside(self, columns):
-        """The weighing of a fit that has columns (n, k) too."""
-        basis, volume = self.basis(columns)
-        return Weighing(self.weight, np.concatenate([self.absorbed, basis], axis=1), self.volume - volume)
-
-    def p(self, bases, volumes, readings):
-        """Probabilities (..., b) that noise explains as much of readings (..., n) as bases (b, n, r), and the log
-        likelihoods (..., b) of what they leave; NaN without freedom.
-        """
-        left, count = self.left(readings), bases.shape[-1]
-        explained = (np.einsum("...n,bnr->...br", left, bases) ** 2).sum(axis=-1)
-        freedom = len(self.weight) - self.absorbed.shape[1] - count
-        if not count or freedom < 1:
-            return np.full(explained.shape, np.nan), np.zeros(explained.shape)
-        rest = (left**2).sum(axis=-1)[..., None] - explained
-        likelihood = self.volume - volumes - 0.5 * freedom * np.log(rest)
-        return special.fdtrc(count, freedom, explained / count * freedom / rest), likelihood
 
 
 @dataclass(frozen=True)
@@ -176,9 +89,7 @@ class CauseTests:
         if beside is not None:
             weighings = [one.beside(beside) for one in weighings]
             bases = [self._bases(name, one) for one in weighings]
-        parts = [one.p(*basis, readings) for one, basis in zip(weighings, bases, strict=True)]
-        each, likelihood = (np.array(part) for part in zip(*parts, strict=True))
-        mean = (each * special.softmax(likelihood, axis=0)).sum(axis=0)
+        mean = mean_p(weighings, bases, readings)
         return np.minimum(mean * mean.shape[-1], 1.0) if name == BAD_READING else mean[..., 0]
 
     def p_without_any(self, name):

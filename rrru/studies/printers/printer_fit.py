@@ -117,13 +117,16 @@ def common_arm_error(result):
 
 def dense_arm_error(result):
     """The same in mm for 100 heights with the noise of its own, spread evenly over their disc (a sunflower's seeds)."""
-    mechanism, seeds = result.residuals.mechanism, np.arange(_DENSE)
+    return _common_arm_error(result, result.residuals.mechanism.inverse(even_places(result, _DENSE)))
+
+
+def even_places(result, count):
+    """Places (count, 3) in mm on the disc of a printer's heights, as evenly as a sunflower's seeds."""
+    mechanism, seeds = result.residuals.mechanism, np.arange(count)
     reach = np.linalg.norm(mechanism.forward(-result.printer.height_drop_mm)[:, :2], axis=1).max()
-    radius, turn = reach * np.sqrt((seeds + 0.5) / _DENSE), seeds * np.pi * (3.0 - np.sqrt(5.0))
-    height = np.full(_DENSE, result.printer.height_mm.mean())
-    return _common_arm_error(
-        result, mechanism.inverse(np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1))
-    )
+    radius, turn = reach * np.sqrt((seeds + 0.5) / count), seeds * np.pi * (3.0 - np.sqrt(5.0))
+    height = np.full(count, result.printer.height_mm.mean())
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
 
 
 def _common_arm_error(result, actuators):

@@ -36,10 +36,13 @@ def _changed_numbers(result):
         offset = _z_offset(moved)
     if not differ:
         return offset
+    # an arm and a Z offset are two changes
+    if len(differ) > 2 and (arms := _changed_arms(result)):
+        return arms
     if len(differ) < len(result.names) - len(_ENDSTOPS) * bool(offset):
         rest = "the other numbers are those of the readings"
         return _joined(f"overwritten after the calibration: {', '.join(differ)}; {rest}", offset)
-    return _changed_arms(result) or _changed_reading(result) or _UNKNOWN
+    return _changed_reading(result) or _UNKNOWN
 
 
 def _z_offset(moved_mm):
@@ -58,7 +61,7 @@ def _changed_arms(result):
         def before(change, arms=arms):
             return replace(printer, arm_mm=printer.arm_mm + change[0] * arms, endstop_mm=printer.endstop_mm - change[1])
 
-        change = _change_that_belongs(before, result.stopping_step)
+        change = _change_that_belongs(before, rounding(printer), result.stopping_step)
         if change is not None:
             now, then = (one.arm_mm[arms > 0.0] for one in (printer, before(change)))
             which = "all arms were" if len(now) == 3 else f"arm_{'abc'[int(arms.argmax())]} was"
@@ -67,10 +70,10 @@ def _changed_arms(result):
     return ""
 
 
-def _change_that_belongs(before, stopping_step):
+def _change_that_belongs(before, rounded, stopping_step):
     """The change (2,) under which a printer's saved numbers are those of its readings, None if there is none."""
     try:
-        found = optimize.least_squares(lambda change: _off(before(change), stopping_step), np.zeros(2))
+        found = optimize.least_squares(lambda change: _off(before(change), rounded, stopping_step), np.zeros(2))
     except (FitError, ValueError):
         return None
     # where one change leaves no number off by more than 1, the change of least squares leaves no more than p in sum
@@ -98,6 +101,6 @@ def _moves(residuals, rounded, stopping_step):
     return moves, moves @ residuals.residual(start)[:, 0]
 
 
-def _off(printer, stopping_step):
+def _off(printer, rounded, stopping_step):
     """How far (p,) the saved numbers are from those of the readings, one Gauss-Newton step; see `_moves`."""
-    return _moves(residuals_of(printer), rounding(printer), stopping_step)[1]
+    return _moves(residuals_of(printer), rounded, stopping_step)[1]
