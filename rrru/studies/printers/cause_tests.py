@@ -2,11 +2,16 @@
 
 A cause adds columns to the linear fit about the answer, and F compares what they explain with what they leave (Cook and
 Weisberg, Residuals and Influence in Regression, 1982, 2.2; a bad reading is a column with a single one). F needs the
-ratio of a height's noise to a distance's, which few readings tell. So p is the mean of F's over ratios from 1/8 to 2,
-each as likely as it makes what the cause cannot explain (restricted likelihood, Harville, Journal of the American
-Statistical Association 72, 1977; the ratio's logarithm is uniform beforehand). What the cause explains is foretold from
-the rest this way (a partial predictive p, Bayarri and Berger, ibid. 95, 2000), and a bad reading does not judge its own
-noise. The level holds on the average over these ratios, and for every ratio from a quarter to 1 by simulation.
+ratio of a height's noise to a distance's, which few readings tell: false alarms are up to six times too many where the
+firmware's ratio is wrong. For causes of the machine p is the largest over all ratios, which holds the level wherever
+between a quarter and 1 the true one is.
+
+For a bad reading that would hide most of them: under a ratio that the other readings exclude, even a reading that is far
+off is likely. There p is the mean over ratios from 1/8 to 2, each as likely as the other readings make it (restricted
+likelihood, Harville, Journal of the American Statistical Association 72, 1977; the ratio's logarithm is uniform
+beforehand). A reading is foretold from the others this way (a partial predictive p, Bayarri and Berger, ibid. 95, 2000)
+and does not judge its own noise. The level holds on the average over these ratios, and for each from a quarter to 1 by
+simulation.
 """
 
 from dataclasses import dataclass
@@ -17,12 +22,13 @@ from scipy import optimize
 
 from rrru.studies.printers.cause_columns import cause_columns
 from rrru.studies.printers.printer_fit import PrinterFit
-from rrru.studies.printers.weighing import Weighing, mean_p
+from rrru.studies.printers.weighing import Weighing, largest_p, mean_p
 
 BAD_READING = "bad_reading"
-# ASSUME noise of a height over that of a distance: a probe is a quarter as bad as calipers to as bad, and a factor of 2
-# on either side so that the level holds at these ends too
-_RATIOS = np.geomspace(0.125, 2.0, 9)
+# ASSUME noise of a height over that of a distance: a probe is at best four times as good as calipers, at worst as bad
+_RATIOS = np.geomspace(0.25, 1.0, 4)
+# the same with a factor of 2 on either side, so that a mean holds the level at these ends too
+_LIKELY_RATIOS = np.geomspace(0.125, 2.0, 9)
 _POWER, _DRAWS, _SEED = 0.9, 500, 1
 
 
@@ -49,12 +55,19 @@ class CauseTests:
 
     @cached_property
     def weighings(self):
-        """Under every ratio of noises; heights alone have one."""
+        """Under the firmware's ratio, and where there are distances under the others."""
+        return [self.own_weighing, *self._under(_RATIOS)]
+
+    @cached_property
+    def _likely(self):
+        """Under every ratio that a bad reading is judged by."""
+        return self._under(_LIKELY_RATIOS) or [self.own_weighing]
+
+    def _under(self, ratios):
+        """Weighings under ratios of noises; heights alone have none."""
         residuals = self.result.residuals
         height = np.arange(len(residuals)) < len(residuals.height_mm)
-        if height.all():
-            return [self.own_weighing]
-        return [self._weighing(np.where(height, 1.0 / ratio, 1.0)) for ratio in _RATIOS]
+        return [] if height.all() else [self._weighing(np.where(height, 1.0 / ratio, 1.0)) for ratio in ratios]
 
     def _weighing(self, weight):
         residuals = self.result.residuals
@@ -76,21 +89,23 @@ class CauseTests:
     @cached_property
     def _all_bases(self):
         """What `_bases` gives, of every cause by name, under each weighing."""
-        return {name: [self._bases(name, one) for one in self.weighings] for name in (*self.columns, BAD_READING)}
+        every = {name: [self._bases(name, one) for one in self.weighings] for name in self.columns}
+        return every | {BAD_READING: [self._bases(BAD_READING, one) for one in self._likely]}
 
     def p(self, name, readings=None, beside=None):
-        """Mean p over the ratios for a cause, (...) for readings (..., n), by default its own.
+        """Largest p over the ratios for a cause, (...) for readings (..., n), by default its own.
 
-        Of a bad reading it is (..., n), of every reading, times their number (Bonferroni). beside: columns (n, k) that
-        are fitted too.
+        Of a bad reading it is the mean (..., n), of every reading, times their number (Bonferroni). beside: columns
+        (n, k) that are fitted too.
         """
         readings = self.readings_mm if readings is None else readings
-        weighings, bases = self.weighings, self._all_bases[name]
+        weighings, bases = self._likely if name == BAD_READING else self.weighings, self._all_bases[name]
         if beside is not None:
             weighings = [one.beside(beside) for one in weighings]
             bases = [self._bases(name, one) for one in weighings]
-        mean = mean_p(weighings, bases, readings)
-        return np.minimum(mean * mean.shape[-1], 1.0) if name == BAD_READING else mean[..., 0]
+        if name != BAD_READING:
+            return largest_p(weighings, bases, readings)[..., 0]
+        return np.minimum(mean_p(weighings, bases, readings) * readings.shape[-1], 1.0)
 
     def p_without_any(self, name):
         """Largest p of a cause with any single reading left out."""

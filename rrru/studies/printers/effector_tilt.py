@@ -14,7 +14,7 @@ them are fitted beside the tilt, and F says how likely noise explains as much as
 # ASSUME rods as far apart and joints as far out as those of `rrru.robots.linear_delta`, the nozzle in the joints' plane
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,12 +23,14 @@ from scipy import stats
 from rrru.studies.printers.cause_columns import arm_columns, lean_columns
 from rrru.studies.printers.cause_tests import CauseTests
 from rrru.studies.printers.printer_fit import PrinterFit
-from rrru.studies.printers.weighing import Weighing, mean_p
+from rrru.studies.printers.weighing import Weighing, largest_p
 
 # the difference of an arm's rods that readings have to show
 SHOWN_MM = 0.1
 # ASSUME how well a probe repeats, where the readings do not tell
 PROBE_MM = 0.01
+# Gauss-Newton steps, and the part of the largest singular value from which on the readings see a combination
+_REFITS, _SEEN = 3, 1e-3
 # ASSUME noise of a height touched by hand, over that of a probed one
 _HAND = (1.0, 2.0, 4.0)
 
@@ -73,13 +75,33 @@ class TiltTest:
     @cached_property
     def rivals(self):
         """Change (n, k) of the readings by all that may look like a tilt."""
+        arms = () if len(self.result.residuals.distance_mm) else (arm_columns(self.result),)
+        return np.concatenate([*arms, lean_columns(self.result), self.bed], axis=1)
+
+    @cached_property
+    def bed(self):
+        """Change (n, k) of the readings by the zero of every place of the probe, and by three shapes of the bed."""
         kinds = np.unique(self.probe_mm, axis=0)
         zeros = (self.probe_mm[:, None] == kinds[1:]).all(axis=2).astype(float)
-        arms = () if len(self.result.residuals.distance_mm) else (arm_columns(self.result),)
         x, y = (self.places[: len(self.probe_mm), :2] + self.probe_mm).T
-        bed = np.stack([x**2 + y**2, x**2 - y**2, 2.0 * x * y], axis=1)
-        own = self._of_heights(np.concatenate([zeros, bed], axis=1))
-        return np.concatenate([*arms, lean_columns(self.result), own], axis=1)
+        shapes = np.stack([x**2 + y**2, x**2 - y**2, 2.0 * x * y], axis=1) / np.hypot(x, y).max() ** 2
+        return self._of_heights(np.concatenate([zeros, shapes], axis=1))
+
+    def with_bent_bed(self):
+        """The test about the answer beside which the bed may be bent, as far as the readings see that.
+
+        An answer that took the bed for flat turns and stretches the places under the probe.
+        """
+        result = self.result
+        for _ in range(_REFITS):
+            test = replace(self, result=result)
+            weight, count = result.residuals.root_weight[:, None], len(result.fit.deviations)
+            columns = np.concatenate([-result.residuals.jacobian(result.fit.deviations)[:, 0], test.bed * weight], axis=1)
+            scale = np.linalg.norm(columns, axis=0)
+            move = np.linalg.lstsq(columns / scale, test._readings * weight[:, 0], rcond=_SEEN)[0] / scale
+            deviations = result.fit.deviations + move[:count]
+            result = replace(result, fit=replace(result.fit, deviations=deviations))
+        return replace(self, result=result)
 
     def _of_heights(self, columns):
         """Columns (heights, k) with zeros (n, k) for the distances."""
@@ -128,10 +150,10 @@ class TiltTest:
         return self._p(self._weighings, self.columns)
 
     def _p(self, weighings, columns):
-        """Mean p of columns (n, k) over weighings; NaN where their rank depends on the ratio."""
+        """Largest p of columns (n, k) over weighings; NaN where their rank depends on the ratio."""
         bases = [(basis[None], volume) for basis, volume in (one.basis(columns) for one in weighings)]
         ranks = {basis.shape for basis, _ in bases}
-        return float(mean_p(weighings, bases, self._readings)[0]) if len(ranks) == 1 else np.nan
+        return float(largest_p(weighings, bases, self._readings)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
         """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst."""

@@ -96,6 +96,10 @@ class Level:
         """
         return self.level / (1 + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
 
+    def of_one_more(self, tests):
+        """The limit for one cause of the machine more than those, asked for beside them."""
+        return self.level / (2 + len(tests.columns)) / self.pieces
+
 
 def causes(result, left, level):
     """Possible causes of what a PrinterFit leaves, a tuple: a bad reading, and those that act on all of them.

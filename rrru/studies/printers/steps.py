@@ -30,8 +30,7 @@ def changed_steps(printer, level):
     stated = _left(printer)
     left = [_left(with_steps(printer, factors)) for factors in _CHANGES]
     best, readings = int(np.argmin(left)), len(printer.height_mm) + len(printer.distance_mm)
-    with np.errstate(divide="ignore"):
-        gain = readings * (np.log(stated) - np.log(left[best])) if np.isfinite(left[best]) else 0.0
+    gain = readings * (np.log(stated) - np.log(left[best]))
     return _CHANGES[best] if gain > np.log(len(_CHANGES) / level) else np.ones(3)
 
 
@@ -46,10 +45,16 @@ def told(factors):
 
 
 def _left(printer):
-    """Rms in mm of what the saved numbers leave of the readings, the heights' mean counted once; inf out of reach."""
+    """Rms in mm of what the saved numbers leave of the readings, the heights' mean counted once.
+
+    A place out of reach is off by an arm's length.
+    """
     robot = printer.mechanism()
     heights = printer.height_mm - robot.forward(-printer.height_drop_mm)[:, 2]
     ends = [robot.forward(-printer.distance_drop_mm[:, end]) for end in (0, 1)]
     lengths = printer.distance_mm - np.linalg.norm(ends[0] - ends[1], axis=1)
-    left = np.concatenate([heights - heights.mean(), [heights.mean()], lengths])
-    return np.sqrt((left**2).mean()) if np.isfinite(left).all() else np.inf
+    off, arm = np.concatenate([heights, lengths]), printer.arm_mm.mean()
+    off[~np.isfinite(off)] = arm
+    zero = off[: len(heights)].mean()
+    off[: len(heights)] -= zero
+    return np.sqrt((np.append(off, zero) ** 2).mean())

@@ -34,7 +34,7 @@ def tilt_answer(result, limit):
     probe = result.printer.probe_mm
     if np.isnan(probe).any() or not probe.any():
         return None
-    test = TiltTest(result, probe)
+    test = TiltTest(result, probe).with_bent_bed()
     power, p = test.power(limit), test.p
     if p < limit:
         return TiltAnswer(p, limit, power, f"found: the effector tilts, {_rods(test, limit)}")

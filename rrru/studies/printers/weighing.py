@@ -65,8 +65,13 @@ class Weighing:
         return special.fdtrc(count, freedom, explained / count * freedom / rest), likelihood
 
 
+def largest_p(weighings, bases, readings):
+    """Largest p (..., b) over weighings of bases, as `Weighing.basis` gives them for each."""
+    return np.max([one.p(*basis, readings)[0] for one, basis in zip(weighings, bases, strict=True)], axis=0)
+
+
 def mean_p(weighings, bases, readings):
-    """Mean over weighings of the p of bases, as `Weighing.basis` gives them for each, weighed by their likelihoods."""
+    """Mean p (..., b) over weighings of bases, weighed by their likelihoods."""
     parts = [one.p(*basis, readings) for one, basis in zip(weighings, bases, strict=True)]
     each, likelihood = (np.array(part) for part in zip(*parts, strict=True))
     return (each * special.softmax(likelihood, axis=0)).sum(axis=0)
