@@ -1,9 +1,9 @@
 """Unequal rods of an arm tilt the platform, and a probe beside the nozzle takes the tilt for the bed's shape.
 
 Where the two rods of arm i, a distance s apart along the tangent t_i, differ in length by d_i, the platform turns by w
-and its point in the joints' plane moves by v, to first order (n_i: direction of the arm, u_i: to its joints, r: how far)
+and its point in the joints' plane moves by v, to first order (n_i: down the arm, u_i: to its joints, r: how far)
 
-    (t_i x n_i) . w = -d_i / s,    n_i . v = -r n_i . (w x u_i)
+    (t_i x n_i) . w = d_i / s,    n_i . v = -r n_i . (w x u_i)
 
 A probe at the offset o stands v_z + (w x o)_z higher than the platform says. All else that is smooth over the bed may
 look like it: arms of other lengths than saved, leaning towers, a bed that is bent to second order, the probe's own zero.
@@ -31,6 +31,7 @@ SHOWN_MM = 0.1
 PROBE_MM = 0.01
 # Gauss-Newton steps, and the part of the largest singular value from which on the readings see a combination
 _REFITS, _SEEN = 3, 1e-3
+_CONFIDENCE = 0.95
 # ASSUME noise of a height touched by hand, over that of a probed one
 _HAND = (1.0, 2.0, 4.0)
 
@@ -40,7 +41,7 @@ def tilts(robot, places, actuators, deviations):
     differ by.
     """
     arms = robot.link_directions(places, actuators, deviations)
-    turn = -np.linalg.inv(np.cross(robot.tangent, arms)) / robot.spacing_mm
+    turn = np.linalg.inv(np.cross(robot.tangent, arms)) / robot.spacing_mm
     carried = np.cross(np.moveaxis(turn, 2, 1)[:, None], robot.radial[:, None])
     return turn, np.linalg.solve(arms, -robot.r_mm * np.einsum("nia,nika->nik", arms, carried))
 
@@ -115,13 +116,25 @@ class TiltTest:
         return Weighing.of(jacobian, weight).beside(self.rivals)
 
     @cached_property
+    def _left(self):
+        """Sum of squares in mm^2 of what neither rivals nor tilt explain, and its freedom."""
+        free = self._own_weighing.beside(self.columns)
+        return (free.left(self._readings) ** 2).sum(), len(self._readings) - free.absorbed.shape[1]
+
+    @cached_property
     def noise(self):
         """Noise in mm of a reading of weight 1: as given, of what neither rivals nor tilt explain, or a probe's."""
         if self.noise_mm is not None:
             return self.noise_mm
-        free = self._own_weighing.beside(self.columns)
-        left, freedom = free.left(self._readings), len(self._readings) - free.absorbed.shape[1]
-        return np.sqrt((left**2).sum() / freedom) if freedom > 0 else PROBE_MM
+        left, freedom = self._left
+        return np.sqrt(left / freedom) if freedom > 0 else PROBE_MM
+
+    @cached_property
+    def most_noise(self):
+        """What the noise is below with a confidence of 95 %: few readings promise too little of it."""
+        left, freedom = self._left
+        given = self.noise_mm is not None or freedom < 1
+        return self.noise if given else np.sqrt(left / stats.chi2.ppf(1.0 - _CONFIDENCE, freedom))
 
     @property
     def _hands(self):
@@ -156,13 +169,16 @@ class TiltTest:
         return float(largest_p(weighings, bases, self._readings)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
-        """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst."""
+        """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
+
+        Under `most_noise`.
+        """
         own = self._own_weighing
         rank = own.basis(self.columns)[0].shape[1]
         freedom = len(self.columns) - own.absorbed.shape[1] - rank
         if freedom < 1 or rank < self.columns.shape[1]:
             return 0.0
-        seen = (own.left(self.columns.T) ** 2).sum(axis=1) * (SHOWN_MM / self.noise) ** 2
+        seen = (own.left(self.columns.T) ** 2).sum(axis=1) * (SHOWN_MM / self.most_noise) ** 2
         return float(stats.ncf.sf(stats.f.isf(limit, rank, freedom), rank, freedom, seen).min())
 
     def alone(self, arm):
