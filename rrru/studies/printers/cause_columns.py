@@ -49,5 +49,3 @@ def _by_place(result):
     places = residuals.places(deviations)
     moved = residuals.mechanism.leg_jacobian(places, residuals.actuators, deviations)
     return np.einsum("rna,nalc->rnlc", residuals.gradient(places), moved)
-
-

@@ -6,7 +6,7 @@ and its point in the joints' plane moves by v, to first order (n_i: down the arm
     (t_i x n_i) . w = d_i / s,    n_i . v = -r n_i . (w x u_i)
 
 A probe at the offset o stands v_z + (w x o)_z higher than the platform says. All else that is smooth over the bed may
-look like it: arms of other lengths than saved, leaning towers, a bed that is bent to second order, the probe's own zero.
+look like it: arms of other lengths than saved, leaning towers, a bed bent to second order, the probe's own zero.
 A bed's slope is a gradient and the tilt is none, so that probing on three sides of the nozzle tells them apart. All of
 them are fitted beside the tilt, and F says how likely noise explains as much as the tilt then does, see
 `cause_tests`. Whether readings can tell is known before: it is the probability that 0.1 mm on any one arm passes.
@@ -97,7 +97,9 @@ class TiltTest:
         for _ in range(_REFITS):
             test = replace(self, result=result)
             weight, count = result.residuals.root_weight[:, None], len(result.fit.deviations)
-            columns = np.concatenate([-result.residuals.jacobian(result.fit.deviations)[:, 0], test.bed * weight], axis=1)
+            columns = np.concatenate(
+                [-result.residuals.jacobian(result.fit.deviations)[:, 0], test.bed * weight], axis=1
+            )
             scale = np.linalg.norm(columns, axis=0)
             move = np.linalg.lstsq(columns / scale, test._readings * weight[:, 0], rcond=_SEEN)[0] / scale
             deviations = result.fit.deviations + move[:count]
@@ -182,7 +184,7 @@ class TiltTest:
         return float(stats.ncf.sf(stats.f.isf(limit, rank, freedom), rank, freedom, seen).min())
 
     def alone(self, arm):
-        """How much an arm's rods differ in mm if only they do, the standard error, and the p of the other arms beside."""
+        """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
         column, own = self.columns[:, [arm]], self._own_weighing
         seen = own.left(column[:, 0])
         size = abs(seen @ own.left(self._readings)) / (seen @ seen)

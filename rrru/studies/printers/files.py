@@ -4,7 +4,7 @@ from collections import Counter
 from pathlib import Path
 
 from rrru.errors import IngestError
-from rrru.studies.printers import klipper, readings
+from rrru.studies.printers import klipper, readings, reprap
 from rrru.studies.printers.printer import Refused
 
 
@@ -13,7 +13,8 @@ def read(path, name=None):
     if Path(path).suffix.lower() == ".json":
         return readings.read(path)
     name = name or Path(path).stem
-    printer = readings.printer_of(path, name, klipper.entry(path, name))
+    form = reprap if reprap.belongs(path) else klipper
+    printer = readings.printer_of(path, name, form.entry(path, name))
     if isinstance(printer, Refused):
         raise IngestError(printer.problems)
     return (printer,)

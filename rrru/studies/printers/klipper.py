@@ -1,6 +1,6 @@
 """Klipper's printer.cfg as the printers' JSON form: the owner's settings and the block that SAVE_CONFIG wrote.
 
-A setting that stands above the block wins over the saved one, as in Klipper. Absent settings are Klipper's own: 200 full
+A setting that stands above the block wins over the saved one, as in Klipper. Absent settings are Klipper's: 200 full
 steps a turn, towers at 210, 330 and 90 degrees, tower a's arm and endstop for the others. Files of before 2021 state
 `step_distance` instead of rotation distance and microsteps. `[include ..]` is followed where the file is there.
 """

@@ -22,8 +22,8 @@ class LeftOut:
     """Every reading against the fit of the others.
 
     difference_mm (n,): reading less what they foretell. ratio (n,): that over its standard error, under the firmware's
-    ratio of noises. p (n,): of so large a ratio anywhere among the readings; see `cause_tests`. The last two are NaN where
-    the others leave no freedom.
+    ratio of noises. p (n,): of so large a ratio anywhere among the readings; see `cause_tests`. The last two are NaN
+    where the others leave no freedom.
     """
 
     difference_mm: np.ndarray

@@ -25,7 +25,7 @@ def tables(printers, settings):
 
     settings: `stopping_step`, `level` and `imitated_from` of the configuration's `printers` section. A printer that
     cannot be read or fitted has a row in `printers` that says why, and none elsewhere. Printers that share readings are
-    one piece of evidence; for causes of the machines the level is divided by the pieces in which something can be found.
+    one piece of evidence; for causes of the machines the level is divided by the pieces in which anything can be found.
     """
     rows = {name: [] for name in ("printers", "printer_parameters", "printer_readings", "printer_causes")}
     sound = [printer for printer in printers if not isinstance(printer, Refused)]

@@ -18,7 +18,7 @@ such triples. One microstep is rotation_distance / (full_steps x microsteps), di
 unless step_mm gives it. `source`, `distances`, `gear_ratio` and `step_mm` may be absent; so may
 `program_height_rms_mm`, `program_distance_rms_mm` and `refit_max_difference`, which are not read.
 
-"probe_offset_mm": [x, y], of a printer or of a single height: where the probe sits beside the nozzle; [0, 0] for a height
+"probe_offset_mm": [x, y], of a printer or of one height: where the probe sits beside the nozzle; [0, 0] for a height
 that the nozzle touched by itself. "calibrated": false where the saved numbers are not said to come from the readings.
 """
 

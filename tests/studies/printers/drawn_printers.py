@@ -18,7 +18,7 @@ class Drawn:
         self.bed_radius, self.endstop = 0.8 * self.radius, self.radius * 2.0
         self.rods = self.arm + generator.normal(0.0, 0.2, 3)[:, None] + 0.5 * np.outer(rods_mm, [1.0, -1.0])
         self.true_radius = self.radius + generator.normal(0.0, 0.3)
-        self.true_angle = np.radians(ANGLES + [*generator.normal(0.0, 0.1, 2), 0.0])
+        self.true_angle = np.radians(ANGLES + np.append(generator.normal(0.0, 0.1, 2), 0.0))
         self.zero = self.endstop + np.sqrt(self.arm**2 - self.radius**2) + generator.normal(0.0, 0.3, 3)
         self.lean = generator.normal(0.0, 0.002, (3, 2))
         self.bed = generator.normal(0.0, bed_mm, 3) if bed_mm else np.zeros(3)

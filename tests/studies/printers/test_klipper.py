@@ -10,7 +10,10 @@ from rrru.errors import IngestError
 from rrru.studies.printers import files
 from tests.studies.printers.simulated_printers import DISTANCES, ENTRIES, HEIGHTS
 
-PLACES = {"heights": (("z_mm", ""), ("stable", "_pos")), "distances": (("mm", ""), ("stable1", "_pos1"), ("stable2", "_pos2"))}
+PLACES = {
+    "heights": (("z_mm", ""), ("stable", "_pos")),
+    "distances": (("mm", ""), ("stable1", "_pos1"), ("stable2", "_pos2")),
+}
 
 
 def config(entry, drive="microsteps:{microsteps}\nrotation_distance: {rotation_distance_mm} # of the belt\n", above=""):
@@ -18,7 +21,9 @@ def config(entry, drive="microsteps:{microsteps}\nrotation_distance: {rotation_d
     owner, saved = ["[printer]\nkinematics: delta\n"], [f"[printer]\ndelta_radius = {entry['radius_mm']}\n"]
     for name, tower in entry["towers"].items():
         owner.append(f"[stepper_{name}]\n" + drive.format(**tower))
-        numbers = f"angle = {tower['angle_deg']}\narm_length = {tower['arm_mm']}\nposition_endstop = {tower['endstop_mm']}\n"
+        numbers = (
+            f"angle = {tower['angle_deg']}\narm_length = {tower['arm_mm']}\nposition_endstop = {tower['endstop_mm']}\n"
+        )
         saved.append(f"[stepper_{name}]\n{numbers}")
     saved.append("[delta_calibrate]\n")
     for kind, places in PLACES.items():
@@ -28,7 +33,9 @@ def config(entry, drive="microsteps:{microsteps}\nrotation_distance: {rotation_d
                 text = value if not isinstance(value, list) else ",".join(str(one) for one in value)
                 saved.append(f"{kind[:-1]}{number}{ending} = {text}\n")
     block = "\n".join("#*# " + line for line in "\n".join(saved).splitlines())
-    head = "#*# <---------------------- SAVE_CONFIG ---------------------->\n#*# DO NOT EDIT THIS BLOCK OR BELOW.\n#*#\n"
+    head = (
+        "#*# <---------------------- SAVE_CONFIG ---------------------->\n#*# DO NOT EDIT THIS BLOCK OR BELOW.\n#*#\n"
+    )
     return "\n".join(owner) + above + "\n" + head + block + "\n"
 
 
@@ -86,7 +93,10 @@ def test_where_the_probe_sat_at_every_height(tmp_path):
         (lambda t: re.sub(r"#\*# delta_radius.*\n", "", t), ("printer: delta_radius", "nothing")),
         (lambda t: re.sub(r"microsteps:.*\n", "", t), ("stepper_c: microsteps", "nothing")),
         (lambda t: re.sub(r"(height3 =).*", r"\1 high", t), ("delta_calibrate: height3", "'high'", "a number")),
-        (lambda t: re.sub(r"(height3_pos =).*", r"\1 1,2", t), ("delta_calibrate: height3_pos", "'1,2'", "three numbers")),
+        (
+            lambda t: re.sub(r"(height3_pos =).*", r"\1 1,2", t),
+            ("delta_calibrate: height3_pos", "'1,2'", "three numbers"),
+        ),
         (lambda t: re.sub(r"#\*# height0 =.*", "", t), ("delta_calibrate: height0", "DELTA_CALIBRATE")),
         (lambda t: re.sub(r"(height3 =).*", r"\1 nan", t), ("heights, number 4, z_mm", "nan")),
         (lambda t: "just text\n" + t, ("no printer.cfg",)),

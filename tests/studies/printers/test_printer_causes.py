@@ -52,7 +52,9 @@ def slow_p(result, columns, ratio, without=None):
         left.append(((readings - scaled @ np.linalg.lstsq(scaled, readings)[0]) ** 2).sum())
     count, freedom = columns.shape[1], len(kept) - more.shape[1]
     scaled = more / np.linalg.norm(more / weight[kept][:, None], axis=0)
-    likelihood = np.log(weight[kept]).sum() - 0.5 * np.linalg.slogdet(scaled.T @ scaled)[1] - 0.5 * freedom * np.log(left[1])
+    likelihood = (
+        np.log(weight[kept]).sum() - 0.5 * np.linalg.slogdet(scaled.T @ scaled)[1] - 0.5 * freedom * np.log(left[1])
+    )
     return stats.f.sf((left[0] - left[1]) / count / (left[1] / freedom), count, freedom), likelihood
 
 

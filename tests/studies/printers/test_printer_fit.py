@@ -37,7 +37,9 @@ def test_the_answer_is_that_of_another_refit_and_belongs_where_the_file_is_consi
 
 
 def test_why_an_answer_does_not_belong():
-    reasons = {name: saved_answers.reason(printer_fit.fit_printer(printer, STEP, LEVEL)) for name, printer in PRINTERS.items()}
+    reasons = {
+        name: saved_answers.reason(printer_fit.fit_printer(printer, STEP, LEVEL)) for name, printer in PRINTERS.items()
+    }
     foreign = {name: text for name, text in reasons.items() if text}
     words = {
         "printer_04": "overwritten after the calibration: endstop_a, endstop_b, endstop_c;",
