@@ -6,7 +6,7 @@ ratio of a height's noise to a distance's, which few readings tell: false alarms
 firmware's ratio is wrong. For causes of the machine p is the largest over all ratios, which holds the level wherever
 between a quarter and 1 the true one is.
 
-For a bad reading that would hide most of them: under a ratio that the other readings exclude, even one that is far off is
+For a bad reading that would hide most of them: under a ratio that the other readings exclude, even one far off is
 likely. There p is the mean over ratios from 1/8 to 2, each as likely as the other readings make it (restricted
 likelihood, Harville, Journal of the American Statistical Association 72, 1977; the ratio's logarithm is uniform
 beforehand). A reading is foretold from the others this way (a partial predictive p, Bayarri and Berger, ibid. 95, 2000)
