@@ -90,8 +90,8 @@ def in_file(text: str, whole: pd.DataFrame) -> str:
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:
     """Noise per axis that the instrument states: of positions in mm and of orientations in rad, None where it does not.
 
-    See `rrru.campaign.noise.typical`. Raises ConfigError for a column whose median is not above 0: an instrument without
-    noise is none.
+    See `rrru.campaign.noise.typical`. Raises ConfigError for a column whose median is not above 0: no
+    instrument is without noise.
     """
     result = []
     for key, scales, unit in (("position_std", MM, "unit"), ("rotation_std", RAD, "rotation_unit")):
