@@ -31,7 +31,7 @@ def details_of(attribution, steps, residual_mm, generator, draws):
         "gap_attribute": _attribute_rows(attribution),
         "gap_sets": _set_rows(attribution),
         "gap_shrink": shrink_table(case, steps, exact),
-        "gap_parameters": _parameter_rows(attribution),
+        "gap_parameters": parameter_rows(attribution),
         "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
     }
 
@@ -111,7 +111,7 @@ def _set_rows(attribution):
     return pd.DataFrame(result)
 
 
-def _parameter_rows(attribution):
+def parameter_rows(attribution):
     """Rows of `gap_parameters`: all numbers of the corrected sim, the effects' with standard errors."""
     parameters, state = attribution.case.mechanism.parameters, attribution.state
     result = [

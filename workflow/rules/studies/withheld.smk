@@ -1,4 +1,4 @@
-from rrru.studies.withheld.chunks import chunks, rivalled
+from rrru.studies.withheld.chunks import chunks, described, rivalled
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
@@ -24,6 +24,11 @@ WITHHELD_ROBOT = {
 }
 
 
+def withheld_known(wildcards):
+    """What is known of the robots of a chunk, those of files by the file's entry."""
+    return {"files": described(config, WITHHELD[wildcards.chunk]), **WITHHELD_ROBOT}
+
+
 wildcard_constraints:
     chunk="|".join(WITHHELD) or "none",
 
@@ -34,7 +39,11 @@ rule withheld_robots:
     log:
         f"{RESULTS}/logs/withheld_robots/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {"members": WITHHELD[wildcards.chunk], **WITHHELD_ROBOT, **reads("motion")},
+        settings=lambda wildcards: {
+            "members": WITHHELD[wildcards.chunk],
+            **withheld_known(wildcards),
+            **reads("motion"),
+        },
         code=code("withheld_robots"),
     script:
         "../../scripts/withheld_robots.py"
@@ -50,8 +59,8 @@ rule withheld_diagnose:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
-            "robots": {member.name: (member.check, member.taken_out) for member in WITHHELD[wildcards.chunk]},
-            **WITHHELD_ROBOT,
+            "robots": {one.name: (one.check, one.taken_out, one.file) for one in WITHHELD[wildcards.chunk]},
+            **withheld_known(wildcards),
             **reads("gap"),
         },
         own_effects=own_effects_digests(),
@@ -71,7 +80,7 @@ rule withheld_score:
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        settings={**WITHHELD_ROBOT, **reads("motion", "gap")},
+        settings=lambda wildcards: {**withheld_known(wildcards), **reads("motion", "gap")},
         own_effects=own_effects_digests(),
         code=code("withheld_score"),
     script:
