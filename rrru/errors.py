@@ -35,6 +35,10 @@ class FitError(RrruError):
         self.result = result
 
 
+class SimulationError(RrruError):
+    """A foreign simulator did not come to a pose that may be recorded."""
+
+
 class TableError(RrruError):
     """A result table does not fit its schema."""
 

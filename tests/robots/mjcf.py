@@ -5,7 +5,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.places import ROOT
 
-ARM, HEXAPOD = ROOT / "data/robots/arm6.urdf", ROOT / "data/robots/hexapod.xml"
+ARM, HEXAPOD = ROOT / "data/models/arm6.urdf", ROOT / "data/models/hexapod.xml"
 GEOM = '<geom size="0.02" mass="0.3"/>'
 
 

@@ -115,13 +115,13 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
 
     The tracker sees two reflectors at every point and the orientation.
     """
-    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="zero")
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
     x, y, z = (float(value) for value in arm.legs.home_mm.round(1))
     column = arm.parts.columns[1]
     error = f"d{column.rpartition('_')[0]}"
     result = _run(
         tmp_path,
-        robot="{urdf: data/robots/arm6.urdf}",
+        robot="{urdf: data/models/arm6.urdf}",
         error=error,
         size=0.002,
         play="{" + ", ".join(f"width{k}: 0.0005" for k in range(1, 7)) + "}",
@@ -189,7 +189,7 @@ def test_an_own_robot_that_cannot_be_made_is_refused(entry, text):
 
 def test_numbers_that_others_imitate_are_left_out_and_said_so():
     """Of an arm's numbers the rank chooses; what is left out is a stated combination of the chosen ones."""
-    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="full")
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="full")
     assert len(arm.parameters) < len(arm.candidates)
     at = arm.map_at(*(values[:20] for values in arm._workspace()))
     columns = {one.name: at.columns(direction(arm.legs, one)[..., None])[..., 0] for one in arm.candidates}
@@ -200,11 +200,11 @@ def test_numbers_that_others_imitate_are_left_out_and_said_so():
 
 def test_the_example_hexapod_of_an_mjcf_file_goes_the_whole_way(tmp_path):
     """Its six legs' play is named at the legs, in its own columns."""
-    hexapod = make_mechanism("h", {"mjcf": str(ROOT / "data/robots/hexapod.xml"), "platform": "plate"})
+    hexapod = make_mechanism("h", {"mjcf": str(ROOT / "data/models/hexapod.xml"), "platform": "plate"})
     x, y, z = (float(value) for value in hexapod.legs.home_mm.round(1))
     result = _run(
         tmp_path,
-        robot="{mjcf: data/robots/hexapod.xml, platform: plate}",
+        robot="{mjcf: data/models/hexapod.xml, platform: plate}",
         error=f"d{hexapod.parts.columns[2].rpartition('_')[0]}",
         size=0.4,
         play="{" + ", ".join(f"width{k}: 0.1" for k in range(1, 7)) + "}",

@@ -11,8 +11,8 @@ from rrru.campaign import measurements as rows
 from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
+from rrru.plant.driven import non_repeatability
 from rrru.plant.tracker import measure
-from rrru.plant.virtual_robot import non_repeatability
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3.paper import ERRORS_MM
 

@@ -10,7 +10,7 @@ from rrru.errors import IngestError
 from rrru.robots.catalogue import make_mechanism
 from tests.places import ROOT
 
-ARM = make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="zero")
+ARM = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
 
 
 def _file():

@@ -31,7 +31,7 @@ _QUATERNION = [f"measured_q{part}" for part in "xyzw"]
 @pytest.fixture(scope="module")
 def arm():
     """The example arm with the full set of parameters."""
-    return make_mechanism("arm", {"urdf": str(ROOT / "data/robots/arm6.urdf")}, parameter_set="full")
+    return make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="full")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,153 @@
+"""An MJCF made ready to be driven and to be changed by causes: `Edit` holds its MjSpec. Files count in m, N and kg.
+
+Loops are held between named sites, so that a changed length opens the loop instead of moving the anchor. The
+constraints are as stiff as MuJoCo allows at this step: they give with the square of `solref` and with 1 - `solimp`.
+Contacts and keyframes are left out; home is the first keyframe's pose, else the reference configuration.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from rrru.errors import ConfigError
+
+MM = 1000.0
+STEP_S = 2e-4
+SOLREF, SOLIMP = (2.0 * STEP_S, 1.0), (0.9999, 0.9999, 1e-4, 0.5, 2.0)
+PAYLOAD, BASE = "rrru payload", "rrru base"
+_EQ, _JOINT, _OBJ = mujoco.mjtEq, mujoco.mjtJoint, mujoco.mjtObj
+_SIZES = {_JOINT.mjJNT_FREE: 7, _JOINT.mjJNT_BALL: 4}
+
+
+@dataclass
+class Edit:
+    """A model on its way from its file to what is driven.
+
+    nominal: the file's compiled model; home: values of qpos by joint; by driven joint: drives, the actuators, servos,
+    their names, lengths, what its mm or rad is in m or rad, offsets in m or rad, and lags in s that its controller does
+    not know. shifts: by place, as causes name it, what it is off by in m or rad; grows: likewise, what it moves by as
+    it warms up with the time constant warming_s; masses: added to bodies in kg; tilt (3,): rotation vector of the base
+    against gravity. damped: by added joint the angular frequency in 1/s of what settles it, None for a spring's own;
+    leashes: by tendon the two sites that it keeps near each other; seats: by site that marks where a body is seated the
+    body's site that lies there at home. prefix: of all names in spec; payload_kg: the heaviest that will be carried.
+    """
+
+    spec: mujoco.MjSpec
+    nominal: mujoco.MjModel
+    platform: str
+    home: dict
+    drives: dict
+    servos: dict
+    lengths: dict
+    payload_kg: float = 0.0
+    damped: dict = field(default_factory=dict)
+    shifts: dict = field(default_factory=dict)
+    grows: dict = field(default_factory=dict)
+    warming_s: float | None = None
+    offsets: dict = field(default_factory=dict)
+    masses: dict = field(default_factory=dict)
+    tilt: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    lags: dict = field(default_factory=dict)
+    seats: dict = field(default_factory=dict)
+    leashes: dict = field(default_factory=dict)
+    prefix: str = ""
+
+    def units(self, joint):
+        """What a mm or rad of a joint, and a N or N mm on it, are in the file's units."""
+        return (1.0 / MM, 1.0) if self.spec.joint(joint).type == _JOINT.mjJNT_SLIDE else (1.0, 1.0 / MM)
+
+    def add_joint(self, body, name, kind, axis, **options):
+        """Add a hinge or slide behind the other joints of a body, and the free dof's rest to home."""
+        joint = self.spec.body(body).add_joint(name=self.prefix + name, type=kind, axis=axis, **options)
+        joint.solref_limit, joint.solimp_limit = SOLREF, SOLIMP
+        self.home[name] = np.zeros(1)
+        return joint
+
+    def steady(self, joint, stiffness):
+        """Give a joint the inertia that an explicit step needs under a spring; it has no weight."""
+        joint.armature = max(joint.armature, stiffness * STEP_S**2)
+
+
+def read(file, platform, tool_mm, drives):
+    """The Edit of an MJCF without causes; raises ConfigError where a drive has no position actuator.
+
+    tool_mm (3,): where the payload hangs in the platform's frame; drives: names of the driven joints.
+    """
+    spec = mujoco.MjSpec.from_file(str(file))
+    spec.compiler.fusestatic = False
+    _name_all(spec)
+    nominal = spec.compile()
+    qpos = nominal.key_qpos[0] if nominal.nkey else nominal.qpos0
+    home = {nominal.joint(j).name: _values(nominal, j, qpos) for j in range(nominal.njnt)}
+    for key in list(spec.keys):
+        spec.delete(key)
+    _hold_between_sites(spec, nominal)
+    spec.body(platform).add_body(name=PAYLOAD, pos=np.asarray(tool_mm) / MM)
+    set_options(spec, nominal.opt.gravity)
+    drives = _servos(spec, Path(file), drives)
+    servos = {joint: servo.name for joint, servo in drives.items()}
+    lengths = {joint: 1.0 / MM if spec.joint(joint).type == _JOINT.mjJNT_SLIDE else 1.0 for joint in drives}
+    return Edit(spec, nominal, platform, home, drives, servos, lengths)
+
+
+def set_options(spec, gravity):
+    """Set what does not depend on the robot: step, integrator, solver, and gravity (3,) in m/s^2."""
+    option = spec.option
+    option.timestep, option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.tolerance, option.iterations = 1e-14, 200
+    option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    option.gravity = gravity
+
+
+def _name_all(spec):
+    """Give names to what has none, so that all can be found again."""
+    for number, body in enumerate(spec.bodies):
+        body.name = body.name or f"body {number}"
+        for count, joint in enumerate(body.joints, 1):
+            joint.name = joint.name or f"{body.name} joint {count}"
+    for kind, every in (("equality", spec.equalities), ("actuator", spec.actuators)):
+        for number, one in enumerate(every, 1):
+            one.name = one.name or f"{kind} {number}"
+
+
+def _values(model, joint, qpos):
+    """Values of qpos of one joint."""
+    first = int(model.jnt_qposadr[joint])
+    return np.array(qpos[first : first + _SIZES.get(_JOINT(int(model.jnt_type[joint])), 1)])
+
+
+def _servos(spec, file, drives):
+    """Position actuators of the driven joints by their names."""
+    found = {actuator.target: actuator for actuator in spec.actuators}
+    for joint in drives:
+        actuator = found.get(joint)
+        if actuator is None or not actuator.gainprm[0] > 0.0 or actuator.biasprm[1] != -actuator.gainprm[0]:
+            raise ConfigError(f"{file}: {joint} has no position actuator; allowed: <position joint={joint!r} kp=..>")
+    return {joint: found[joint] for joint in drives}
+
+
+def _hold_between_sites(spec, nominal):
+    """Make connects and welds hold two named sites together where the file's bodies meet; stiffen all equalities."""
+    for one in spec.equalities:
+        one.solref, one.solimp = SOLREF, SOLIMP
+        if one.type not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD):
+            continue
+        data, names = nominal.eq_data[nominal.equality(one.name).id], held_sites(one.name)
+        if one.objtype == _OBJ.mjOBJ_SITE:
+            sites = [spec.site(name) for name in (one.name1, one.name2)]
+            bodies = [site.parent.name for site in sites]
+            places = [(site.pos, site.quat) for site in sites]
+        else:
+            bodies, own = [name or "world" for name in (one.name1, one.name2)], (1.0, 0.0, 0.0, 0.0)
+            connect = one.type == _EQ.mjEQ_CONNECT
+            places = [(data[:3], own), (data[3:6], own)] if connect else [(data[3:6], data[6:10]), (data[:3], own)]
+        for body, name, (pos, quat) in zip(bodies, names, places, strict=True):
+            spec.body(body).add_site(name=name, pos=np.array(pos), quat=np.array(quat))
+        one.objtype, one.name1, one.name2 = _OBJ.mjOBJ_SITE, *names
+
+
+def held_sites(equality):
+    """Names of the two sites that a connect or weld holds together."""
+    return f"{equality} first", f"{equality} second"
