@@ -16,6 +16,7 @@ from rrru.errors import UnreachableError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
 from rrru.plant.tracker import Sees
+from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
 from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
@@ -56,7 +57,7 @@ class FileConditions(Conditions):
     @classmethod
     def from_parts(cls, parts, settings):
         """The conditions of one robot from its parts of the configuration, and what all share."""
-        nominal, masses = parts["robot"], setup.Masses(**parts["masses"])
+        nominal, masses = parts["robot"], Masses(**parts["masses"])
         told = {key: nominal["dimensions"][key] for key in ("mjcf", "platform")}
         noise_mm, seed = settings["withheld"]["noise_mm"], settings["seed"]
         robot = setup.mechanism(nominal)
@@ -239,6 +240,6 @@ def draw_trajectories(generator, conditions):
             },
         }
         points = np.concatenate([one.curve(np.linspace(0.0, 1.0, 60)) for one in from_config(section)])
-        if np.isfinite(conditions.mechanism.inverse(points)).all():
+        if conditions.mechanism.solve(conditions.mechanism.inverse(points), points).closed.all():
             return section
     raise UnreachableError(f"{conditions.name}: no trajectories in reach within {half:g} mm of home in {_DRAWS} draws")

@@ -36,7 +36,7 @@ def _rrru3():
     arms = tuple(((f"crank{k}.x", f"elbow{k}_x"),) for k, _ in legs)
     forearms = tuple(((f"{plate}.x", f"wrist{k}_x"),) for k, plate in legs)
     tilts = tuple(((f"arm{k}.{turn}", f"drive{k}_{turn}"),) for k, _ in legs for turn in ("rx", "rz"))
-    return Model(220.0, lengths=arms + forearms, tilts=tilts, growth_mm=growth)
+    return Model(140.0, lengths=arms + forearms, tilts=tilts, growth_mm=growth)
 
 
 def _leg_growth(k, plate):

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.withheld.chunks import noise_of
+from rrru.studies.withheld.chunks import PLANTS, noise_of
 from rrru.studies.withheld.verdicts import CAUSES, in_order, is_outside
 
 # of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
@@ -11,6 +11,7 @@ _BINS, _PER_BIN = 10, 20
 _NEAR = 0.05
 # share of a part's true size that the found one may be off
 _NEAR_PART = 0.25
+_WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PREDICTED = f"share closed predicted within {_NEAR:g}"
 _STRONG = "acts == 'one' and strength >= 1.5"
 _WEAK = "acts == 'one' and 0.3 <= strength <= 1.0"
@@ -69,10 +70,22 @@ _BACKGROUND = (
     ("one effect besides", "named exactly, with or without joint_axis_error", "acts == 'one'", "right", 0.92),
     _CALIBRATED,
 )
+_OUTSIDE = "acts == 'outside' and strength >= 2"
+_FILE = (
+    ("one cause, gap >= 1.5 x noise", "named exactly", _STRONG, "right", 0.95),
+    ("nothing shows", "false alarms", "acts == 'none'", "wrong", 0.02),
+    ("outside the library, gap >= 2 x noise", "unexplained", _OUTSIDE, "right", None),
+    ("outside the library, gap >= 2 x noise", f"unexplained, or its part {_WITHIN}", _OUTSIDE, "sized", 0.9),
+    ("one place at fault, gap >= 1.5 x noise", "place named", f"{_STRONG} and truth_leg > 0", "leg_right", None),
+    ("one cause, gap below 1.5 x noise", "named exactly", "acts == 'one' and strength < 1.5", "right", None),
+    ("one cause, gap below 1.5 x noise", "oracle detects it", "acts == 'one' and strength < 1.5", "oracle_detects", None),
+    _CALIBRATED,
+    ("one cause named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
+    ("numbers of causes named", "95 % intervals hold the true one", "numbers > 0 and right", "held", 0.9),
+)
 _MANY = (("all", "what matters named, nothing that is not there", "", "right", None), _CALIBRATED)
 # of the parts of these robots' gaps
 _SIZED = "kind != 'outside' and strength >= 2"
-_WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PARTS = (
     ("causes in the library, 0.3 of the gap or more", "named", "kind == 'effect' and share >= 0.3", "named", 0.95),
     ("causes named", "not there", f"kind in {CAUSES} and named", "invented", 0.02),
@@ -95,6 +108,7 @@ _CHECKS = {
     "noise": _NOISE,
     "many": _MANY,
     "background": _BACKGROUND,
+    **dict.fromkeys(PLANTS, _FILE),
     "field": _FIELD,
 }
 
