@@ -15,9 +15,12 @@ from rrru.plant.mujoco_model import BASE, MM, SOLIMP, SOLREF, held_sites, set_op
 _JOINT, _EQ, _OBJ = mujoco.mjtJoint, mujoco.mjtEq, mujoco.mjtObj
 _LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 _HINGE, _SLIDE = _JOINT.mjJNT_HINGE, _JOINT.mjJNT_SLIDE
+_BASE_RADIUS_M = 0.3
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-# ASSUME friction holds an arm within its play against this many times the weight that can load its joint at home
+# ASSUME friction holds an arm within its play against this many times its load at home and its share of all weight
 _HOLDS = 2.0
+# what hangs in a clearance swings as a pendulum of that length, damped by this share of the critical
+_SWINGING, _G = 0.1, 9.81
 
 
 def _zero_offset(edit, site, size):
@@ -105,6 +108,7 @@ def _clearance(edit, site, size):
     if site in [one.name for one in spec.equalities if one.type == _EQ.mjEQ_CONNECT]:
         spec.delete(spec.equality(site))
         _leash(edit, site, held_sites(site), gap)
+        _damp_swinging(edit, site, gap)
         return
     joint = spec.joint(_joint(edit, site, "a hinge, ball joint or connect", (_HINGE, _JOINT.mjJNT_BALL)))
     body, names = joint.parent, held_sites(f"{site} pin")
@@ -117,7 +121,7 @@ def _clearance(edit, site, size):
     for number, axis in enumerate(axes, 1):
         name = f"{site} clearance {number}"
         edit.add_joint(body.name, name, _SLIDE, axis)
-        edit.damped[name] = np.sqrt(9.81 / gap)
+        edit.damped[name] = _SWINGING * np.sqrt(_G / gap)
     _leash(edit, site, names, gap)
 
 
@@ -243,22 +247,42 @@ def _leash(edit, name, sites, gap):
         leash.wrap_site(site)
 
 
+def _damp_swinging(edit, site, gap):
+    """Dampers between the two sites of a connect: actuators that only brake, across x, y and z of the second site."""
+    first, second = held_sites(site)
+    for number, letter in enumerate("xyz"):
+        brake = edit.spec.add_actuator(name=f"{site} clearance {letter}", target=first, refsite=second)
+        brake.trntype, brake.biastype = mujoco.mjtTrn.mjTRN_SITE, mujoco.mjtBias.mjBIAS_AFFINE
+        brake.gear = np.eye(6)[number]
+        edit.brakes[brake.name] = f"{site} clearance", _SWINGING * np.sqrt(_G / gap)
+
+
 def _holding(edit, site):
-    """Friction in N m or N that holds the arm of a drive against all weight that may load it."""
+    """Friction in N m or N that holds the arm of a drive: more than what loads it at home."""
     model, data = edit.nominal, mujoco.MjData(edit.nominal)
-    for joint, values in edit.home.items():
-        if joint in {model.joint(j).name for j in range(model.njnt)}:
-            data.joint(joint).qpos = values
-    mujoco.mj_kinematics(model, data)
-    joint = model.joint(site)
+    for number in range(model.njnt):
+        name = model.joint(number).name
+        data.joint(name).qpos = edit.home[name]
+    mujoco.mj_forward(model, data)
     loops = ((model.eq_type == _EQ.mjEQ_CONNECT) | (model.eq_type == _EQ.mjEQ_WELD)).any()
+    joint = model.joint(site)
     behind = [b for b in range(1, model.nbody) if loops or _hangs_on(model, b, joint.bodyid[0])]
     weight = np.linalg.norm(model.opt.gravity) * np.append(model.body_mass[behind], edit.payload_kg)
-    if joint.type[0] == _SLIDE:
-        return _HOLDS * weight.sum()
-    places = np.vstack([data.xipos[behind], data.body(edit.platform).xpos])
-    lever = np.linalg.norm(np.cross(data.joint(site).xaxis, places - data.joint(site).xanchor), axis=1)
-    return _HOLDS * weight @ lever
+    places = np.vstack([data.xipos[behind], data.body(edit.platform).xpos]) - data.joint(site).xanchor
+    lever = np.linalg.norm(np.cross(data.joint(site).xaxis, places), axis=1)
+    share = (weight.sum() if joint.type[0] == _SLIDE else weight @ lever) / (len(edit.drives) if loops else 1)
+    return _HOLDS * abs(_static_load(edit, data)[site]) + share
+
+
+def _static_load(edit, data):
+    """What the drives bear in N m or N in a pose at rest, by joint: the bias that loops cannot bear."""
+    model = edit.nominal
+    dofs = [model.joint(name).dofadr[0] for name in edit.drives]
+    held = np.zeros((data.ne, model.nv))
+    for row, one in zip(held, np.eye(data.nefc), strict=False):
+        mujoco.mj_mulJacTVec(model, data, row, one)
+    bearing = np.vstack([np.eye(model.nv)[dofs], held])
+    return dict(zip(edit.drives, np.linalg.lstsq(bearing.T, data.qfrc_bias)[0], strict=False))
 
 
 def _hangs_on(model, body, first):
@@ -275,8 +299,11 @@ def _put_on_base(edit):
             _unfree(edit, body)
     model = mujoco.MjSpec()
     set_options(model, edit.nominal.opt.gravity)
-    model.option.gravity = edit.spec.option.gravity
-    model.attach(edit.spec, frame=model.worldbody.add_body(name=BASE).add_frame(), prefix="robot ")
+    mass = edit.nominal.body_mass.sum()
+    # ASSUME the base is as heavy as all that stands on it
+    inertia = {"mass": mass, "inertia": np.full(3, _BASE_RADIUS_M**2 * mass), "explicitinertial": True}
+    base = model.worldbody.add_body(name=BASE, **inertia)
+    model.attach(edit.spec, frame=base.add_frame(), prefix="robot ")
     edit.spec, edit.prefix = model, "robot "
 
 

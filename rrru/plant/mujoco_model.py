@@ -30,7 +30,8 @@ class Edit:
     not know. shifts: by place, as causes name it, what it is off by in m or rad; grows: likewise, what it moves by as
     it warms up with the time constant warming_s; masses: added to bodies in kg; tilt (3,): rotation vector of the base
     against gravity. damped: by added joint the angular frequency in 1/s of what settles it, None for a spring's own;
-    leashes: by tendon the two sites that it keeps near each other; seats: by site that marks where a body is seated the
+    leashes: by tendon the two sites that it keeps near each other; brakes: by actuator the leash whose swinging it
+    damps, and a frequency likewise; seats: by site that marks where a body is seated the
     body's site that lies there at home. prefix: of all names in spec; payload_kg: the heaviest that will be carried.
     """
 
@@ -52,6 +53,7 @@ class Edit:
     lags: dict = field(default_factory=dict)
     seats: dict = field(default_factory=dict)
     leashes: dict = field(default_factory=dict)
+    brakes: dict = field(default_factory=dict)
     prefix: str = ""
 
     def units(self, joint):

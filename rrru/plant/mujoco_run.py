@@ -12,8 +12,9 @@ from rrru.errors import SimulationError, UnreachableError
 from rrru.plant.mujoco_model import MM, PAYLOAD, STEP_S
 from rrru.plant.mujoco_shape import Shape
 
-# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre
-CLOSED_MM, REST_MM_S = 1e-3, 2e-3
+# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: what
+# friction holds creeps in MuJoCo by some um/s
+CLOSED_MM, REST_MM_S = 1e-3, 1e-2
 _ARM = 0.5
 # the platform is pushed by a tenth of gravity at most: friction that holds an arm in its play holds it
 _ACCELERATION = 1.0
@@ -76,6 +77,9 @@ class Machine:
             dof, own = joint.dofadr[0], model.dof_M0[joint.dofadr[0]]
             natural = np.sqrt(model.jnt_stiffness[joint.id] / own) if frequency is None else frequency
             model.dof_damping[dof] = 2.0 * own * natural
+        for name, (leash, frequency) in self.edit.brakes.items():
+            mass = 1.0 / model.tendon_invweight0[model.tendon(self.edit.prefix + leash).id]
+            model.actuator(self.edit.prefix + name).biasprm[2] = -2.0 * mass * frequency
 
     def controls(self, drives):
         """Controls (N, K) for actuator values (N, K) in rad or mm; raises UnreachableError beyond the file's ranges."""
