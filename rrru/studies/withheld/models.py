@@ -35,7 +35,7 @@ def _rrru3():
     growth = {name: size for k, plate in legs for name, size in _leg_growth(k, plate).items()}
     arms = tuple(((f"crank{k}.x", f"elbow{k}_x"),) for k, _ in legs)
     forearms = tuple(((f"{plate}.x", f"wrist{k}_x"),) for k, plate in legs)
-    tilts = tuple(((f"arm{k}.{turn}", f"drive{k}_{turn}"),) for k, _ in legs for turn in ("rx", "rz"))
+    tilts = tuple(((f"crank{k}.{turn}", f"elbow{k}_{turn}"),) for k, _ in legs for turn in ("rx", "rz"))
     return Model(140.0, lengths=arms + forearms, tilts=tilts, growth_mm=growth)
 
 
@@ -45,12 +45,9 @@ def _leg_growth(k, plate):
 
 
 def _delta():
-    """Rods are of carbon fibre and plates are small: arms and base grow."""
+    """Its rods hang between balls, so that no place of the file makes them longer: it does not warm up."""
     rods = [f"{k}{side}" for k in (1, 2, 3) for side in "ab"]
     pairs = ((1, 2), (3, 4), (5, 6))
-    seats = ((160.215, -92.5, 748.331), (0.0, 185.0, 748.331), (-160.215, -92.5, 748.331))
-    growth = {f"arm{k}": seat for k, seat in zip((1, 2, 3), seats, strict=True)}
-    growth |= {f"rod{rod}": (375.0, -60.0 if rod.endswith("a") else 60.0, 0.0) for rod in rods}
     return Model(
         200.0,
         links=tuple((f"rod{rod}.z",) for rod in rods),
@@ -59,8 +56,7 @@ def _delta():
             ((f"rod{k}a.x", f"leg_{a}_ball_x"), (f"rod{k}b.x", f"leg_{b}_ball_x"))
             for k, (a, b) in zip((1, 2, 3), pairs, strict=True)
         ),
-        tilts=tuple(((f"arm{k}.{turn}", f"theta{k}_{turn}"),) for k in (1, 2, 3) for turn in ("rx", "rz")),
-        growth_mm=growth,
+        tilts=tuple(((f"arm{k}.rz", f"theta{k}_rz"),) for k in (1, 2, 3)),
     )
 
 
@@ -76,7 +72,7 @@ def _hexapod():
         45.0,
         links=tuple((f"piston{k}.z",) for k in legs),
         clearances=tuple(f"ball{k}" for k in legs),
-        lengths=tuple(((f"ball{k}.x", f"leg_{k}_end_x"),) for k in legs),
+        lengths=tuple(((f"cylinder{k}.x", f"leg_{k}_ball_x"),) for k in legs),
         growth_mm=growth,
         targets=_TARGETS,
     )

@@ -74,7 +74,7 @@ What the diagnosis says about each withheld robot; made without knowing any answ
 check robot kind
 effects                str    as in gap_verdicts
 probability            float  of the whole verdict, 0 to 1
-leg                    int    the one leg at fault, 1 to 3; 0 for all or none
+leg                    int    the one leg at fault, from 1 on; 0 for all or none
 gap_rms_mm             float  gap under the calibrated sim, 3-D
 noise_rms_mm           float  measuring noise, 3-D
 share_closed           float  share of the gap that the verdict's effects close on held-out runs
@@ -147,7 +147,7 @@ The scores in figures, against what the tool is meant to reach.
 check
 group                  str    which robots are counted
 figure                 str    what is counted
-robots                 int    robots in the group, or parts of their gaps
+robots                 int    robots in the group, parts of their gaps, or numbers of their causes
 value                  float? the figure; null where the group is empty
 low                    float? lower end of the 95 % Wilson interval; null where the figure is no share
 high                   float? upper end

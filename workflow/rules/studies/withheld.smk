@@ -13,7 +13,15 @@ WITHHELD_FIGURES = {
         ["withheld_scores", "withheld_confusion", "withheld_parts"],
     )
 }
+PLANTS_FIGURES = {
+    "withheld_plants": (
+        "rrru.studies.withheld.figures:plants",
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+    )
+}
 FIGURES["withheld"] = WITHHELD_FIGURES
+if config["withheld"]["mujoco"] + config["withheld"]["own"]:
+    FIGURES["withheld"] = WITHHELD_FIGURES | PLANTS_FIGURES
 # and those among them on which other ways to find a cause are tried
 RIVALLED = rivalled(config["withheld"])
 # what is known of every robot
@@ -161,4 +169,4 @@ rule withheld:
     input:
         named([*WITHHELD_TABLES, *WITHHELD_ADVICE]).values(),
         rules.withheld_methods.output,
-        drawn(WITHHELD_FIGURES).values(),
+        drawn(FIGURES["withheld"]).values(),
