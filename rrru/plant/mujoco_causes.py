@@ -20,7 +20,7 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # ASSUME friction holds an arm within its play against this many times its load at home and its share of all weight
 _HOLDS = 2.0
 # what hangs in a clearance swings as a pendulum of that length, damped by this share of the critical
-_SWINGING, _G = 0.1, 9.81
+_SWINGING, _G = 0.5, 9.81
 
 
 def _zero_offset(edit, site, size):
@@ -47,6 +47,7 @@ def _actuator_stiffness(edit, site, size):
     kp = _positive(site, size) * force / length
     actuator.biasprm[2] *= np.sqrt(kp / actuator.gainprm[0])
     actuator.gainprm[0], actuator.biasprm[1] = kp, -kp
+    edit.steady(edit.spec.joint(site), kp)
 
 
 def _servo_lag(edit, site, size):
@@ -78,7 +79,6 @@ def _play(edit, site, size):
     half, (length, _) = 0.5 * _positive(site, size), edit.units(site)
     ends = {"range": (-half * length, half * length), "limited": _LIMITED}
     edit.add_joint(joint.parent.name, name, joint.type, joint.axis, pos=joint.pos, **ends)
-    edit.steady(joint, edit.drives[site].gainprm[0])
     arm = edit.spec.add_tendon(name=name)
     arm.wrap_joint(site, 1.0)
     arm.wrap_joint(name, 1.0)

@@ -91,7 +91,10 @@ def read(file, platform, tool_mm, drives):
     drives = _servos(spec, Path(file), drives)
     servos = {joint: servo.name for joint, servo in drives.items()}
     lengths = {joint: 1.0 / MM if spec.joint(joint).type == _JOINT.mjJNT_SLIDE else 1.0 for joint in drives}
-    return Edit(spec, nominal, platform, home, drives, servos, lengths)
+    edit = Edit(spec, nominal, platform, home, drives, servos, lengths)
+    for joint, servo in drives.items():
+        edit.steady(spec.joint(joint), servo.gainprm[0])
+    return edit
 
 
 def set_options(spec, gravity):

@@ -58,9 +58,10 @@ def source(config, name):
 
 
 def truth(config, name):
-    """The true deviations of a virtual campaign's robot by name; None for a measured one."""
+    """The true deviations of a virtual campaign's robot by name; None for a measured or simulated one."""
     section = config["campaigns"][name]
-    return config["virtual_robots"][section["virtual"]]["errors"] if "virtual" in section else None
+    real = config["virtual_robots"][section["virtual"]] if "virtual" in section else {"mujoco": {}}
+    return None if "mujoco" in real else real["errors"]
 
 
 def virtual(config, name):

@@ -6,6 +6,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
 from rrru.plant import virtual_robot
+from rrru.plant.driven import DrivenRobot
 from rrru.plant.tracker import Sees
 from rrru.robots.catalogue import make_mechanism, tracked_set
 from rrru.seeds import stream
@@ -53,7 +54,7 @@ class VirtualCampaign:
     in the order driven, to those sent to the motors, None where these are the same; sees: what the tracker reads.
     """
 
-    robot: virtual_robot.VirtualRobot
+    robot: DrivenRobot
     plan: object
     noise_mm: float
     seed: int
@@ -83,7 +84,12 @@ class VirtualCampaign:
 
 def real_robot(nominal, section):
     """The virtual robot that an entry of `virtual_robots:` makes of a nominal one; see `virtual_campaign`."""
-    return virtual_robot.from_config(mechanism(nominal), section)
+    if "mujoco" not in section:
+        return virtual_robot.from_config(mechanism(nominal), section)
+    # a simulator is not small, and other robots do not need it
+    from rrru.plant import mujoco_robot
+
+    return mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)
 
 
 def virtual_campaign(nominal, virtual):

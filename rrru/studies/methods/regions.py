@@ -6,7 +6,7 @@ import numpy as np
 
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 from rrru.errors import ConfigError
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.plant.driven import DrivenRobot
 from rrru.seeds import stream
 from rrru.studies import setup
 
@@ -43,7 +43,7 @@ class Trial:
     """
 
     name: str
-    robot: VirtualRobot
+    robot: DrivenRobot
     noise_mm: float
     train_mm: np.ndarray
     tests_mm: dict
