@@ -12,7 +12,7 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
-from rrru.errors import UnreachableError
+from rrru.errors import SimulationError, UnreachableError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
 from rrru.plant.tracker import Sees
@@ -28,7 +28,7 @@ from rrru.studies.withheld.verdicts import NONE
 # what can be seen at all, and what an own tracker would find
 WEAKEST, STRONGEST = 0.7, 10.0
 _OFFSET_SD = {"rad": 0.002, "mm": 0.5}
-_DRAWS, _STEPS = 20, 2
+_DRAWS, _TRIES, _STEPS = 5, 20, 2
 _MOTION = {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
 _SOME = {"trajectories": ["line_1", "spiral"]}
@@ -157,7 +157,11 @@ def residual(measurements, conditions):
 
 
 def draw(member, conditions):
-    """The robot of a Member, see `rrru.studies.withheld.chunks`, and its measurements."""
+    """The robot of a Member, see `rrru.studies.withheld.chunks`, and its measurements.
+
+    A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, is drawn again; raises the
+    last of these errors where none can be driven.
+    """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
     offsets = [_OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
     trajectories = draw_trajectories(generator, conditions)
@@ -166,9 +170,14 @@ def draw(member, conditions):
     kind = kinds[member.number % len(kinds)]
     if kind == NONE:
         return robot, robot.measured(conditions)
-    fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
-    strength = float(np.exp(generator.uniform(*np.log([WEAKEST, STRONGEST]))))
-    return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
+    for _ in range(_DRAWS):
+        fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
+        strength = float(np.exp(generator.uniform(*np.log([WEAKEST, STRONGEST]))))
+        try:
+            return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
+        except (SimulationError, UnreachableError) as error:
+            failed = error
+    raise failed
 
 
 def sized(robot, fault, strength, conditions):
@@ -219,7 +228,7 @@ def draw_trajectories(generator, conditions):
     Raises UnreachableError where no draw is in reach.
     """
     half, home = conditions.model.half_mm, conditions.mechanism.legs.home_mm
-    for _ in range(_DRAWS):
+    for _ in range(_TRIES):
         x, y, z = home + half * generator.uniform(-0.15, 0.15, 3)
         high, low, inner, outer, begin = generator.uniform([0.2, -0.5, 0.15, 0.7, 0.0], [0.5, -0.2, 0.3, 0.9, 360.0])
         level = z + half * generator.uniform(-0.3, 0.3)
@@ -242,4 +251,4 @@ def draw_trajectories(generator, conditions):
         points = np.concatenate([one.curve(np.linspace(0.0, 1.0, 60)) for one in from_config(section)])
         if conditions.mechanism.solve(conditions.mechanism.inverse(points), points).closed.all():
             return section
-    raise UnreachableError(f"{conditions.name}: no trajectories in reach within {half:g} mm of home in {_DRAWS} draws")
+    raise UnreachableError(f"{conditions.name}: no trajectories in reach within {half:g} mm of home in {_TRIES} draws")
