@@ -144,7 +144,9 @@ def withheld_scores(each=8):
         for truth in [*EFFECTS, "link_flexure+backlash", "none", *outside] if label == "label" else outside:
             rows += [_score(generator, label, truth) for _ in range(each)]
     for label in PLANTS:
-        rows += [_score(generator, label, truth) for truth in (*EFFECTS[:4], "none", "outside:spring") for _ in range(each)]
+        rows += [
+            _score(generator, label, truth) for truth in (*EFFECTS[:4], "none", "outside:spring") for _ in range(each)
+        ]
     for label, others in (("noise", ("backlash", "none")), ("background", ("axis_tilt", "none")), ("many", OTHERS)):
         rows += [_score(generator, label, truth) for truth in others for _ in range(each)]
     rows += [_score(generator, "field", truth) for truth in ("backlash", "none", "outside:sag", "axis_tilt+servo_lag")]

@@ -78,7 +78,13 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     modules = _modules(script)
     assert {("gap", "diagnose"), ("gap", "case")} <= modules
     # of the study that draws the robots only how verdicts and corrected sims are written down, and other ways to them
-    own = {"__init__", "numbers", "schemas", "states", *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ())}
+    own = {
+        "__init__",
+        "numbers",
+        "schemas",
+        "states",
+        *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ()),
+    }
     assert {name for package, name in modules if package == "withheld"} <= own
     # and the walk would see them
     assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")

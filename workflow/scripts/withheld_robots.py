@@ -6,7 +6,7 @@ from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.withheld.chunks import Member
 from rrru.studies.withheld.members import all_conditions, drawn
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.withheld.schemas import tables_of
 
 
 def main(settings, inputs, outputs):
@@ -20,7 +20,9 @@ def main(settings, inputs, outputs):
         "withheld_answers": pd.DataFrame(answers),
         "withheld_measurements": pd.concat(driven, ignore_index=True),
     }
-    tables.write_all(TABLES, frames, outputs)
+    names = frames["withheld_measurements"].columns
+    # the drives are those of all robots of the chunk
+    tables.write_all(tables_of(conditions[member.file].mechanism, names), frames, outputs)
 
 
 if __name__ == "__main__":

@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from rrru.errors import ConfigError
 from rrru.studies import config as parts
 from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.noise import NOISES
-
 
 # checks on robots of files, each the name of the plant that drives them
 PLANTS = ("mujoco", "own")
@@ -53,9 +54,13 @@ def chunks(section):
     members += [Member("effect", e, k) for e in section["effects"] for k in range(section["per_effect"])]
     members += [Member("noise", noise, k) for noise in NOISES for k in range(section["per_noise"])]
     members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
-    members += [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
-    size = section["chunk"]
-    return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
+    driven = [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
+    # a chunk's robots have the same drives
+    groups = [members, *([one for one in driven if one.file == file] for file in section["files"])]
+    result, size = {}, section["chunk"]
+    for k, group in zip(np.cumsum([0, *map(len, groups)]).tolist(), groups, strict=False):
+        result |= {f"robots_{k + first:04d}": group[first : first + size] for first in range(0, len(group), size)}
+    return result
 
 
 def _of_file(plant, files, k):

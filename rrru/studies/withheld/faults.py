@@ -51,7 +51,7 @@ class Kind:
     """A kind of cause.
 
     law: from a robot to the Effect that it is on our own plant, None where it is errors of the robot's own numbers;
-    answer: the effect of the library that is right, empty where the calibration takes it up, None where no law holds it;
+    answer: the effect that is right, empty where the calibration takes it up, None where the library has no law of it;
     on: field of a Model that lists where it acts, empty for drives and the whole robot; typical: sizes of such errors;
     more: further numbers by name, each with the span that it is drawn from.
     """

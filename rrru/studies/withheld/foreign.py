@@ -70,7 +70,8 @@ class FileConditions(Conditions):
 
 @dataclass(frozen=True)
 class FileRobot:
-    """A robot of a file, of which it has the entry in `robots:`: plant, trajectories as in the configuration, offsets of its drives (K,), the fault if any.
+    """A robot of a file: the file's entry in `robots:`, plant, trajectories as in the configuration, offsets of its
+    drives (K,), the fault if any.
 
     oracle_chi2: what its own displacement, the size fitted, takes off the chi-square of its measurements.
     """

@@ -1,4 +1,4 @@
-"""The robots of the check, whoever drives them: 3-RRRUs of our own plant, and robots of files on the plant they name."""
+"""The robots of the check: 3-RRRUs of our own plant, and robots of files on the plant that they name."""
 
 import json
 from typing import NamedTuple

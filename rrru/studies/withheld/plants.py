@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 
 from rrru.effects.protocol import ActiveEffect
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots.dynamics import Masses
 from rrru.studies.withheld.faults import KINDS
 
 # servos whose friction shows, in N mm/rad or N/mm: so stiff that weight does not

@@ -6,6 +6,7 @@ Those below withheld/ pass between the rules, chunk by chunk of the robots.
 from dataclasses import replace
 
 from rrru.campaign.schemas import TABLES as CAMPAIGN_TABLES
+from rrru.campaign.schemas import measurement_table
 from rrru.store.schema import read_tables
 
 _TABLES = read_tables("""
@@ -14,8 +15,8 @@ kind                   str    paper (each trajectory once), full (reverse runs, 
     full, file}
 truth                  str    true effects joined by +; none; or outside:<name> for what the library does not hold
 file                   str    entry in robots of a robot that is read from a file; empty for the 3-RRRU of our own
-cause                  str    what acts, as its plant names it, see rrru/studies/withheld/faults.py; truth for the 3-RRRU
-    of our own
+cause                  str    what acts, as its plant names it, see rrru/studies/withheld/faults.py; of the 3-RRRU of
+    our own the truth
 truth_leg              int    the one leg at fault, from 1 on; 0 for all or none
 strength               float  true gap rms over noise rms, without noise
 weakest                float  the same of the weakest cause alone; 0 where nothing acts
@@ -198,13 +199,23 @@ low                    float? lower end of the 95 % Wilson interval
 high                   float? upper end
 """)
 _ANSWERS = _TABLES[0]
-_MEASURED = next(table for table in CAMPAIGN_TABLES if table.name == "measurements")
-_MEASUREMENTS = replace(
-    _MEASURED,
-    name="withheld_measurements",
-    path="withheld/measurements/{chunk}.parquet",
-    description="One row per commanded point of each robot: all that the diagnosis is given.",
-    columns=(*_ANSWERS.columns[:2], *_MEASURED.columns),
-    key=("robot", "run", "point"),
-)
-TABLES = (_ANSWERS, _MEASUREMENTS, *_TABLES[1:])
+
+
+def _measurements(measured):
+    """The table of measurements of several robots out of that of one."""
+    return replace(
+        measured,
+        name="withheld_measurements",
+        path="withheld/measurements/{chunk}.parquet",
+        description="One row per commanded point of each robot: all that the diagnosis is given.",
+        columns=(*_ANSWERS.columns[:2], *measured.columns),
+        key=("robot", "run", "point"),
+    )
+
+
+TABLES = (_ANSWERS, _measurements(next(t for t in CAMPAIGN_TABLES if t.name == "measurements")), *_TABLES[1:])
+
+
+def tables_of(robot, names):
+    """All tables, that of the measurements with a robot's own columns and those of `names` beyond them."""
+    return (_ANSWERS, _measurements(measurement_table(robot, names)), *_TABLES[1:])

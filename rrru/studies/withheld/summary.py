@@ -81,7 +81,13 @@ _FILE = (
     ("outside the library, gap >= 2 x noise", f"unexplained, or its part {_WITHIN}", _OUTSIDE, "sized", 0.9),
     ("one place at fault, gap >= 1.5 x noise", "place named", f"{_STRONG} and truth_leg > 0", "leg_right", None),
     ("one cause, gap below 1.5 x noise", "named exactly", "acts == 'one' and strength < 1.5", "right", None),
-    ("one cause, gap below 1.5 x noise", "oracle detects it", "acts == 'one' and strength < 1.5", "oracle_detects", None),
+    (
+        "one cause, gap below 1.5 x noise",
+        "oracle detects it",
+        "acts == 'one' and strength < 1.5",
+        "oracle_detects",
+        None,
+    ),
     _CALIBRATED,
     ("one cause named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
     _HELD,
@@ -156,7 +162,13 @@ def _each(check, robots):
         for cause, own in robots.groupby("cause"):
             yield cause, "right", f"cause == '{cause}'", "right", None
             if (own["strength"] >= _SEEN).any():
-                yield f"{cause}, gap >= 1.5 x noise", "right", f"cause == '{cause}' and strength >= {_SEEN}", "right", None
+                yield (
+                    f"{cause}, gap >= 1.5 x noise",
+                    "right",
+                    f"cause == '{cause}' and strength >= {_SEEN}",
+                    "right",
+                    None,
+                )
         for file in sorted(robots["file"].unique()):
             yield file, "right", f"file == '{file}'", "right", None
     if check == "label":

@@ -6,7 +6,20 @@ UNEXPLAINED, NONE = "unexplained", "none"
 CAUSES = ("effect", "background")
 # what acts in every robot of the check on a background, asked for or not
 _BACKGROUND = "joint_axis_error"
-_SCORES = ["check", "robot", "kind", "file", "cause", "truth", "truth_leg", "strength", "verdict", "right", "leg_right", "probability"]
+_SCORES = [
+    "check",
+    "robot",
+    "kind",
+    "file",
+    "cause",
+    "truth",
+    "truth_leg",
+    "strength",
+    "verdict",
+    "right",
+    "leg_right",
+    "probability",
+]
 
 
 def is_right(truth, verdict, check):

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import numpy as np
 import yaml
 
 from rrru.campaign.plan import make_plan
@@ -34,7 +35,7 @@ def short(plant, file, acting=(), offsets=None):
     """A Short robot of a file on a plant."""
     known = conditions(file)
     home, reach = known.mechanism.legs.home_mm, 0.4 * known.model.half_mm
-    start, end = (home - [reach, 0.0, reach]).tolist(), (home + [reach, 0.3 * reach, 0.5 * reach]).tolist()
-    lines = {"start_mm": start, "end_mm": end, "offsets_y_mm": [0.0], "points": 3}
+    ends = home + reach * np.array([[-1.0, 0.0, -1.0], [1.0, 0.3, 0.5]])
+    lines = {"start_mm": ends[0].tolist(), "end_mm": ends[1].tolist(), "offsets_y_mm": [0.0], "points": 3}
     offsets = offsets or (0.0,) * len(known.mechanism.parts.columns)
     return Short("short", file, plant, {"lines": lines}, offsets, acting)
