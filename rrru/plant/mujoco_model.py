@@ -16,6 +16,7 @@ from rrru.errors import ConfigError
 MM = 1000.0
 STEP_S = 2e-4
 SOLREF, SOLIMP = (2.0 * STEP_S, 1.0), (0.9999, 0.9999, 1e-4, 0.5, 2.0)
+LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 PAYLOAD, BASE = "rrru payload", "rrru base"
 _EQ, _JOINT, _OBJ = mujoco.mjtEq, mujoco.mjtJoint, mujoco.mjtObj
 _SIZES = {_JOINT.mjJNT_FREE: 7, _JOINT.mjJNT_BALL: 4}
