@@ -190,7 +190,7 @@ def test_chunks_hold_every_robot_once():
 def test_chunks_hold_the_robots_of_every_check():
     section = {"robots": 1, "per_effect": 1, "effects": ["backlash"], "per_noise": 2, "many": 3, "background": 2}
     section |= {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]}
-    (members,) = chunks(section | {"chunk": 100}).values()
+    members = [member for chunk in chunks(section | {"chunk": 100}).values() for member in chunk]
     counted = Counter(member.check for member in members)
     assert counted == {
         "label": 1,
