@@ -12,6 +12,8 @@ from rrru.plant.tracker import Sees
 from rrru.robots.delta import Delta
 from rrru.robots.from_file import from_urdf
 from rrru.robots.rrru3 import Rrru3
+from rrru.studies import config as parts
+from rrru.studies import setup
 from tests.plant.simulated import MODELS, file_of, mechanism, near_home, on_line, simulated, standing
 
 _AWAY = ((0.0, 0.0, 0.0), (60.0, 30.0, 20.0), (-50.0, 40.0, -30.0), (10.0, -60.0, 25.0))
@@ -85,6 +87,30 @@ def test_it_is_measured_as_every_virtual_robot_is():
     balls = truth[[f"true_{axis}_mm" for axis in "xyz"]].to_numpy()
     apart = np.linalg.norm(balls[::2] - balls[1::2], axis=1)
     np.testing.assert_allclose(apart, np.sqrt(50.0**2 + 10.0**2 + 10.0**2), atol=1e-9)
+
+
+def test_a_campaign_of_the_configuration_is_simulated():
+    """Play of a drive that goes one way only is a constant; nobody claims true deviations beside it."""
+    config = {
+        "seed": 1,
+        "motion": {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 1.0},
+        "loads": {"platform_mass_kg": 3.0},
+        "calibration": {"bounds": {"angle_rad": 0.02, "length_mm": 3.0}},
+        "robots": {"arm": {"mjcf": str(file_of("arm6")), "platform": "tool0"}},
+        "virtual_robots": {"worn": {"mujoco": {"causes": {"play": {"axis1": 1e-3}}}, "errors": {}, "effects": {}}},
+        "trajectories": {
+            "short": {
+                "lines": {"start_mm": [590, -50, 865], "end_mm": [590, 50, 865], "offsets_y_mm": [0], "points": 4}
+            }
+        },
+        "campaigns": {"own": {"robot": "arm", "virtual": "worn", "trajectories": "short", "noise_mm": 0.0}},
+    }
+    parts.check(config)
+    measured, _ = setup.virtual_campaign(parts.nominal(config, "own"), parts.virtual(config, "own")).run()
+    sideways = (measured["measured_y_mm"] - measured["command_y_mm"]).to_numpy()
+    # axis 1 is upright, 590 mm from the tool
+    np.testing.assert_allclose(sideways[1:], -590.0 * 0.5e-3, rtol=0.02)
+    assert parts.truth(config, "own") is None
 
 
 def test_a_loop_that_is_not_closed_is_an_error_that_says_where_and_how_far(tmp_path):
