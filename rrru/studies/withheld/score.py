@@ -43,18 +43,21 @@ def score_chunk(answers, measurements, verdicts, states, budget, known):
         about = known[robot.file]
         taken_out = row["truth"] if row["check"] == "effect" else ""
         own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
-        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, own)})
+        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, robot, own)})
         listed.append(own.assign(check=row["check"], robot=name))
     told = told.assign(**pd.DataFrame(measured, index=told.index))
     limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
     return Scored(scores(told), limited, pd.concat(listed, ignore_index=True))
 
 
-def _right(row, listed):
-    """Whether the verdict of a row is right; listed: the robot's rows of `withheld_parts`."""
+def _right(row, robot, listed):
+    """Whether the verdict of a row on a robot is right; listed: the robot's rows of `withheld_parts`."""
     if row["check"] == "many":
         return is_enough(listed, row["strength"])
-    return is_right(row["truth"], row["effects"], row["check"])
+    effects = row["effects"]
+    if robot.file:
+        effects = "+".join(name for name in effects.split("+") if name not in robot.beside) or effects
+    return is_right(row["truth"], effects, row["check"])
 
 
 def _measured(row, robot, points, about, taken_out):

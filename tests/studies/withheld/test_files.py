@@ -114,7 +114,7 @@ def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
     known = conditions("rrru3_file")
     robot, measurements = foreign.draw(Member("own", "rrru3_file", 1), known)
     assert robot.cause == NONE and not robot.acting and len(measurements) <= 220
-    assert set(measurements["speed_mm_s"]) == {80.0, 200.0} and set(measurements["payload_kg"]) == {0.0, 3.0}
+    assert set(measurements["speed_mm_s"]) == {40.0, 120.0} and set(measurements["payload_kg"]) == {0.0, 3.0}
     assert set(rows.direction(measurements)) == {-1, 1}
     elsewhere = foreign.fresh(robot, known).plan(known).targets()
     assert np.abs(elsewhere - robot.plan(known).targets()).max() > 5.0
