@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from rrru.plant.mujoco_model import BASE, LIMITED, SOLIMP, SOLREF, held_sites, set_options
+from rrru.plant.mujoco_model import BASE, LIMITED, SOFTER, SOLIMP, held_sites, set_options
 
 _JOINT, _EQ = mujoco.mjtJoint, mujoco.mjtEq
 _SLIDE = _JOINT.mjJNT_SLIDE
@@ -31,7 +31,7 @@ def leash(edit, name, sites, gap):
     """Let two sites be as far apart as this in m."""
     tendon = edit.spec.add_tendon(name=f"{name} clearance", limited=LIMITED, range=(0.0, gap))
     edit.leashes[tendon.name] = sites
-    tendon.solref_limit, tendon.solimp_limit = SOLREF, SOLIMP
+    tendon.solref_limit, tendon.solimp_limit = SOFTER, SOLIMP
     for site in sites:
         tendon.wrap_site(site)
 

@@ -91,6 +91,7 @@ def test_it_is_measured_as_every_virtual_robot_is():
 
 def test_a_campaign_of_the_configuration_is_simulated():
     """Play of a drive that goes one way only is a constant; nobody claims true deviations beside it."""
+    line = {"start_mm": [590, -50, 865], "end_mm": [590, 50, 865], "offsets_y_mm": [0], "points": 4}
     config = {
         "seed": 1,
         "motion": {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 1.0},
@@ -98,11 +99,7 @@ def test_a_campaign_of_the_configuration_is_simulated():
         "calibration": {"bounds": {"angle_rad": 0.02, "length_mm": 3.0}},
         "robots": {"arm": {"mjcf": str(file_of("arm6")), "platform": "tool0"}},
         "virtual_robots": {"worn": {"mujoco": {"causes": {"play": {"axis1": 1e-3}}}, "errors": {}, "effects": {}}},
-        "trajectories": {
-            "short": {
-                "lines": {"start_mm": [590, -50, 865], "end_mm": [590, 50, 865], "offsets_y_mm": [0], "points": 4}
-            }
-        },
+        "trajectories": {"short": {"lines": line}},
         "campaigns": {"own": {"robot": "arm", "virtual": "worn", "trajectories": "short", "noise_mm": 0.0}},
     }
     parts.check(config)
