@@ -180,8 +180,7 @@ def test_chunks_hold_every_robot_once():
     section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
     others = {"per_noise": 0, "many": 0, "background": 0, "mujoco": 0, "own": 0, "files": []}
     parts = list(chunks(section | others).values())
-    count = 7 + 3 * len(EFFECTS)
-    assert [len(part) for part in parts] == [*[4] * (count // 4), *([count % 4] if count % 4 else [])]
+    assert [len(part) for part in parts] == [4] * 10 + [3]
     names = [member.name for part in parts for member in part]
     assert names[:8] == [*(f"label_{k:04d}" for k in range(7)), "effect_backlash_0000"]
     assert names[7:] == [f"effect_{effect}_{k:04d}" for effect in EFFECTS for k in range(3)]
