@@ -89,8 +89,12 @@ class CauseTests:
     @cached_property
     def _all_bases(self):
         """What `_bases` gives, of every cause by name, under each weighing."""
-        every = {name: [self._bases(name, one) for one in self.weighings] for name in self.columns}
-        return every | {BAD_READING: [self._bases(BAD_READING, one) for one in self._likely]}
+        return {name: [self._bases(name, one) for one in self.weighings] for name in self.columns}
+
+    @cached_property
+    def _bad_bases(self):
+        """What `_bases` gives of a bad reading under each of its weighings."""
+        return [self._bases(BAD_READING, one) for one in self._likely]
 
     def p(self, name, readings=None, beside=None):
         """Largest p over the ratios for a cause, (...) for readings (..., n), by default its own.
@@ -99,11 +103,12 @@ class CauseTests:
         (n, k) that are fitted too.
         """
         readings = self.readings_mm if readings is None else readings
-        weighings, bases = self._likely if name == BAD_READING else self.weighings, self._all_bases[name]
+        bad = name == BAD_READING
+        weighings, bases = (self._likely, self._bad_bases) if bad else (self.weighings, self._all_bases[name])
         if beside is not None:
             weighings = [one.beside(beside) for one in weighings]
             bases = [self._bases(name, one) for one in weighings]
-        if name != BAD_READING:
+        if not bad:
             return largest_p(weighings, bases, readings)[..., 0]
         return np.minimum(mean_p(weighings, bases, readings) * readings.shape[-1], 1.0)
 

@@ -30,8 +30,8 @@ def changed_steps(printer, level):
     stated = _left(printer)
     left = [_left(with_steps(printer, factors)) for factors in _CHANGES]
     best, readings = int(np.argmin(left)), len(printer.height_mm) + len(printer.distance_mm)
-    gain = readings * (np.log(stated) - np.log(left[best]))
-    return _CHANGES[best] if gain > np.log(len(_CHANGES) / level) else np.ones(3)
+    needed = (len(_CHANGES) / level) ** (1.0 / readings)
+    return _CHANGES[best] if stated > needed * left[best] else np.ones(3)
 
 
 def told(factors):
