@@ -10,17 +10,12 @@ import mujoco
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.plant.mujoco_model import BASE, MM, SOLIMP, SOLREF, held_sites, set_options
+from rrru.plant.mujoco_model import BASE, LIMITED, MM, SOLIMP, SOLREF, held_sites
+from rrru.plant.mujoco_parts import damp_swinging, holding_friction, leash, put_on_base, spring, swinging_frequency
 
 _JOINT, _EQ, _OBJ = mujoco.mjtJoint, mujoco.mjtEq, mujoco.mjtObj
-_LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 _HINGE, _SLIDE = _JOINT.mjJNT_HINGE, _JOINT.mjJNT_SLIDE
-_BASE_RADIUS_M = 0.3
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-# ASSUME friction holds an arm within its play against this many times its load at home and its share of all weight
-_HOLDS = 2.0
-# what hangs in a clearance swings as a pendulum of that length, damped by this share of the critical
-_SWINGING, _G = 0.5, 9.81
 
 
 def _zero_offset(edit, site, size):
@@ -47,6 +42,7 @@ def _actuator_stiffness(edit, site, size):
     kp = _positive(site, size) * force / length
     actuator.biasprm[2] *= np.sqrt(kp / actuator.gainprm[0])
     actuator.gainprm[0], actuator.biasprm[1] = kp, -kp
+    edit.steady(edit.spec.joint(site), kp)
 
 
 def _servo_lag(edit, site, size):
@@ -76,13 +72,12 @@ def _play(edit, site, size):
         others = ", ".join(one.name for one in joint.parent.joints if one.name != site)
         raise ConfigError(f"play: {site} shares its body with {others}; allowed: a drive whose body has no other joint")
     half, (length, _) = 0.5 * _positive(site, size), edit.units(site)
-    ends = {"range": (-half * length, half * length), "limited": _LIMITED}
+    ends = {"range": (-half * length, half * length), "limited": LIMITED}
     edit.add_joint(joint.parent.name, name, joint.type, joint.axis, pos=joint.pos, **ends)
-    edit.steady(joint, edit.drives[site].gainprm[0])
     arm = edit.spec.add_tendon(name=name)
     arm.wrap_joint(site, 1.0)
     arm.wrap_joint(name, 1.0)
-    arm.frictionloss = _holding(edit, site)
+    arm.frictionloss = holding_friction(edit, site)
     arm.solref_friction, arm.solimp_friction = SOLREF, SOLIMP
 
 
@@ -99,7 +94,7 @@ def _link_stiffness(edit, site, size):
     body, direction = _body_place(edit, site)
     kind, length, force = (_HINGE, 1.0, 1.0 / MM) if direction > 2 else (_SLIDE, 1.0 / MM, 1.0)
     name = f"{site} spring"
-    _spring(edit, edit.add_joint(body, name, kind, np.eye(3)[direction % 3]), _positive(site, size) * force / length)
+    spring(edit, edit.add_joint(body, name, kind, np.eye(3)[direction % 3]), _positive(site, size) * force / length)
 
 
 def _clearance(edit, site, size):
@@ -107,8 +102,8 @@ def _clearance(edit, site, size):
     gap, spec = _positive(site, size) / MM, edit.spec
     if site in [one.name for one in spec.equalities if one.type == _EQ.mjEQ_CONNECT]:
         spec.delete(spec.equality(site))
-        _leash(edit, site, held_sites(site), gap)
-        _damp_swinging(edit, site, gap)
+        leash(edit, site, held_sites(site), gap)
+        damp_swinging(edit, site, gap)
         return
     joint = spec.joint(_joint(edit, site, "a hinge, ball joint or connect", (_HINGE, _JOINT.mjJNT_BALL)))
     body, names = joint.parent, held_sites(f"{site} pin")
@@ -121,8 +116,8 @@ def _clearance(edit, site, size):
     for number, axis in enumerate(axes, 1):
         name = f"{site} clearance {number}"
         edit.add_joint(body.name, name, _SLIDE, axis)
-        edit.damped[name] = _SWINGING * np.sqrt(_G / gap)
-    _leash(edit, site, names, gap)
+        edit.damped[name] = swinging_frequency(gap)
+    leash(edit, site, names, gap)
 
 
 def _payload(edit, site, size):
@@ -139,10 +134,10 @@ def _base_stiffness(edit, site, size):
     """The base stands on springs along or about the robot's axes: N/mm or N mm/rad; without one it is rigid."""
     direction = DIRECTIONS.index(_known(site, DIRECTIONS, "a direction"))
     if not edit.prefix:
-        _put_on_base(edit)
+        put_on_base(edit)
     kind, factor = (_HINGE, 1.0 / MM) if direction > 2 else (_SLIDE, MM)
     joint = edit.add_joint(BASE, f"base {site}", kind, np.eye(3)[direction % 3])
-    _spring(edit, joint, _positive(site, size) * factor)
+    spring(edit, joint, _positive(site, size) * factor)
 
 
 # in the order in which they are applied
@@ -229,95 +224,3 @@ def _place(edit, site):
 def _of_direction(edit, site, size):
     """Size in m or rad of a site that ends in a direction."""
     return size if site.rpartition(".")[2].startswith("r") else size / MM
-
-
-def _spring(edit, joint, stiffness):
-    """Make a joint a spring of a stiffness in N/m or N m/rad."""
-    joint.stiffness[0] = stiffness
-    edit.steady(joint, stiffness)
-    edit.damped[joint.name.removeprefix(edit.prefix)] = None
-
-
-def _leash(edit, name, sites, gap):
-    """Let two sites be as far apart as this in m."""
-    leash = edit.spec.add_tendon(name=f"{name} clearance", limited=_LIMITED, range=(0.0, gap))
-    edit.leashes[leash.name] = sites
-    leash.solref_limit, leash.solimp_limit = SOLREF, SOLIMP
-    for site in sites:
-        leash.wrap_site(site)
-
-
-def _damp_swinging(edit, site, gap):
-    """Dampers between the two sites of a connect: actuators that only brake, across x, y and z of the second site."""
-    first, second = held_sites(site)
-    for number, letter in enumerate("xyz"):
-        brake = edit.spec.add_actuator(name=f"{site} clearance {letter}", target=first, refsite=second)
-        brake.trntype, brake.biastype = mujoco.mjtTrn.mjTRN_SITE, mujoco.mjtBias.mjBIAS_AFFINE
-        brake.gear = np.eye(6)[number]
-        edit.brakes[brake.name] = f"{site} clearance", _SWINGING * np.sqrt(_G / gap)
-
-
-def _holding(edit, site):
-    """Friction in N m or N that holds the arm of a drive: more than what loads it at home."""
-    model, data = edit.nominal, mujoco.MjData(edit.nominal)
-    for number in range(model.njnt):
-        name = model.joint(number).name
-        data.joint(name).qpos = edit.home[name]
-    mujoco.mj_forward(model, data)
-    loops = ((model.eq_type == _EQ.mjEQ_CONNECT) | (model.eq_type == _EQ.mjEQ_WELD)).any()
-    joint = model.joint(site)
-    behind = [b for b in range(1, model.nbody) if loops or _hangs_on(model, b, joint.bodyid[0])]
-    weight = np.linalg.norm(model.opt.gravity) * np.append(model.body_mass[behind], edit.payload_kg)
-    places = np.vstack([data.xipos[behind], data.body(edit.platform).xpos]) - data.joint(site).xanchor
-    lever = np.linalg.norm(np.cross(data.joint(site).xaxis, places), axis=1)
-    share = (weight.sum() if joint.type[0] == _SLIDE else weight @ lever) / (len(edit.drives) if loops else 1)
-    return _HOLDS * abs(_static_load(edit, data)[site]) + share
-
-
-def _static_load(edit, data):
-    """What the drives bear in N m or N in a pose at rest, by joint: the bias that loops cannot bear."""
-    model = edit.nominal
-    dofs = [model.joint(name).dofadr[0] for name in edit.drives]
-    held = np.zeros((data.ne, model.nv))
-    for row, one in zip(held, np.eye(data.nefc), strict=False):
-        mujoco.mj_mulJacTVec(model, data, row, one)
-    bearing = np.vstack([np.eye(model.nv)[dofs], held])
-    return dict(zip(edit.drives, np.linalg.lstsq(bearing.T, data.qfrc_bias)[0], strict=False))
-
-
-def _hangs_on(model, body, first):
-    """Whether a body is another one or hangs on it."""
-    while body > first:
-        body = model.body_parentid[body]
-    return body == first
-
-
-def _put_on_base(edit):
-    """Hang all that stands on the world on a body of its own; free bodies get slides and a ball joint instead."""
-    for body in edit.spec.worldbody.bodies:
-        if [one.type for one in body.joints] == [_JOINT.mjJNT_FREE]:
-            _unfree(edit, body)
-    model = mujoco.MjSpec()
-    set_options(model, edit.nominal.opt.gravity)
-    mass = edit.nominal.body_mass.sum()
-    # ASSUME the base is as heavy as all that stands on it
-    inertia = {"mass": mass, "inertia": np.full(3, _BASE_RADIUS_M**2 * mass), "explicitinertial": True}
-    base = model.worldbody.add_body(name=BASE, **inertia)
-    model.attach(edit.spec, frame=base.add_frame(), prefix="robot ")
-    edit.spec, edit.prefix = model, "robot "
-
-
-def _unfree(edit, body):
-    """Three slides and a ball joint of the same pose at home in place of a free joint."""
-    (free,), own = body.joints, edit.nominal.body(body.name)
-    values, name = edit.home.pop(free.name), free.name
-    edit.spec.delete(free)
-    turn, back, quat = np.zeros(9), np.zeros(4), np.zeros(4)
-    mujoco.mju_quat2Mat(turn, own.quat)
-    mujoco.mju_negQuat(back, own.quat)
-    mujoco.mju_mulQuat(quat, back, values[3:])
-    for letter, axis, value in zip("xyz", np.eye(3), turn.reshape(3, 3).T @ (values[:3] - own.pos), strict=True):
-        edit.add_joint(body.name, f"{name} {letter}", _SLIDE, axis)
-        edit.home[f"{name} {letter}"] = np.array([value])
-    body.add_joint(name=f"{name} turn", type=_JOINT.mjJNT_BALL)
-    edit.home[f"{name} turn"] = quat

@@ -16,6 +16,9 @@ from rrru.errors import ConfigError
 MM = 1000.0
 STEP_S = 2e-4
 SOLREF, SOLIMP = (2.0 * STEP_S, 1.0), (0.9999, 0.9999, 1e-4, 0.5, 2.0)
+# ends of a play or clearance: as stiff as loops they would chatter
+SOFTER = (10.0 * STEP_S, 1.0)
+LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 PAYLOAD, BASE = "rrru payload", "rrru base"
 _EQ, _JOINT, _OBJ = mujoco.mjtEq, mujoco.mjtJoint, mujoco.mjtObj
 _SIZES = {_JOINT.mjJNT_FREE: 7, _JOINT.mjJNT_BALL: 4}
@@ -63,7 +66,7 @@ class Edit:
     def add_joint(self, body, name, kind, axis, **options):
         """Add a hinge or slide behind the other joints of a body, and the free dof's rest to home."""
         joint = self.spec.body(body).add_joint(name=self.prefix + name, type=kind, axis=axis, **options)
-        joint.solref_limit, joint.solimp_limit = SOLREF, SOLIMP
+        joint.solref_limit, joint.solimp_limit = SOFTER, SOLIMP
         self.home[name] = np.zeros(1)
         return joint
 
@@ -91,7 +94,10 @@ def read(file, platform, tool_mm, drives):
     drives = _servos(spec, Path(file), drives)
     servos = {joint: servo.name for joint, servo in drives.items()}
     lengths = {joint: 1.0 / MM if spec.joint(joint).type == _JOINT.mjJNT_SLIDE else 1.0 for joint in drives}
-    return Edit(spec, nominal, platform, home, drives, servos, lengths)
+    edit = Edit(spec, nominal, platform, home, drives, servos, lengths)
+    for joint, servo in drives.items():
+        edit.steady(spec.joint(joint), servo.gainprm[0])
+    return edit
 
 
 def set_options(spec, gravity):

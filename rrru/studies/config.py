@@ -128,7 +128,11 @@ def entry(config, section, name, asked_by):
 
 def _check_virtual(config, name, section):
     """Raise ConfigError where a virtual campaign's robot, trajectories or passes name nothing that exists."""
-    entry(config, "virtual_robots", section["virtual"], f"campaigns.{name}")
+    real = entry(config, "virtual_robots", section["virtual"], f"campaigns.{name}")
+    if "mujoco" in real:
+        from rrru.studies import setup
+
+        setup.real_robot(nominal(config, name), real)
     known = trajectory_names(entry(config, "trajectories", section["trajectories"], f"campaigns.{name}"))
     for one in section.get("passes", []):
         for wanted in one.get("trajectories", []):

@@ -228,7 +228,9 @@ def test_mujoco_s_simulation_of_the_hexapod_comes_to_rest_on_the_closed_form(six
     load = driven_loads(
         six, (legs, still, still), six.solve(legs, six.legs.home_mm[None]), np.array([0.0, 0.0, -9810.0])
     )
-    np.testing.assert_allclose(1000.0 * data.ctrl - legs[0], -load[0] / 2e3, rtol=1e-3)
+    np.testing.assert_allclose(
+        1000.0 * data.ctrl - legs[0], -load[0] / (model.actuator_gainprm[:, 0] / 1000.0), rtol=1e-3
+    )
 
 
 def test_a_3_rrru_of_a_file_stands_where_the_closed_form_does(tmp_path):
@@ -400,8 +402,8 @@ def test_lumps_of_a_bar_lie_along_it(six):
     across = sum(lump.mass_kg * (lump.at_mm[0] - centre) ** 2 for lump in cylinder)
     assert across == pytest.approx(1e6 * model.body("cylinder2").inertia.max())
     piston = [lump for lump in six.lumps if lump.joint == "leg 2 end"]
-    # its middle is 75 mm before its body, which is 200 mm up the leg
-    assert np.mean([lump.at_mm[0] for lump in piston]) == pytest.approx(275.0 - six.legs.legs[1].bar.length_mm)
+    # its middle is 100 mm before its body, which is 200 mm up the leg
+    assert np.mean([lump.at_mm[0] for lump in piston]) == pytest.approx(300.0 - six.legs.legs[1].bar.length_mm)
 
 
 def _mass_centre(robot, actuators, poses):

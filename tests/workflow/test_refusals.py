@@ -21,6 +21,8 @@ from tests.workflow.folder import dry_run, run
             "campaigns.crooked.passes: no trajectory 'nosuch'",
         ),
         ("campaigns: {crooked: {virtual: nosuch}}", "campaigns.crooked: virtual_robots has no 'nosuch'"),
+        ("virtual_robots: {twin: {mujoco: {}}}", "virtual robot: mujoco drives rrru3, which has no mjcf"),
+        ("virtual_robots: {twin: {mujoco: {cause: {}}}}", "'cause' was unexpected"),
         ("campaigns: {paper: {unit: inch}}", "unit"),
         ("sweep: {values: [0.1, 0.2]}", "0.1 is not of type 'string'"),
         ('sweep: {values: ["0.5", "0.50"]}', "sweep.values holds a number twice"),
