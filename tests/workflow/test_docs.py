@@ -8,7 +8,6 @@ run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell
 
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -17,6 +16,8 @@ import pandas as pd
 import pytest
 
 from tests.places import ROOT
+from tests.studies.printers.simulated_printers import ENTRIES
+from tests.studies.printers.test_klipper import config
 from tests.workflow.folder import dry_run, link
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -32,7 +33,7 @@ def blocks(page):
 
 
 def _readers_folder(folder, results):
-    """What a reader has: the project, results of a run, and a file of a tracker's."""
+    """What a reader has: the project, results of a run, and a file of a tracker and of a printer."""
     link(folder)
     for name in ("Makefile", "pyproject.toml", "requirements.lock"):
         (folder / name).symlink_to(ROOT / name)
@@ -41,7 +42,7 @@ def _readers_folder(folder, results):
     table.to_csv(folder / "my_file.csv", index=False)
     names = {"trajectory": "path", "measured_x_mm": "X", "measured_y_mm": "Y", "measured_z_mm": "Z"}
     table.rename(columns=names).to_csv(folder / "tracker.csv", index=False)
-    shutil.copy(ROOT / "data/linear_delta.json", folder / "my_printers.json")
+    (folder / "printer.cfg").write_text(config(ENTRIES["printer_22"]))
 
 
 def _shell(line, folder):
@@ -51,6 +52,10 @@ def _shell(line, folder):
         return 0, ""
     if words[0] == "make":
         told = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
+        return told.returncode, told.stdout + told.stderr
+    if words[0] == "rrru-printer":
+        program = [sys.executable, "-m", "rrru.studies.printers.command", *words[1:]]
+        told = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
         return told.returncode, told.stdout + told.stderr
     assert words[:2] == ["snakemake", "--cores"], f"no way to try {line!r}"
     told = words[3:]
