@@ -54,7 +54,7 @@ def _shell(line, folder):
         told = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
         return told.returncode, told.stdout + told.stderr
     if words[0] == "rrru-printer":
-        program = [sys.executable, "-m", "rrru.studies.printers.command", *words[1:]]
+        program = [sys.executable, "-c", "from rrru.studies.printers.command import main; main()", *words[1:]]
         told = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
         return told.returncode, told.stdout + told.stderr
     assert words[:2] == ["snakemake", "--cores"], f"no way to try {line!r}"
