@@ -3,11 +3,20 @@ PYTHON ?= python3
 CORES ?= 2
 BIN = .venv/bin
 
-.PHONY: results check-data test lint lock
+.PHONY: results report compare check-data test lint lock
 
 results: .venv/ready
 	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
 	$(BIN)/snakemake --cores $(CORES)
+
+# one page of everything, results/report.html
+report: .venv/ready
+	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
+	$(BIN)/snakemake --cores $(CORES) report
+
+# two folders of results, or two campaigns of results: make compare A=field_01 B=field_09
+compare: .venv/ready
+	@$(BIN)/python -m rrru.report.compare_page "$(A)" "$(B)" results/compare.html
 
 # what is in a file of measurements: make check-data FILE=tracker.csv ROBOT=rrru3 [COMMANDS=commands.csv] [CONFIG=mine.yaml]
 check-data: .venv/ready

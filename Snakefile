@@ -29,6 +29,7 @@ for study in sorted(Path(workflow.basedir, "workflow/rules/studies").glob("*.smk
 include: "workflow/rules/pipeline/published.smk"
 include: "workflow/rules/pipeline/gap.smk"
 include: "workflow/rules/pipeline/figures.smk"
+include: "workflow/rules/pipeline/report.smk"
 
 
 # what is refused is refused before anything runs

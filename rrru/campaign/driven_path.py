@@ -41,14 +41,16 @@ def _path_through(measurements):
     """The path (N, 3) of everything that is driven, transfers included, and what a robot was told to do on it.
 
     That is by name, of the n rows of a measurement table, all of them in the order driven: position_mm, velocity_mm_s,
-    acceleration_mm_s2 (n, 3), time_s, payload_kg and path_index, their places on the path (n,); NaN where nobody knows.
+    acceleration_mm_s2 (n, 3), time_s, payload_kg, temperature_c and path_index, their places on the path (n,); NaN
+    where nobody knows.
 
     # ASSUME the robot passes smoothly through a run's commanded points and rests where it slows down at an end. Speeds
     and accelerations come from the times; where a run has no increasing times, or its points follow no path, they are
     NaN.
     """
     position, run = rows.command(measurements), measurements["run"].to_numpy()
-    told = {name: measurements[name].to_numpy(dtype=float) for name in ("time_s", "payload_kg")}
+    named = measurements.reindex(columns=("time_s", "payload_kg", "temperature_c"))
+    told = {name: named[name].to_numpy(dtype=float) for name in named}
     pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
     velocity, acceleration = rates(measurements, position)
     path, index = connect(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_STEPS)

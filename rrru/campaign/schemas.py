@@ -116,7 +116,7 @@ def measurement_table(robot, names=()):
     for after, name, text in _MORE:
         nullable = not name.startswith("target")
         more[after] += [Column(name.format(axis), "float64", f"{text}, {axis}", nullable) for axis in "xyz"]
-    more["measured_z_mm"].append(Column("temperature_c", "float64", "temperature, as the file states it", True))
+    more["measured_z_mm"].append(Column("temperature_c", "float64", "temperature of the robot, degrees Celsius", True))
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
     fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
     more["measured_z_mm"].append(fixed_to)

@@ -25,6 +25,9 @@ from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_param
 from rrru.effects.protocol import Effect
 from rrru.parameters import ParameterSet
 
+# over half a turn or less it is taken for an eccentric encoder and that for it: tested where a configuration names it
+BY_NAME_ONLY = True
+
 _SOURCE = "difference of diameters over four of them, or tilt squared over four, assumed"
 
 

@@ -40,7 +40,8 @@ class Motion:
     in N mm or force in N of the loads on each drive, positive in the drive's sense; follower_load (n, f): on each joint
     that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
-    how far the drives went from the stop before to this one, NaN where the robot does not stop at its points.
+    how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
+    temperature_c (n,): of the robot.
     """
 
     robot: Any
@@ -59,6 +60,7 @@ class Motion:
     across: np.ndarray
     base_moment: np.ndarray
     last_move: np.ndarray
+    temperature_c: np.ndarray
 
     def __len__(self) -> int:
         return len(self.drive)
@@ -206,8 +208,8 @@ class Effect:
     needs: fields of Motion without which the law says nothing; along_drives: of a law that changes nothing but actuator
     values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
-    law that has them; spoils: of a law about the measuring and not about the robot, why a calibration that leaves it
-    out is wrong.
+    law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
+    calibration that leaves it out is wrong.
     """
 
     name: str
@@ -218,6 +220,7 @@ class Effect:
     spoils: str = ""
     along_drives: Callable[[Motion], list[np.ndarray]] | None = None
     with_waves: Callable[..., "Effect"] | None = None
+    waves: tuple[tuple[int, float], ...] = ()
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""

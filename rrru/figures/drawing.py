@@ -8,13 +8,14 @@ from rrru.store import tables
 
 
 def draw_all(figures, paths, options, outputs):
-    """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_pdf"] and outputs["{name}_png"].
+    """Draw figures {name: ("module:function", names of its tables)} to outputs["{name}_{kind}"] of `style.KINDS`.
 
     paths: the tables' paths by name; options: what all figures are told, see their functions. What a figure's function
-    says of it is the caption in both files.
+    says of it is the caption in all files.
     """
     for name, (place, needed) in figures.items():
         module, _, attribute = place.partition(":")
         function = getattr(importlib.import_module(module), attribute)
         figure = function({table: tables.read(paths[table]) for table in needed}, options)
-        style.save(figure, outputs[f"{name}_pdf"], outputs[f"{name}_png"], inspect.cleandoc(function.__doc__))
+        files = {kind: outputs[f"{name}_{kind}"] for kind in style.KINDS}
+        style.save(figure, files, inspect.cleandoc(function.__doc__))

@@ -4,6 +4,7 @@ from textwrap import wrap
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import choose, gap_budget, gap_map, style
@@ -20,6 +21,8 @@ _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
 # width that the maps get, and the most that a page is high
 _MAP_MM, _MOST_MM = 74.0, 238.0
 _BUDGET_MM = 16.0
+# steps of the arrows' scale: more numbers run into one another
+_TICKS = 5
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
@@ -45,14 +48,39 @@ def gap(tables, options):
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
     gap_budget.draw(panels["budget"], frames["gap_budget"])
-    worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-    arrows, beyond = gap_map.draw(panels, used, worst, options["z_down"])
-    place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
-    figure.colorbar(arrows, ax=panels["side view"], **place).set_label("measured minus calibrated sim (mm)")
+    _map(figure, panels, used, verdict, options["z_down"], "(a) ")
     _causes(panels["causes"], causes, verdict)
     _shrink(panels["shrink"], shrink, verdict)
     _along(panels["along"], points, verdict)
     return figure
+
+
+@style.printed
+def where(tables, options):
+    """Where the robot misses: measured minus calibrated sim at the points, from above and from the side. An arrow
+    points to where the robot really was, magnified as stated; dark is far. The ring is the worst spot.
+    """
+    campaign = options["campaign"]
+    verdict = choose.of_campaign(tables, "gap_verdicts", campaign, "gap_map").iloc[0]
+    points = _sized(tables["gap_points"], campaign)
+    used = points[points["used"]]
+    heights = [_MAP_MM * gap_map.height_ratio(used, name) for name in gap_map.VIEWS]
+    figure = style.new(style.SINGLE_MM, sum(heights) + 36.0)
+    axes = figure.subplots(2, 1, height_ratios=heights)
+    panels = dict(zip(gap_map.VIEWS, axes, strict=True))
+    axes[0].sharex(axes[1])
+    _map(figure, panels, used, verdict, options["z_down"])
+    return figure
+
+
+def _map(figure, panels, used, verdict, z_down, mark=""):
+    """Both views of the gap with the scale of their arrows."""
+    worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
+    arrows, beyond, factor = gap_map.draw(panels, used, worst, z_down)
+    panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst spot")
+    place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
+    bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
+    bar.set_label("measured minus calibrated sim (mm)")
 
 
 def _sized(points, campaign):

@@ -29,7 +29,9 @@ def height_ratio(points, view):
 
 
 def draw(panels, points, worst, z_down=True):
-    """Draw both views into axes by name; returns the arrows, and whether some are larger than the scale holds.
+    """Draw both views into axes by name.
+
+    Returns the arrows, whether some are larger than the scale holds, and how much they are magnified.
 
     points: rows of gap_points that are used, with `before_mm`; worst (3,); z_down: the robot frame's z points down.
     """
@@ -43,8 +45,7 @@ def draw(panels, points, worst, z_down=True):
         panels[name].plot(*worst[["xyz".index(axis) for axis in plane]], linestyle="none", zorder=6, **_RING)
     panels["top view"].tick_params(labelbottom=False)
     panels["side view"].set_xlabel("x (mm)")
-    panels["top view"].set_title(f"(a) gap, magnified {factor:g} times; ring: worst spot")
-    return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any())
+    return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any()), factor
 
 
 def _view(axes, points, shown, plane, scale, factor, z_down):

@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib import style
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
@@ -23,6 +24,12 @@ leave_out_layout()
 SINGLE_MM, DOUBLE_MM = 85.0, 175.0
 _MM_PER_INCH = 25.4
 _DPI = 200
+# files of a figure: what draws them, the entry that would hold a date or a version, and the one for the caption
+KINDS = {
+    "pdf": (FigureCanvasPdf, "CreationDate", "Subject"),
+    "png": (FigureCanvasAgg, "Software", "Description"),
+    "svg": (FigureCanvasSVG, "Date", "Description"),
+}
 # characters in a line of a legend that stands in a panel's place
 _NARROW = 24
 
@@ -60,6 +67,8 @@ _STYLE = {
     "grid.color": "#dddddd",
     "hatch.linewidth": 0.5,
     "pdf.fonttype": 42,
+    # names inside of a file: by what it draws, not by chance
+    "svg.hashsalt": "rrru",
 }
 
 
@@ -160,38 +169,40 @@ def plain_log(axis):
     axis.set_minor_formatter(NullFormatter())
 
 
-def save(figure, pdf, png, caption=""):
-    """Write both files of a figure; they carry its caption but no date, and none is replaced before both are whole.
+def save(figure, paths, caption=""):
+    """Write the files of a figure; they carry its caption but no date, and none is replaced before all are whole.
 
-    pdf, png: paths. The same tables give the same bytes under the same versions of Matplotlib and its font library.
+    paths: by kind, of `KINDS`. The same tables give the same bytes under the same versions of Matplotlib and its font
+    library.
     """
-    formats = {
-        "pdf": (Path(pdf), {"CreationDate": None, "Subject": caption}),
-        "png": (Path(png), {"Software": None, "Description": caption}),
-    }
-    partial = {kind: path.parent / f".{path.name}.partial" for kind, (path, _) in formats.items()}
+    partial = {kind: Path(path).parent / f".{Path(path).name}.partial" for kind, path in paths.items()}
     try:
         with print_style():
-            # arrange once, so that both files, and every later one, have the panels at the same places
-            if engine := figure.get_layout_engine():
-                engine.execute(figure)
-                figure.set_layout_engine(None)
-                # its solver's last digits differ from the first figure of a process to the next
-                for axes in figure.axes:
-                    for which in ("original", "active"):
-                        place = axes.get_position(original=which == "original").bounds
-                        axes.set_position(np.round(place, 9), which=which)
-            for kind, (path, metadata) in formats.items():
+            _arrange(figure)
+            for kind, path in partial.items():
                 path.parent.mkdir(parents=True, exist_ok=True)
                 # straight to the canvas: savefig would draw everything a second time to arrange it
                 figure.set_dpi(_DPI)
-                canvas = FigureCanvasPdf(figure) if kind == "pdf" else FigureCanvasAgg(figure)
-                getattr(canvas, f"print_{kind}")(partial[kind], metadata=metadata)
-        for kind, (path, _) in formats.items():
+                canvas, undated, described = KINDS[kind]
+                write = getattr(canvas(figure), f"print_{kind}")
+                write(path, metadata={undated: None, described: caption})
+        for kind, path in paths.items():
             partial[kind].replace(path)
     finally:
         for path in partial.values():
             path.unlink(missing_ok=True)
+
+
+def _arrange(figure):
+    """Give the panels their places once, so that all files of a figure, and every later one, have them there."""
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+        # its solver's last digits differ from the first figure of a process to the next
+        for axes in figure.axes:
+            for which in ("original", "active"):
+                place = axes.get_position(original=which == "original").bounds
+                axes.set_position(np.round(place, 9), which=which)
 
 
 def height_axis(axes, z_down):

@@ -77,9 +77,10 @@ def calibrate(case):
 
 def with_arm(case, noise_mm=None, noise_rad=None):
     """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
-    positions, turned, _ = _rough(case, calibrate(case))
-    positions, turned = noise_mm or positions, noise_rad or turned / case.arm_mm
-    return replace(case, arm_mm=positions / turned)
+    if not (noise_mm and noise_rad):
+        positions, turned, _ = _rough(case, calibrate(case))
+        noise_mm, noise_rad = noise_mm or positions, noise_rad or turned / case.arm_mm
+    return replace(case, arm_mm=noise_mm / noise_rad)
 
 
 def with_beside(case):
@@ -174,29 +175,35 @@ def with_effects(attribution, effects):
     return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
 
 
-def _rounds(case, calibrated, prior, stated):
-    """Search and refinement in turn until the best hypothesis repeats itself."""
-    state, covariance, last, stated_mm, looks = calibrated, _NO_COVARIANCE, None, case.noise_mm, []
+class _Looks:
+    """What one sees of a case at a state: laws found in it, columns at the state, the noise; once for each call."""
 
-    def seen(case, state, terms=()):
+    def __init__(self, stated, stated_mm):
+        self._stated, self._stated_mm = stated, stated_mm
+        self._source = None
+
+    def at(self, case, state, terms=()):
+        """Case with its laws and noise, its linearisation at a state with a hypothesis' terms, and the noise's source."""
         linear = case.linearise(state)
-        case, added = with_orders(case, linear, terms)
-        case, found = with_spectra(case, linear, terms)
-        added = [*added, *found]
+        case, orders = with_orders(case, linear, terms)
+        case, waves = with_spectra(case, linear, terms)
         kept = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
         linear = replace(linear, columns=kept)
-        if added:
-            linear = replace(linear, columns=linear.columns | case.linearise(state, added).columns)
-        if stated == KNOWN:
+        if orders or waves:
+            linear = replace(linear, columns=kept | case.linearise(state, [*orders, *waves]).columns)
+        if self._stated == KNOWN:
             return case, linear, "given"
         # many columns take long to be projected out, and leave the same wherever they are taken
-        if looks and any(effect.coordinates.broad for effect in case.library.values()):
-            return case, linear, looks[-1]
-        under, source = with_noise(case, linear, stated_mm if stated == STATED else None)
-        looks.append(source)
-        return under, linear, source
+        if self._source and any(effect.coordinates.broad for effect in case.library.values()):
+            return case, linear, self._source
+        under, self._source = with_noise(case, linear, self._stated_mm if self._stated == STATED else None)
+        return under, linear, self._source
 
-    case, linear, source = seen(case, state)
+
+def _rounds(case, calibrated, prior, stated):
+    """Search and refinement in turn until the best hypothesis repeats itself."""
+    state, covariance, last, looks = calibrated, _NO_COVARIANCE, None, _Looks(stated, case.noise_mm)
+    case, linear, source = looks.at(case, state)
     case, linear = with_seen(case, linear)
     evidence = case.evidence(linear)
     # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
@@ -220,7 +227,7 @@ def _rounds(case, calibrated, prior, stated):
             # what a dropped effect has done to the others' numbers can hold a fit back
             dropped = {name for name, _ in state.effects} - hypothesis.effects
             state, covariance = refine(case, calibrated if dropped else state, hypothesis, level)
-            case, linear, source = seen(case, state, hypothesis.terms)
+            case, linear, source = looks.at(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:
             # the sim cannot follow: what the last linearisation says stands

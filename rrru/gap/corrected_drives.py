@@ -48,17 +48,20 @@ def corrected_drives(attribution, masses):
         found[approach] = told
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < _SAME:
         found = {0: found[1]}
-    place = rows.vector_columns("command", position)
+    return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
+
+
+def _table(robot, place, drives, state):
+    """The rows of places and drives: nominal ones (n, K), and found ones (n, K) by the side that they come from."""
+    (position, turn), (nominal, found) = place, drives
     vectors = Rotation.from_matrix(turn).as_rotvec().reshape(-1, 3)
-    place |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
-    given = dict(zip(robot.parts.columns, nominal.T, strict=True))
+    told = {"point": np.arange(1, len(position) + 1)} | rows.vector_columns("command", position)
+    told |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
+    told |= dict(zip(robot.parts.columns, nominal.T, strict=True)) | state
+    names = [f"corrected_{name}" for name in robot.parts.columns]
     frames = [
-        pd.DataFrame({"point": np.arange(1, len(position) + 1), "approach": side} | place | given).assign(
-            **{f"corrected_{name}": value for name, value in zip(robot.parts.columns, told.T, strict=True)},
-            payload_kg=payload,
-            time_s=end_s,
-        )
-        for side, told in found.items()
+        pd.DataFrame(told | dict(zip(names, values.T, strict=True))).assign(approach=side)
+        for side, values in found.items()
     ]
     table = pd.concat(frames, ignore_index=True)
     return table[np.isfinite(table.to_numpy(dtype=float)).all(axis=1)].reset_index(drop=True)

@@ -10,7 +10,7 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
-from rrru.gap.corrected import corrected
+from rrru.gap.corrected import Corrected, corrected
 from rrru.gap.corrected_drives import corrected_drives
 from rrru.gap.shrink import model_row
 from rrru.plant.mujoco_robot import MujocoRobot
@@ -21,26 +21,32 @@ from rrru.robots.walk import Poses
 
 # a simulation takes about a tenth of a second a point: no more of them are driven, from the first on
 _MOST_DRIVEN = 300
+# what of a Motion has no row for each point
+_WHOLE = ("robot", "path_drive")
 
 
 def write_corrected(diagnosis, section, masses, file):
     """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
 
-    section: the robot's entry in the configuration; masses: the robot's.
+    A file that cannot be corrected becomes an empty one that says why, as does `not_in_model`. section: the robot's
+    entry in the configuration; masses: the robot's.
     """
     file, attribution = Path(file), diagnosis.attribution
-    written = corrected(attribution, section, file.resolve().parent)
+    shrink, why = diagnosis.tables["gap_shrink"], ""
+    try:
+        written = corrected(attribution, section, file.resolve().parent)
+    except ConfigError as error:
+        tag = "mujoco" if "mjcf" in section else "robot"
+        written = Corrected(f"<{tag}><!-- not corrected: {error} --></{tag}>\n", (str(error),), None)
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(written.text)
-    shrink = diagnosis.tables["gap_shrink"]
-    more, why = gap_rows(attribution, written, section, file, shrink)
+    if written.found:
+        more, why = gap_rows(attribution, written, section, file, shrink)
+        shrink = pd.concat([shrink, more], ignore_index=True)
     notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
     verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(written.not_in_model)}
-    tables = diagnosis.tables | {
-        "gap_shrink": pd.concat([shrink, more], ignore_index=True),
-        "corrected_drives": corrected_drives(attribution, masses),
-    }
-    return replace(diagnosis, verdict=verdict, tables=tables)
+    tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
+    return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
 
 
 def gap_rows(attribution, corrected, section, file, shrink):
@@ -70,7 +76,8 @@ def gap_rows(attribution, corrected, section, file, shrink):
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
         twists = twists + _instrument(attribution.case, robot, corrected.found, kind == "corrected_model")
         left = attribution.case.by_other(robot, own, twists)
-        result.append(model_row(shrink, kind, left, attribution.case.noise_mm))
+        if np.isfinite(left).all(axis=1).any():
+            result.append(model_row(shrink, kind, left, attribution.case.noise_mm))
     return pd.DataFrame(result), why
 
 
@@ -92,9 +99,6 @@ def _simulated(case, robot, file, platform):
     for name in ("position_mm", "turn", "residual_mm", "closed"):
         getattr(whole, name)[:count] = getattr(poses, name)
     return whole, robot.twists()
-
-
-_WHOLE = ("robot", "path_drive")
 
 
 def _nowhere(robot, count):

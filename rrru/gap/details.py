@@ -32,7 +32,6 @@ def details_of(attribution, steps, residual_mm, generator, draws):
         "gap_attribute": _attribute_rows(attribution),
         "gap_sets": _set_rows(attribution),
         "gap_shrink": shrink_table(case, steps, exact),
-        "gap_parameters": parameter_rows(attribution),
         "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
     }
 

@@ -14,7 +14,7 @@ from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
 from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
-from rrru.gap.details import details_of, where
+from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.noise_model import CONTRADICTED, NoiseModel
@@ -77,8 +77,8 @@ def diagnose(
 ) -> Diagnosis:
     """Diagnosis of a measurement table of a MeasuredRobot.
 
-    details: also the tables that tell more than the verdict, its budget and what to measure next. Raises FitError where
-    there are too few points to calibrate on.
+    details: also the tables that tell more than the verdict, its budget and numbers and what to measure next. Raises
+    FitError where there are too few points to calibrate on.
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
@@ -104,6 +104,7 @@ def diagnose(
     own = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses}
+    tables["gap_parameters"] = parameter_rows(attribution)
     if details:
         tables |= details_of(attribution, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, attribution.state, attribution)
@@ -170,7 +171,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         same = known.hypothesis.effects == frozenset(verdict.effects)
         fitted = known if same else with_effects(attribution, verdict.effects)
         least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
-        worse = {name for name, gain in _gains(fitted, verdict.effects).items() if gain < least}
+        worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             return verdict, with_effects(fitted, verdict.effects), ordered if same else order_by_share(fitted)
         ruled_out |= worse
@@ -202,12 +203,8 @@ def _likely(attribution: Attribution) -> tuple[Attribution, tuple]:
     return attribution, order_by_share(attribution)
 
 
-def _gains(attribution: Attribution, names: Sequence[str]) -> dict[str, float]:
+def _gains(attribution: Attribution) -> dict[str, float]:
     """Log predictive score that each effect of the hypothesis gains on left-out points over the others."""
-    hypothesis, level, held_out = attribution.hypothesis, attribution.level, attribution.held_out
-
-    def score(terms: tuple) -> float:
-        return float(held_out.predict(terms, hypothesis.strengths_of(terms, level), level).log_score.sum())
-
-    whole = score(hypothesis.terms) if names else 0.0
-    return {name: whole - score(tuple(t for t in hypothesis.terms if t.effect != name)) for name in names}
+    terms, level = attribution.hypothesis.terms, attribution.level
+    gains = attribution.held_out.gains(terms, attribution.hypothesis.strengths[level], level)
+    return {term.effect: gain for term, gain in zip(terms, gains, strict=True)}

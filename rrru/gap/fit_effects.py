@@ -32,13 +32,13 @@ class EffectFit:
     identifiable: int
 
 
-def fit_effects(case, names, times_typical=_TIMES_TYPICAL):
+def fit_effects(case, names, times_typical=_TIMES_TYPICAL, calibrated=None):
     """EffectFit of a Case's used points with the effects of these names, each in its first shape.
 
-    times_typical: of the prior's standard deviation over the typical size. Raises FitError where the sim loses a pose
-    or the steps do not end.
+    times_typical: of the prior's standard deviation over the typical size; calibrated: State to start from, by default
+    that of the calibration. Raises FitError where the sim loses a pose or the steps do not end.
     """
-    calibrated = calibrate(case)
+    calibrated = calibrated or calibrate(case)
     keys = [(name, 0) for name in names]
     sizes = [case.library[name].coordinates.typical for name in names]
     state = State(calibrated.deviations, {key: np.zeros(len(size)) for key, size in zip(keys, sizes, strict=True)})

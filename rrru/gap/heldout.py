@@ -5,7 +5,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import cho_solve, solve_triangular
 
 from rrru.campaign.noise import along_runs
 from rrru.gap.case import Case
@@ -43,16 +43,26 @@ class Prediction:
 
     @property
     def log_score(self):
-        """Log predictive score (n,) under noise, discrepancy and the prediction's own uncertainty.
+        """Log predictive score (n,) under noise, discrepancy and the prediction's own uncertainty."""
+        residual, spread = self.coordinates
+        return _log_score(residual, self.left_mm2 + (spread**2).sum(axis=-1))
 
-        Of series it is that of their cosines, whose sum over a series is that of its points: what is smooth along a run
-        is one thing to foretell and not one at every point.
+    @property
+    def coordinates(self):
+        """Residuals (n, 3) and their spread (n, 3, k) as they are scored.
+
+        Of series they are those of the cosines, whose scores have the points' sum over a series: what is smooth along a
+        run is one thing to foretell and not one at every point.
         """
-        together = np.concatenate([self.residual_mm[..., None], self.spread], axis=-1)
-        if self.series is not None:
-            together, _ = along_runs(together, self.series)
-        variance = self.left_mm2 + (together[..., 1:] ** 2).sum(axis=-1)
-        return -0.5 * (together[..., 0] ** 2 / variance + np.log(variance)).sum(axis=-1)
+        if self.series is None:
+            return self.residual_mm, self.spread
+        together, _ = along_runs(np.concatenate([self.residual_mm[..., None], self.spread], axis=-1), self.series)
+        return together[..., 0], together[..., 1:]
+
+
+def _log_score(residual, variance):
+    """`Prediction.log_score` (n,) of residuals (n, 3) with their variance (n, 3)."""
+    return -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=-1)
 
 
 @dataclass(frozen=True)
@@ -81,25 +91,64 @@ class HeldOut:
         The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
         laws as they are. uncertain: tell the prediction's spread, too.
         """
-        evidence, linear = self.evidence, self.evidence.linear
-        blocks = [linear.base, *signatures(evidence.library, linear, terms)]
-        penalty = np.concatenate([np.zeros(linear.base.shape[-1]), evidence.scales(terms, strengths) ** -2.0])
-        grams = {number: self._chosen(gram, terms) for number, gram in self._sums(level).items()}
-        total = sum(grams.values())
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(total)[:-1] + penalty, 1e-300))
+        linear, blocks = self.evidence.linear, self._blocks(terms)
+        ends = np.cumsum([block.shape[-1] for block in blocks])
         residual = np.empty_like(linear.data)
-        spread = np.empty((len(self.case), 3, len(unit) if uncertain else 0))
-        for number, gram in grams.items():
-            out, rest = self.fold == number, total - gram
-            precision = unit[:, None] * (rest[:-1, :-1] + np.diag(penalty)) * unit
-            factor = np.linalg.cholesky(precision + 1e-12 * np.eye(len(unit)))
-            mean = unit * cho_solve((factor, True), unit * rest[:-1, -1])
-            parts = np.split(mean, np.cumsum([block.shape[-1] for block in blocks])[:-1])
+        together = np.concatenate(blocks, axis=-1) if uncertain else linear.base[..., :0]
+        spread = np.empty_like(together)
+        for number, (unit, factor, mean) in self._fits(terms, strengths, level).items():
+            out = self.fold == number
+            parts = np.split(mean, ends[:-1])
             residual[out] = linear.data[out] - sum(b[out] @ part for b, part in zip(blocks, parts, strict=True))
             if uncertain:
-                half = unit[:, None] * np.linalg.inv(factor).T
-                spread[out] = np.concatenate([block[out] for block in blocks], axis=-1) @ half
+                scaled = (together[out] * unit).reshape(-1, len(unit))
+                spread[out] = _halved(factor, scaled).T.reshape(-1, 3, len(unit))
         return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
+
+    def gains(self, terms, strengths, level):
+        """Log predictive score that each of the terms adds to that of the others, at these strengths.
+
+        Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
+        then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
+        """
+        whole, fits = self.predict(terms, strengths, level), self._fits(terms, strengths, level)
+        residuals, spread = whole.coordinates
+        variances = whole.left_mm2 + (spread**2).sum(axis=-1)
+        result, score = [], _log_score(residuals, variances).sum()
+        for first, last in pairwise(np.cumsum([block.shape[-1] for block in self._blocks(terms)])):
+            residual, variance = residuals.copy(), variances.copy()
+            for number, (unit, factor, mean) in fits.items():
+                out = self.fold == number
+                half = _halved(factor, np.diag(unit)[first:last])
+                root, moved = np.linalg.cholesky(half.T @ half), spread[out] @ half
+                residual[out] += moved @ cho_solve((root, True), mean[first:last])
+                taken = _halved(root, moved.reshape(-1, last - first))
+                variance[out] -= (taken**2).sum(axis=0).reshape(-1, 3)
+            result.append(float(score - _log_score(residual, variance).sum()))
+        return result
+
+    def _blocks(self, terms):
+        """Columns (n, 3, k) of the calibration and of each term."""
+        linear = self.evidence.linear
+        return [linear.base, *signatures(self.evidence.library, linear, terms)]
+
+    def _fits(self, terms, strengths, level):
+        """What is fitted to the points of all folds but one, by its number.
+
+        Units (k,) of the columns of calibration and terms, the lower Cholesky factor (k, k) of the coefficients'
+        precision in these units, and their mean (k,).
+        """
+        free = np.zeros(self.evidence.linear.base.shape[-1])
+        penalty = np.concatenate([free, self.evidence.scales(terms, strengths) ** -2.0])
+        grams = {number: self._chosen(gram, terms) for number, gram in self._sums(level).items()}
+        total, result = sum(grams.values()), {}
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(total)[:-1] + penalty, 1e-300))
+        for number, gram in grams.items():
+            rest = total - gram
+            precision = unit[:, None] * (rest[:-1, :-1] + np.diag(penalty)) * unit
+            factor = np.linalg.cholesky(precision + 1e-12 * np.eye(len(unit)))
+            result[number] = unit, factor, unit * cho_solve((factor, True), unit * rest[:-1, -1])
+        return result
 
     def _sums(self, level):
         """Sums of squares and products (K + 1, K + 1) of all columns and the data, by fold, at a level (an index)."""
@@ -168,6 +217,13 @@ class HeldOut:
         if self._whole_runs:
             together, _ = along_runs(together, self.case.series)
         return 1.0 / self._left(level), together
+
+
+def _halved(factor, rows):
+    """Columns (k, r) of which products make those of rows (r, k) with the inverse of a matrix whose lower factor this
+    is.
+    """
+    return solve_triangular(factor, rows.T, lower=True, check_finite=False)
 
 
 def within(run, at):

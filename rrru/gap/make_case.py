@@ -40,14 +40,27 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
+    testable, untestable, complete = _tested(library, motion, used, _told(measurements, used, stop))
+    used &= complete
+    for name, function in unknown_functions(mechanism).items():
+        values = [getattr(motion, need)[used] for need in function.needs]
+        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
+            testable[name] = function
+    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+
+
+def _tested(library, motion, used, told):
+    """Effects that the used points can test, others with the reason, and where (n,) the tested ones are complete.
+
+    told: how many numbers the used points tell of the robot.
+    """
     testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
-    read = _told(measurements, used, stop)
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
             continue
-        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * read:
-            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {read} that were told"
+        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * told:
+            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
             continue
         known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
         missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
@@ -56,12 +69,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         else:
             testable[name] = effect
             complete = np.all([complete, *known.values()], axis=0)
-    used &= complete
-    for name, function in unknown_functions(mechanism).items():
-        values = [getattr(motion, need)[used] for need in function.needs]
-        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
-            testable[name] = function
-    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+    return testable, untestable, complete
 
 
 def _told(measurements, used, stop):

@@ -22,6 +22,8 @@ from rrru.gap.unknown import UNKNOWN
 _DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
 # share of a wave's squares that the calibration has to leave
 _TOLD = 0.01
+# of a wave of unit length, below which others take it up
+_SEEN = 1e-6
 # steps of that grid by which a wave's order may lie beside the one of the grid that shows it
 _REACH = 0.75
 # logarithms of the signal over the noise that are tried: from, to, how many
@@ -34,7 +36,10 @@ def with_spectra(case, linear, terms):
     linear: about the state that the terms of a hypothesis, fitted beside them, have led to.
     """
     library, held = dict(case.library), {term.effect for term in terms}
-    open_ones = [e for e in library.values() if (e.coordinates.spectra or _waits(e)) and e.name not in held]
+    # a rough function of the drives' values holds all waves
+    broad = any(library[term.effect].coordinates.broad for term in terms)
+    waiting = [e for e in library.values() if e.coordinates.spectra or (_waits(e) and not broad)]
+    open_ones = [e for e in waiting if e.name not in held]
     if not open_ones:
         return case, []
     known = [term for term in terms if term.effect not in UNKNOWN]
@@ -93,7 +98,7 @@ def pursue(data, basis, drive_effect, drive):
     unit = _unit(every, least)
     resolved = max(sum(_HIGHEST * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
-    found, had, left = [], np.zeros((len(data), 0)), data
+    found, had, left = [], np.zeros((len(data), 0)), data  # had: an orthonormal basis of the waves found
     while len(found) < min(_MOST_WAVES, len(data) // 20):
         gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
         if not gains.any():
@@ -101,36 +106,37 @@ def pursue(data, basis, drive_effect, drive):
         k, middle = atoms[int(gains.argmax())]
         step = 2.0 * np.pi / reach[k] / _DENSITY
         wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
-        order = _sharpest(data, had, wave, middle, step)
-        had = np.concatenate([had, wave(order)], axis=1)
-        trial = _left(data, had)
+        order = _sharpest(left, had, wave, middle, step)
+        added = _beside(had, wave(order))
+        trial = _without(left, added)
         if 0.5 * freedom * np.log((left @ left) / (trial @ trial)) < price:
             break
         found.append((k, order))
-        left = trial
+        had, left = np.concatenate([had, added], axis=1), trial
         # what is nearer than that is the same wave
         same = [drive == k and abs(one - order) < step for drive, one in atoms]
         unit[:, np.repeat(same, 2)] = 0.0
     return tuple(found), float(gammaln(len(found) + 1) - len(found) * np.log(resolved))
 
 
-def _sharpest(data, had, wave, middle, step):
-    """The order about the middle whose wave, from orders to columns (m, 2), takes most off beside others.
+def _sharpest(left, had, wave, middle, step):
+    """The order about the middle whose wave, from orders to columns (m, 2), takes most off what others leave (m,).
 
     A wave between two orders of the grid, which lie a step apart, would else be taken for both of them.
     """
     bounds = max(middle - _REACH * step, _DENSITY * step), min(middle + _REACH * step, _HIGHEST)
 
     def cost(order):
-        left = _left(data, np.concatenate([had, wave(order)], axis=1))
-        return left @ left
+        return -float(((_beside(had, wave(order)).T @ left) ** 2).sum())
 
     return float(minimize_scalar(cost, bounds=bounds, method="bounded").x)
 
 
-def _left(data, columns):
-    """What columns (m, c) leave of data (m,)."""
-    return data - columns @ np.linalg.lstsq(columns, data, rcond=1e-9)[0]
+def _beside(had, columns):
+    """An orthonormal basis (m, r) of what columns (m, c) add to the orthonormal ones had (m, h)."""
+    # once more for what rounding has left
+    basis, size, _ = np.linalg.svd(_without(_without(columns, had), had), full_matrices=False)
+    return basis[:, size > _SEEN]
 
 
 def _unit(columns, least):

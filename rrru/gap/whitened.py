@@ -63,20 +63,18 @@ class Whitened:
 
     @cached_property
     def _together(self):
-        """Columns of calibration and effects, and the data, (m, 3, k), as they are and by the runs' cosines; waves."""
+        """Columns of calibration and effects, and the data, (m, 3, k), by the runs' cosines; waves (m,)."""
         linear = self.linear
         blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
-        together = np.concatenate(blocks, axis=-1)
-        cosines, wave = along_runs(together.reshape(len(self), -1), self.run)
-        return together, cosines.reshape(together.shape), wave
+        return along_runs(np.concatenate(blocks, axis=-1), self.run)
 
     @cached_property
     def whole(self):
         """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
-        together, _, _ = self._together
-        columns = (together[..., self.linear.base.shape[-1] : -1] / self.noise.mean_mm).reshape(3 * len(self), -1)
+        # cosines change no sum of squares
+        columns = self._together[0][..., self.linear.base.shape[-1] : -1].reshape(3 * len(self), -1)
         sums = columns @ self.layout[1]
-        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)])
+        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)]) / self.noise.mean_mm**2
 
     @cached_property
     def _made(self):
@@ -85,7 +83,7 @@ class Whitened:
 
     def _white(self, level):
         """Whitened columns (m, k), of which the first p are the calibration's; variances; and p."""
-        (_, cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+        (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
         own = self.noise.variance(wave, lengths(self.run)) / unit**2
         variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
         return (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1]), variance, p
@@ -109,7 +107,8 @@ class Whitened:
         if level not in self._made:
             white, variance, p = self._white(level)
             basis, triangle = np.linalg.qr(white[:, :p])
-            rest = white[:, p:] - basis @ (basis.T @ white[:, p:])
+            rest = white[:, p:]
+            rest -= basis @ (basis.T @ rest)
             gram, sums = rest.T @ rest, self.layout[1]
             none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
             gram, moment = gram[:-1, :-1], gram[:-1, -1]

@@ -65,6 +65,9 @@ def write_plays(document, structure, found, lines):
         if not width > 0.0:
             continue
         move = structure.driven[number]
+        for tag in ("joint", "fixed"):
+            # the file may have been corrected before
+            document.drop(tag, f"{move.origin}_play")
         # to m and N m, or rad and N
         scale, force, unit = (1.0, 1.0 / MM, "rad") if move.kind == "R" else (1.0 / MM, 1.0, "m")
         whole, holding = scale * width, _HOLDS * force * found.loads.get(number, 0.0)

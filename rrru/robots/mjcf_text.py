@@ -51,6 +51,19 @@ class MjcfDocument(Document):
         for key, place in self._folders.items():
             self._compiler.set(key, os.path.relpath(place, folder))
 
+    def site(self, body, name, attributes):
+        """The site of a name with these attributes, put on a body by number where there is none."""
+        for one in self.root.iter("site"):
+            if one.get("name") == name:
+                one.attrib |= attributes
+                return one
+        return self.inside(self.bodies[body], "site", {"name": name} | attributes)
+
+    def drop(self, tag, name):
+        """Remove elements of a name."""
+        for one in [one for one in self.root.iter(tag) if one.get("name") == name]:
+            self.parent(one).remove(one)
+
     def compiled(self):
         """The MjModel of the file as it is now, without keyframes."""
         root = deepcopy(self.root)

@@ -36,13 +36,13 @@ def to_mjcf(path, platform, found, folder):
     changed = {
         key: (value, errors.get(key, np.full(6 if value.ndim == 2 else 3, np.nan)))
         for key, value in values.items()
-        if key not in nominal or np.abs(difference(nominal[key], value)).max() > SAME
+        if key[0] == "frame" or np.abs(difference(nominal[key], value)).max() > SAME
     }
     _write_bodies(document, changed, nominal)
     lost = [*changes_of(structure, found, found.twists).lost, *write_stiffness(document, structure, found)]
     axes = {key[1]: value for key, value in values.items() if key[0] == "axis"}
     write_plays(document, structure, found, {joint: (axis, values["pos", joint]) for joint, axis in axes.items()})
-    _write_frames(document.bodies[structure.assembly.platform], document, changed)
+    _write_frames(document, structure.assembly.platform, changed)
     _write_anchors(document, model, values, errors)
     close_keys(document, model, [move.origin for move in structure.driven], document.compiled())
     document.move_to(folder)
@@ -92,12 +92,12 @@ def _told(error):
     return f"pos +- {sizes(error[:3] / MM)} m, turn about own axes +- {sizes(error[3:])} rad"
 
 
-def _write_frames(platform, document, changed):
+def _write_frames(document, platform, changed):
     """Write places on the platform as sites."""
     for key, (value, error) in changed.items():
         if key[0] == "frame":
             place = {"pos": words(value[:3, 3] / MM), "quat": words(quaternion(value[:3, :3]))}
-            document.note(document.inside(platform, "site", {"name": key[1]} | place), f"found: {_told(error)}")
+            document.note(document.site(platform, key[1], place), f"found: {_told(error)}")
 
 
 def _write_anchors(document, model, values, errors):
@@ -126,7 +126,7 @@ def _hold(document, connect, bodies, points, errors):
     for attribute in ("body1", "body2", "anchor"):
         element.attrib.pop(attribute, None)
     for end, (body, point) in enumerate(zip(bodies, points, strict=True)):
-        site = document.inside(document.bodies[body], "site", {"name": f"{name}_{end + 1}", "pos": words(point / MM)})
+        own = element.get(f"site{end + 1}", f"{name}_{end + 1}")
         error = errors.get(("anchor", k, end), np.full(3, np.nan))
-        document.note(site, f"corrected: pos +- {sizes(error / MM)} m")
-        element.set(f"site{end + 1}", site.get("name"))
+        document.note(document.site(body, own, {"pos": words(point / MM)}), f"corrected: pos +- {sizes(error / MM)} m")
+        element.set(f"site{end + 1}", own)

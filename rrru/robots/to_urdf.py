@@ -32,10 +32,10 @@ def to_urdf(path, found, folder, base=None, tip=None, home=None):
     joints = {joint.find("child").get("link"): joint for joint in document.root.findall("joint")}
     for key, value in values.items():
         error = errors.get(key, np.full(6, np.nan))
-        change = np.abs(difference(nominal[key], value)) if key in nominal else np.full(6, np.inf)
+        kind, name = key
+        change = np.full(6, np.inf) if kind == "frame" else np.abs(difference(nominal[key], value))
         if change.max() <= SAME:
             continue
-        kind, name = key
         if kind == "origin":
             _write_origin(document, joints[name], value, error, change[3:].max() > SAME)
         elif kind == "behind":
@@ -99,7 +99,12 @@ def _write_behind(document, joint, link, told):
 
 
 def _write_frame(document, links, placement, text):
-    """Write a link that stands at a place on another one."""
+    """Write a link that stands at a place on another one, or change its place where it is there already."""
+    for joint in document.root.findall("joint"):
+        if joint.get("name") == f"{links[1]}_mount":
+            joint.find("origin").attrib |= {"xyz": _xyz(placement), "rpy": _rpy(placement)}
+            document.note(joint, text)
+            return
     link = document.inside(document.root, "link", {"name": links[1]})
     _write_fixed(document, link, links, placement)
     document.note(link, text)

@@ -60,9 +60,15 @@ def _imported(file: Path) -> tuple[Path, ...]:
     names = set(_IMPORT.findall(text))
     for module, targets in _FROM.findall(text):
         names.update(f"{module}.{word}" for word in re.findall(r"(\w+)(?:[ \t]+as[ \t]+\w+)?", targets))
-    # what looks for modules finds those of its own folder
-    beside = file.parent.glob("*.py") if "import pkgutil\n" in text else ()
-    return tuple({*beside, *(file for name in names for file in _on_the_way(name))})
+    return tuple({*_looked_for(file, text), *(file for name in names for file in _on_the_way(name))})
+
+
+def _looked_for(file: Path, text: str) -> list[Path]:
+    """Files that a file imports without naming them: of its folder, or every package with its schemas."""
+    if "pkgutil.walk_packages(" in text:
+        package = ROOT / file.relative_to(ROOT).parts[0]
+        return [*package.rglob("__init__.py"), *package.rglob("schemas.py")]
+    return list(file.parent.glob("*.py")) if "pkgutil.iter_modules(" in text else []
 
 
 @cache

@@ -4,15 +4,20 @@ import importlib
 import pkgutil
 from pathlib import Path
 
+import yaml
+
 import rrru
 
 _HEAD = """# What a run writes
 
-`tables/` holds the tables of the whole study, `campaigns/` each campaign's own parts of them, `figures/` every figure
-as PDF and PNG, `timings/` wall times (the only files whose bytes differ from run to run), `logs/` one log per job,
-`sweep/` the parts of the sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page
-is made from the `schemas.py` beside each package.
+`report.html` is one page of everything (`make report`), `compare.html` one of two calibrations (`make compare`).
+`tables/` holds the tables of the whole study, `campaigns/` each campaign's own parts of them, its answer as
+`verdict.json`, and what it was calibrated as, `robot.json`; `figures/` every figure as PDF, PNG and SVG, `timings/`
+wall times (the only files whose bytes differ from run to run), `logs/` one log per job, `sweep/` the parts of the
+sweeps. Lengths are in mm and angles in rad unless a column's name says otherwise. This page is made from the
+`schemas.py` beside each package and from `workflow/schemas/verdict.schema.yaml`.
 """
+_ROOT = Path(__file__).resolve().parents[2]
 
 
 def tables():
@@ -30,7 +35,23 @@ def text():
         parts.append(
             "\n".join(["| column | type | meaning |", "| --- | --- | --- |", *map(_row, table.columns)]) + "\n"
         )
-    return "\n".join(parts)
+    return "\n".join([*parts, _answer()])
+
+
+def _answer():
+    """What stands in verdict.json, from its schema."""
+    schema = yaml.safe_load((_ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+    rows = [f"| `{name}` | {_keys(key)} | {key['description']} |" for name, key in schema["properties"].items()]
+    heading = f"## verdict.json\n\n{schema['description']}. Schema: `workflow/schemas/verdict.schema.yaml`.\n"
+    return "\n".join([heading, "| key | type | meaning |", "| --- | --- | --- |", *rows, ""])
+
+
+def _keys(key):
+    """A key's type as text; of a list of objects their keys."""
+    within = key.get("items", {}).get("properties")
+    kinds = key.get("type", "string" if "enum" in key else "number")
+    kinds = " or ".join(kinds) if isinstance(kinds, list) else kinds
+    return f"array of {', '.join(within)}" if within else kinds
 
 
 def _row(column):
@@ -41,4 +62,4 @@ def _row(column):
 
 
 if __name__ == "__main__":
-    (Path(__file__).resolve().parents[2] / "results" / "README.md").write_text(text())
+    (_ROOT / "results" / "README.md").write_text(text())

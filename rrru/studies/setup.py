@@ -31,8 +31,16 @@ def measured_robot(nominal, measurements, parameter_set=None):
 
     With those that its readings leave open: frame, tool, places of reflectors.
     """
-    open_numbers = rows.reads(measurements, nominal.get("targets", ()), nominal.get("registered", False))
-    robot = mechanism(nominal, parameter_set).reading(open_numbers)
+    robot = mechanism(nominal, parameter_set)
+    return as_measured(robot, measurements, nominal.get("targets", ()), nominal.get("registered", False))
+
+
+def as_measured(robot, measurements, targets=(), registered=False):
+    """A nominal robot with the numbers that the poses of a measurement table can tell; see `measured_robot`.
+
+    targets: reflectors whose places are stated; registered: the frame was.
+    """
+    robot = robot.reading(rows.reads(measurements, targets, registered))
     known = measurements[rows.usable(measurements)]
     actuators = rows.actuators(known, robot)
     return robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))

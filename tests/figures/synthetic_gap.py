@@ -5,6 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
+from rrru.studies.withheld.chunks import PLANTS
 from tests.schemas import TABLES, check
 
 EFFECTS = (
@@ -30,7 +31,8 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
-    texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats", "notes": ""}
+    texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats"}
+    texts |= {"notes": "", "not_in_model": ""}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
     numbers |= {"noise_stated_mm": 0.02, "noise_correlation": 0.1, "noise_runs_mm": 0.005}
@@ -142,6 +144,10 @@ def withheld_scores(each=8):
         outside = [f"outside:{name}" for name in (EFFECTS if label == "effect" else ("gear_wear", "cable_drag"))]
         for truth in [*EFFECTS, "link_flexure+backlash", "none", *outside] if label == "label" else outside:
             rows += [_score(generator, label, truth) for _ in range(each)]
+    for label in PLANTS:
+        rows += [
+            _score(generator, label, truth) for truth in (*EFFECTS[:4], "none", "outside:spring") for _ in range(each)
+        ]
     for label, others in (("noise", ("backlash", "none")), ("background", ("axis_tilt", "none")), ("many", OTHERS)):
         rows += [_score(generator, label, truth) for truth in others for _ in range(each)]
     rows += [_score(generator, "field", truth) for truth in ("backlash", "none", "outside:sag", "axis_tilt+servo_lag")]
@@ -170,6 +176,10 @@ def _score(generator, label, truth):
         "oracle_detects": bool(strength > 0.4),
         "share_closed_true": closed,
         "share_closed": closed + 0.05 * generator.normal(),
+        "file": "delta_file" if label in PLANTS else "",
+        "cause": truth,
+        "numbers": 3,
+        "held": 2,
     }
 
 
@@ -184,7 +194,7 @@ def withheld_confusion(scores):
 def withheld_parts(scores):
     """`withheld_parts` of the robots of many causes and of noises that are not as stated; small ones are missed."""
     generator, rows = np.random.default_rng(12), []
-    for row in scores[scores["check"].isin(["many", "noise"])].itertuples():
+    for row in scores[scores["check"].isin(["many", "noise", *PLANTS])].itertuples():
         kinds = dict.fromkeys(row.truth.replace("none", "backlash").split("+"), "effect")
         kinds |= {kind: kind for kind in ("scatter", "runs", "unexplained")}
         kinds |= {"joint_axis_error": "background", "cable_drag": "outside"} if row.check == "many" else {}

@@ -31,7 +31,7 @@ def test_a_pdf_holds_the_glyphs_that_it_shows_and_nothing_to_lay_them_out(tmp_pa
     figure = style.new(style.SINGLE_MM, 40.0)
     figure.subplots().set_axis_off()
     figure.text(0.1, 0.5, "AV fi \N{MINUS SIGN}5.03 µm")
-    style.save(figure, tmp_path / "a.pdf", tmp_path / "a.png")
+    style.save(figure, {"pdf": tmp_path / "a.pdf"})
     streams = re.findall(rb"stream\r?\n(.*?)\r?\nendstream", (tmp_path / "a.pdf").read_bytes(), re.DOTALL)
     files = [zlib.decompress(stream) for stream in streams if stream.startswith(b"\x78")]
     # the ligature has a font of its own

@@ -11,6 +11,7 @@ from rrru.errors import ConfigError
 from rrru.figures import style
 from rrru.store import tables
 from rrru.studies.withheld import figures as withheld
+from rrru.studies.withheld.chunks import PLANTS
 from tests.figures import synthetic_gap as made_up
 from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
@@ -168,6 +169,15 @@ def test_confusion_tables_count_every_robot_and_frame_the_right_answers():
         )
 
 
+def test_both_plants_stand_beside_each_other():
+    frames = made_up.withheld_tables()
+    figure = draw("withheld_plants", frames)
+    for check, title in (("mujoco", "robots, driven by MuJoCo"), ("own", "robots, the same, own plant")):
+        assert sum(map(int, written(panel(figure, title)))) == (frames["withheld_scores"]["check"] == check).sum() > 0
+    labels = {line.get_label() for line in panel(figure, "stated probability").lines}
+    assert {"driven by MuJoCo", "the same, own plant"} <= labels and "label withheld" not in labels
+
+
 @pytest.mark.parametrize(
     ("verdict", "column"),
     [("none", "none"), ("backlash", "backlash"), ("a+b", "two or more"), ("a+unexplained", "unexplained")],
@@ -191,8 +201,9 @@ def test_shares_are_of_the_scores():
 def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
     scores = made_up.withheld_scores(each=1)
     for check in scores["check"].unique():
-        figure = draw("withheld", made_up.withheld_tables(scores[scores["check"] == check]))
-        assert len(figure.axes) == (5 if check in ("many", "noise") else 4)
+        name = "withheld_plants" if check in PLANTS else "withheld"
+        figure = draw(name, made_up.withheld_tables(scores[scores["check"] == check]))
+        assert len(figure.axes) == (5 if check in ("many", "noise", *PLANTS) else 4)
     with pytest.raises(ConfigError, match="withheld_scores"):
         draw("withheld", made_up.withheld_tables(scores.iloc[:0]))
 

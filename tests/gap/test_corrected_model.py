@@ -1,6 +1,6 @@
 """The corrected file of a diagnosed campaign, and the compensation table, against the robot that was measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -39,6 +39,7 @@ class _Campaign:
     frame: object
     found: object
     file: object
+    shrink: object
 
 
 def _campaign(name, folder, points):
@@ -63,8 +64,11 @@ def _campaign(name, folder, points):
     known = MeasuredRobot(setup.measured_robot(nominal, frame), _MASSES, _NOISE_MM, name, _NOISE_RAD)
     effects = (*_EFFECTS[name], "drive_compliance", "thermal_growth")
     result = diagnose(frame, known, GapSettings(effects, draws=20))
+    shrink = result.tables["gap_shrink"]
     file = folder / f"corrected.{'xml' if 'mjcf' in section else 'urdf'}"
-    return _Campaign(robot, errors, _EFFECTS[name], frame, write_corrected(result, section, _MASSES, file), file)
+    return _Campaign(
+        robot, errors, _EFFECTS[name], frame, write_corrected(result, section, _MASSES, file), file, shrink
+    )
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +134,19 @@ def test_corrected_drives_bring_the_measured_robot_to_where_it_is_commanded(name
             lengths.append(np.linalg.norm(robot.measured(robot.solve(drives, place, twists), twists) - place, axis=1))
         off[prefix] = np.sqrt(np.mean(np.concatenate(lengths) ** 2))
     assert off[""] > 0.3 and off["corrected_"] < 0.05 * off[""]
+
+
+def test_a_file_that_cannot_be_corrected_says_why_and_the_verdict_stands(hexapod, tmp_path):
+    text = HEXAPOD.read_text().replace("<worldbody>", "<worldbody><frame>")
+    text = text.replace("</worldbody>", "</frame></worldbody>")
+    framed = tmp_path / "framed.xml"
+    framed.write_text(text)
+    section = {"mjcf": str(framed), "platform": "plate"}
+    known = replace(hexapod.found, tables=hexapod.found.tables | {"gap_shrink": hexapod.shrink})
+    result = write_corrected(known, section, _MASSES, tmp_path / "corrected.xml")
+    assert "it has <frame>" in result.verdict["not_in_model"] and result.verdict["effects"] == "backlash"
+    assert set(result.tables["gap_shrink"]["kind"]) == {"held_out", "resimulated"}
+    assert "it has <frame>" in (tmp_path / "corrected.xml").read_text()
 
 
 def test_standard_errors_of_the_calibration_hold_the_truth(hexapod):

@@ -1,7 +1,6 @@
 """Robots written back as MJCF and URDF: read again, by this package and by MuJoCo, they stand where errors put them."""
 
 from dataclasses import replace
-from itertools import pairwise
 from xml.etree import ElementTree
 
 import mujoco
@@ -11,12 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from rrru.errors import ConfigError
 from rrru.robots.delta import Delta
 from rrru.robots.file_changes import Found
 from rrru.robots.from_file import from_mjcf, from_urdf
 from rrru.robots.from_mjcf import plays_of
-from rrru.robots.lumps import driven_loads
 from rrru.robots.mjcf_home import closed_qpos
 from rrru.robots.rrru3 import Rrru3
 from rrru.robots.to_mjcf import to_mjcf
@@ -25,7 +22,6 @@ from tests.robots.mjcf import (
     ARM,
     CRANKED,
     CRANKED_JOINTS,
-    GEOM,
     HEXAPOD,
     delta_mjcf,
     file_of,
@@ -154,6 +150,24 @@ def test_the_keyframe_is_closed_and_has_a_place_for_every_joint(tmp_path):
     assert from_mjcf(path, "plate").parts.columns == robot.parts.columns
 
 
+def test_a_corrected_file_can_be_corrected_again(tmp_path):
+    """Its own anchors, play and frames are replaced, not doubled."""
+    robot = from_mjcf(HEXAPOD, "plate")
+    more = {"play": {2: (0.05, 1e-3)}, "loads": {2: 50.0}, "reflectors": {"ball": np.array([60.0, 0.0, 40.0])}}
+    first, second = _drawn(robot, 8), _drawn(robot, 9)
+    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", _found(robot, first, **more), tmp_path)[0])
+    before = from_mjcf(path, "plate")
+    again = file_of(tmp_path, to_mjcf(path, "plate", _found(before, second, **more), tmp_path)[0], "again.xml")
+    model = mujoco.MjModel.from_xml_path(str(again))
+    assert len(plays_of(model)) == model.ntendon == 1 and model.nsite == 13
+    _check(before, from_mjcf(again, "plate"), second, 10)
+    tool = Found({"tool": np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])})
+    arm = _written(tmp_path, to_urdf(ARM, tool, tmp_path)[0], "urdf")
+    twice = Found({"tool": np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0])})
+    text, _ = to_urdf(arm, twice, tmp_path, tip="tool0")
+    assert text.count('"measured_tool"') == 2 and 'xyz="0.002 0 0"' in text
+
+
 @pytest.mark.parametrize(("side", "axis"), [("rods", "y"), ("plate", "y")])
 def test_axes_of_a_ball_joint_that_do_not_meet_are_named(tmp_path, side, axis):
     file = rrs3_mjcf(tmp_path, side)
@@ -193,57 +207,3 @@ def test_tool_and_reflectors_are_frames_on_the_platform(tmp_path):
     arm, _ = to_urdf(ARM, replace(found, tool_mm=(0.0, 0.0, 0.0)), tmp_path)
     place = next(one for one in ElementTree.fromstring(arm).iter("joint") if one.get("name") == "measured_tool_mount")
     assert place.find("parent").get("link") == "tool0" and place.find("origin").get("xyz") == "0.001 0.002 0.003"
-
-
-def test_a_servo_gives_way_by_its_load_over_the_stiffness_found(tmp_path):
-    robot = from_mjcf(HEXAPOD, "plate")
-    softness = np.array([1.0, 2.0, 1.5, 0.8, 1.2, 0.5]) * 1e-3
-    found = Found({}, compliance={k: (one, 1e-5) for k, one in enumerate(softness)})
-    path = _written(tmp_path, to_mjcf(HEXAPOD, "plate", found, tmp_path)[0])
-    model = mujoco.MjModel.from_xml_path(str(path))
-    np.testing.assert_allclose(model.actuator_gainprm[:, 0], 1e3 / softness)
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, 6000)
-    legs, still = np.array([[1000.0 * data.joint(f"leg{k}").qpos[0] for k in range(1, 7)]]), np.zeros((1, 6))
-    poses = robot.solve(legs, robot.legs.home_mm[None])
-    load = driven_loads(robot, (legs, still, still), poses, np.array([0.0, 0.0, -9810.0]))
-    np.testing.assert_allclose(legs[0], softness * load[0], rtol=2e-3)
-
-
-_CRANK = (
-    f'<body name="crank"><joint name="crank" axis="0 1 0"/>{GEOM}<body name="tip" pos="0.2 0 0">{GEOM}</body></body>'
-)
-
-
-@pytest.mark.parametrize(("kp", "friction_alone"), [(2e4, False), (1e3, True)])
-def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp, friction_alone):
-    """Between limits or by friction alone, against gravity: both ends of a slow swing are apart by the width found."""
-    option = '<option timestep="0.0002" integrator="implicitfast"/>'
-    actuator = f'<position joint="crank" kp="{kp}" kv="{20 if friction_alone else 60}"/>'
-    file = mjcf(tmp_path, _CRANK, actuators=actuator, more=option)
-    load = 1000.0 * 9.81 * 0.3 * 0.2
-    found = Found({}, play={0: (1e-3, 1e-5)}, loads={0: load})
-    path = _written(tmp_path, to_mjcf(file, "tip", found, tmp_path)[0])
-    model = mujoco.MjModel.from_xml_path(str(path))
-    assert bool(len(plays_of(model))) is not friction_alone
-    data, places = mujoco.MjData(model), []
-    for start, end in pairwise((0.0, 0.02, 0.01, 0.0, 0.01)):
-        for control in np.concatenate([np.linspace(start, end, 4000), np.full(2000, end)]):
-            data.ctrl[:] = control
-            mujoco.mj_step(model, data)
-        places.append(float(data.qpos[: model.njnt].sum()))
-    _, down, _, up = places
-    assert down - up == pytest.approx(1e-3, rel=0.03)
-
-
-def test_what_the_files_cannot_hold_is_said(tmp_path):
-    both = {"compliance": {1: (1e-8, 1e-9)}, "play": {4: (1e-4, 1e-6)}}
-    assert to_urdf(ARM, Found({}, **both), tmp_path)[1] == ("compliance of axis2", "play of axis5")
-    file = mjcf(tmp_path, _CRANK, actuators='<motor joint="crank"/>')
-    assert to_mjcf(file, "tip", Found({}, compliance={0: (1e-8, 1e-9)}), tmp_path)[1] == (
-        "compliance of crank: it has 0 position servos, not one",
-    )
-    file = mjcf(tmp_path, f"<frame>{_CRANK}</frame>", actuators=servos("crank"))
-    with pytest.raises(ConfigError, match=r"robot\.xml: it has <frame>; allowed .* bodies written out"):
-        to_mjcf(file, "tip", Found({}), tmp_path)

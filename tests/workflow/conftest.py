@@ -33,7 +33,7 @@ def _make(folder):
     (folder / "record").mkdir(parents=True, exist_ok=True)
     (folder / "answers.csv").write_text(_ANSWERS)
     (folder / "field.yaml").write_text(_CHECKED)
-    targets = ("all", "withheld", "build/minimal/twin/delta.yaml")
+    targets = ("all", "withheld", "build/minimal/twin/delta.yaml", "report")
     code, output = run(folder, *targets, overlays=(MINIMAL, "field.yaml"), record=folder / "record")
     assert code == 0, output
     (folder / "output").write_text(output)

@@ -1,13 +1,13 @@
 """Every code block of README and docs does what a reader would do with it.
 
-Python runs, beside the results of the workflow's shared run; YAML is an overlay of which a dry run makes a plan; of a
-shell's lines `snakemake` is run dry, and `make` says what it would do. A comment `<!-- file: name -->` before a block
-is the name that a reader saves it under. Keys under "# part of a campaign" are tried in one. `text` is not for running.
+A page's Python runs as one program, beside the results of the workflow's shared run. YAML is an overlay of which a dry
+run makes a plan; keys under "# part of a campaign" are tried in one. Of a shell's lines `snakemake` is run dry, and
+`make` says what it would do. A comment `<!-- file: name -->` before a block is the name that a reader saves it under.
+`text` is not for running.
 """
 
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import textwrap
@@ -16,6 +16,8 @@ import pandas as pd
 import pytest
 
 from tests.places import ROOT
+from tests.studies.printers.simulated_printers import ENTRIES
+from tests.studies.printers.test_klipper import config
 from tests.workflow.folder import dry_run, link
 
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
@@ -31,7 +33,7 @@ def blocks(page):
 
 
 def _readers_folder(folder, results):
-    """What a reader has: the project, results of a run, and a file of a tracker's."""
+    """What a reader has: the project, results of a run, and a file of a tracker and of a printer."""
     link(folder)
     for name in ("Makefile", "pyproject.toml", "requirements.lock"):
         (folder / name).symlink_to(ROOT / name)
@@ -40,7 +42,7 @@ def _readers_folder(folder, results):
     table.to_csv(folder / "my_file.csv", index=False)
     names = {"trajectory": "path", "measured_x_mm": "X", "measured_y_mm": "Y", "measured_z_mm": "Z"}
     table.rename(columns=names).to_csv(folder / "tracker.csv", index=False)
-    shutil.copy(ROOT / "data/linear_delta.json", folder / "my_printers.json")
+    (folder / "printer.cfg").write_text(config(ENTRIES["printer_22"]))
 
 
 def _shell(line, folder):
@@ -51,39 +53,51 @@ def _shell(line, folder):
     if words[0] == "make":
         told = subprocess.run(["make", "-n", *words[1:]], cwd=folder, capture_output=True, text=True, check=False)
         return told.returncode, told.stdout + told.stderr
+    if words[0] == "rrru-printer":
+        program = [sys.executable, "-c", "from rrru.studies.printers.command import main; main()", *words[1:]]
+        told = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
+        return told.returncode, told.stdout + told.stderr
     assert words[:2] == ["snakemake", "--cores"], f"no way to try {line!r}"
     told = words[3:]
     split = told.index("--configfile") if "--configfile" in told else len(told)
     return dry_run(folder, *told[:split], overlays=tuple(told[split + 1 :]))
 
 
-def _try(kind, text, folder, name):
-    """Run one block."""
-    if kind == "python":
-        command = [sys.executable, "-"]
-        told = subprocess.run(command, input=text, cwd=folder, capture_output=True, text=True, check=False)
-        assert told.returncode == 0, f"{text}\n{told.stderr}"
-    elif kind == "yaml":
-        if text.startswith(_PART):
-            text = _CAMPAIGN + textwrap.indent(text, "    ")
-        (folder / name).write_text(text)
-        code, output = dry_run(folder, overlays=(name,))
-        assert code == 0, f"{text}\n{output}"
-    elif kind == "sh":
-        for line in text.splitlines():
-            code, output = _shell(line, folder)
-            assert code == 0, f"{line}\n{output}"
+def _overlay(text, folder, name):
+    """Plan a run with an overlay."""
+    if text.startswith(_PART):
+        text = _CAMPAIGN + textwrap.indent(text, "    ")
+    (folder / name).write_text(text)
+    code, output = dry_run(folder, overlays=(name,))
+    assert code == 0, f"{text}\n{output}"
+
+
+def _commands(text, folder):
+    """Say what every line would do."""
+    for line in text.splitlines():
+        code, output = _shell(line, folder)
+        assert code == 0, f"{line}\n{output}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_blocks_of_a_page_do_what_they_say(page, results, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     _readers_folder(tmp_path, results)
+    program = []
     for name, kind, text in blocks(page):
         assert kind in ("python", "yaml", "sh", "text", "json", "xml"), f"{page.name}: a block of language {kind!r}"
         if name:
             (tmp_path / name).write_text(text)
-        _try(kind, text, tmp_path, name or "mine.yaml")
+        if kind == "python":
+            program.append(text)
+        elif kind == "yaml":
+            _overlay(text, tmp_path, name or "mine.yaml")
+        elif kind == "sh":
+            _commands(text, tmp_path)
+    told = subprocess.run(
+        [sys.executable, "-"], input="\n".join(program), cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert told.returncode == 0, told.stderr
 
 
 def test_every_link_of_a_page_leads_somewhere():

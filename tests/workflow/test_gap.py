@@ -130,9 +130,9 @@ def test_the_check_on_withheld_effects_runs_from_robots_to_figure(results):
     assert len(scores.loc["label"]) == 4 and len(scores.loc["effect"]) == 1
     assert scores.loc[("field", "field_09"), "right"]
     assert scores.loc[("effect", "effect_backlash_0000"), "truth"] == "backlash"
-    assert len(scores.loc["many"]) == len(scores.loc["background"]) == 1
+    assert len(scores.loc["many"]) == len(scores.loc["background"]) == len(scores.loc["own"]) == 1
     summary = pd.read_parquet(results / "tables/withheld_summary.parquet")
-    assert set(summary["check"]) == {"label", "effect", "many", "background", "field"}
+    assert set(summary["check"]) == {"label", "effect", "many", "background", "own", "field"}
     parts = pd.read_parquet(results / "tables/withheld_parts.parquet")
     assert set(parts["robot"]) == set(scores.query("check != 'field'").index.get_level_values("robot"))
     methods = pd.read_parquet(results / "timings/withheld_methods.parquet").set_index("method")

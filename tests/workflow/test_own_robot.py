@@ -1,6 +1,7 @@
 """Robots of a user's own, from a module and from files, the whole way from campaign to figures."""
 
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pandas as pd
@@ -142,6 +143,10 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
     row = fitted.loc[error]
     assert row["true_value"] == pytest.approx(0.002)
     assert "backlash" in result["gap_verdicts"]["effects"].iloc[0]
+    assert "play of axis1" in result["gap_verdicts"]["not_in_model"].iloc[0]
+    # the offset of the second drive is the turn of its joint's seat
+    seat = ElementTree.parse(tmp_path / "results/campaigns/own/corrected.urdf").find("joint[@name='axis2']/origin")
+    assert float(seat.get("rpy").split()[1]) == pytest.approx(0.002, abs=5e-4)
 
 
 def test_an_arm_of_dh_rows_with_a_joint_that_follows_goes_the_whole_way(tmp_path):
@@ -215,6 +220,16 @@ def test_the_example_hexapod_of_an_mjcf_file_goes_the_whole_way(tmp_path):
     assert set(hexapod.parts.columns) <= set(result["measurements"])
     verdict = result["gap_verdicts"].iloc[0]
     assert "backlash" in verdict["effects"] and verdict["where"].startswith(hexapod.parts.drives[0].site)
+    own = {"mjcf": str(tmp_path / "results/campaigns/own/corrected.xml"), "platform": "plate"}
+    corrected = make_mechanism("h", own, parameter_set="zero")
+    drives = pd.read_parquet(tmp_path / "results/campaigns/own/corrected_drives.parquet")
+    nominal, sent = (
+        drives[[prefix + one for one in hexapod.parts.columns]].to_numpy() for prefix in ("", "corrected_")
+    )
+    # one leg's length is off by 0.4, its servo's offset, and half of the play comes on top
+    assert np.median(nominal - sent, axis=0)[2] == pytest.approx(0.4, abs=0.06)
+    shorter = corrected.forward(nominal[:1] - [0.0, 0.0, 0.4, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(shorter, hexapod.forward(nominal[:1]), rtol=0.0, atol=0.05)
 
 
 def test_a_module_whose_platform_is_not_held_says_what_it_is_free_to_do(tmp_path, monkeypatch):

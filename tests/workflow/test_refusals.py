@@ -35,7 +35,7 @@ from tests.workflow.folder import dry_run, run
         ("gap: {known: {transmission_error: {teeth: 7}}}", "no known 'teeth'"),
         ("gap: {tolerence: 0.2}", "tolerence"),
         ("withheld: {effects: [wind]}", "withheld.effects has 'wind'"),
-        ("printers: {file: nothere.json}", "printers.file: there is no file nothere.json"),
+        ("printers: {files: [nothere.json]}", "printers.files: there is no file nothere.json"),
         ("delta: {lens_mm: 12.0}", "lens_mm"),
         ("delta: {tilted_views: {count: 2}}", "2 is less than the minimum of 3"),
         ("delta: {plane: {radius_mm: 2000.0}}", "delta.plane: a point is out of the robot's reach"),

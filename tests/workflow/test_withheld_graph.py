@@ -33,13 +33,13 @@ def _of(jobs, table):
 def test_the_plan_holds_the_check(jobs):
     rules = [rule for rule, _, _ in jobs]
     chunks = rules.count("withheld_diagnose")
-    assert chunks == 2 and rules.count("withheld_robots") == rules.count("withheld_score") == chunks
+    assert chunks == 3 and rules.count("withheld_robots") == rules.count("withheld_score") == chunks
     assert rules.count("withheld_summary") == 1
 
 
 def test_no_diagnosis_is_given_an_answer(jobs):
     answers = _of(jobs, "answers")
-    assert len(answers) == 2
+    assert len(answers) == 3
     assert {rule for rule, _, outputs in jobs if outputs & answers} == {"withheld_robots"}
     # the advised run is driven by the robot itself
     told = {"withheld_score", "withheld_methods", "withheld_advice"}
@@ -78,7 +78,13 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
     modules = _modules(script)
     assert {("gap", "diagnose"), ("gap", "case")} <= modules
     # of the study that draws the robots only how verdicts and corrected sims are written down, and other ways to them
-    own = {"__init__", "schemas", "states", *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ())}
+    own = {
+        "__init__",
+        "numbers",
+        "schemas",
+        "states",
+        *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ()),
+    }
     assert {name for package, name in modules if package == "withheld"} <= own
     # and the walk would see them
     assert {("withheld", name) for name in ("draw", "robots", "outside")} <= _modules("withheld_score")

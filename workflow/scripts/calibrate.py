@@ -5,13 +5,16 @@ import pandas as pd
 from rrru.fit import campaign_fit
 from rrru.fit.campaign_noise import Noise
 from rrru.fit.schemas import TABLES
-from rrru.store import tables
+from rrru.store import facts, tables
 from rrru.store.job import run
 from rrru.studies import setup
 
 
 def main(settings, inputs, outputs):
-    """Write the campaign's calibrations, parameters and their gauge, correlations and observability."""
+    """Write the campaign's calibrations, parameters and their gauge, correlations and observability.
+
+    And what the robot was taken for, with which the calibration can be applied to other measurements.
+    """
     nominal, info = settings["nominal"], tables.read(inputs["campaigns"]).iloc[0]
     measurements = tables.read(inputs["measurements"])
     calibration = campaign_fit.CalibrationSettings.from_config(settings["calibration"])
@@ -21,6 +24,8 @@ def main(settings, inputs, outputs):
     truth = setup.true_deviations(robot, settings["truth"])
     gauge = pd.DataFrame(list(robot.gauge.items()), columns=["number", "stands_for"])
     frames = {"gauge": gauge.assign(campaign=settings["campaign"])}
+    told = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
+    facts.write({"nominal": nominal, **told}, outputs["robot"])
     tables.write_all(TABLES, frames | campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 

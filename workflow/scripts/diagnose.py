@@ -1,14 +1,15 @@
-"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figure."""
+"""Diagnosis of one campaign's gap between the calibrated sim and what was measured, with its figures."""
 
 import pandas as pd
 
 from rrru.campaign.noise import read_noise
 from rrru.figures.drawing import draw_all
+from rrru.gap.answer import answer
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES, tables_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
-from rrru.store import tables
+from rrru.store import facts, tables
 from rrru.store.job import run
 from rrru.studies import setup
 
@@ -27,6 +28,7 @@ def main(settings, inputs, outputs):
         from rrru.gap.corrected_model import write_corrected
 
         result = write_corrected(result, settings["robot"]["dimensions"], masses, outputs["corrected"])
+    facts.write(answer(settings["campaign"], result.verdict, result.tables), outputs["verdict"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
     frames = {

@@ -3,13 +3,13 @@
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies.printers import printer_tables
-from rrru.studies.printers.readings import read
+from rrru.studies.printers.files import read_all
 from rrru.studies.printers.schemas import TABLES
 
 
 def main(settings, inputs, outputs):
     """Write the tables of the printers; says which saved answers do not belong to their readings."""
-    frames = printer_tables.tables(read(inputs["file"]), settings["printers"])
+    frames = printer_tables.tables(read_all(inputs["files"]), settings["printers"])
     columns = {table.name: table.names for table in TABLES}
     frames = {name: frame.reindex(columns=columns[name]) for name, frame in frames.items()}
     tables.write_all(TABLES, frames, outputs)

@@ -9,7 +9,8 @@ from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
 from rrru.studies.withheld.advice import advice_summary, ambiguous, follow
-from rrru.studies.withheld.robots import Conditions, Robot
+from rrru.studies.withheld.members import robot_of
+from rrru.studies.withheld.robots import Conditions
 from rrru.studies.withheld.schemas import TABLES
 
 
@@ -28,7 +29,7 @@ def main(settings, inputs, outputs):
         for name in [name for name in names if name in set(points["robot"])]:
             own = points[points["robot"] == name].drop(columns=["robot", "kind"]).reset_index(drop=True)
             known = MeasuredRobot(mechanism, masses, conditions.noise_mm, name)
-            result.extend(follow(Robot.from_json(drawn[name]), own, conditions, known, library))
+            result.extend(follow(robot_of(drawn[name]), own, conditions, known, library))
     columns = next(table.names for table in TABLES if table.name == "withheld_advice")
     followed = pd.DataFrame(result, columns=columns)
     frames = {"withheld_advice": followed, "withheld_advice_summary": advice_summary(followed)}

@@ -2,12 +2,14 @@
 
 import pandas as pd
 
+from rrru.gap.details import parameter_rows
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
+from rrru.studies.withheld.numbers import fitted
 from rrru.studies.withheld.schemas import TABLES
 from rrru.studies.withheld.states import VERDICT, state_row
 
@@ -15,16 +17,18 @@ from rrru.studies.withheld.states import VERDICT, state_row
 def main(settings, inputs, outputs):
     """Write verdicts, states and budgets of a chunk."""
     library = GapSettings.from_config(settings["gap"], settings["seed"])
-    robot, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
     noise_mm = settings["withheld"]["noise_mm"]
     verdicts, states, budgets = [], [], []
     for (name, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=False):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
-        check, taken_out = settings["robots"][name]
+        check, taken_out, file = settings["robots"][name]
         known = library.without(taken_out) if taken_out else library
-        result = diagnose(points, MeasuredRobot(robot, masses, noise_mm, name), known, details=False)
+        told = settings["files"].get(file, settings)
+        robot = setup.measured_robot(told["robot"], points) if file else setup.mechanism(told["robot"])
+        result = diagnose(points, MeasuredRobot(robot, Masses(**told["masses"]), noise_mm, name), known, details=False)
         verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
-        states.append(state_row(name, result.attribution.calibrated.deviations, result.state))
+        numbers = fitted(parameter_rows(result.attribution))
+        states.append(state_row(name, result.attribution.calibrated.deviations, result.state, numbers))
         budgets.append(result.tables["gap_budget"].assign(robot=name))
     frames = {
         "withheld_verdicts": pd.DataFrame(verdicts),

@@ -5,21 +5,24 @@ import pandas as pd
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.withheld.chunks import Member
-from rrru.studies.withheld.draw import draw
-from rrru.studies.withheld.robots import Conditions
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.withheld.members import all_conditions, drawn
+from rrru.studies.withheld.schemas import tables_of
 
 
 def main(settings, inputs, outputs):
     """Write answers and measurements of a chunk, one robot below the other."""
-    conditions = Conditions.from_config(settings)
-    robots = [draw(Member(*member), conditions) for member in settings["members"]]
-    driven = [robot.measured(conditions).assign(robot=robot.name, kind=robot.kind) for robot in robots]
+    conditions, answers, driven = all_conditions(settings), [], []
+    for member in map(Member._make, settings["members"]):
+        robot, measurements = drawn(member, conditions[member.file])
+        answers.append(robot.answer(conditions[member.file]))
+        driven.append(measurements.assign(robot=robot.name, kind=robot.kind))
     frames = {
-        "withheld_answers": pd.DataFrame([robot.answer(conditions) for robot in robots]),
+        "withheld_answers": pd.DataFrame(answers),
         "withheld_measurements": pd.concat(driven, ignore_index=True),
     }
-    tables.write_all(TABLES, frames, outputs)
+    names = frames["withheld_measurements"].columns
+    # the drives are those of all robots of the chunk
+    tables.write_all(tables_of(conditions[member.file].mechanism, names), frames, outputs)
 
 
 if __name__ == "__main__":

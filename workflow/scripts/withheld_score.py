@@ -3,7 +3,7 @@
 from rrru.gap.settings import GapSettings
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.robots import Conditions
+from rrru.studies.withheld.members import Known, all_conditions
 from rrru.studies.withheld.schemas import TABLES
 from rrru.studies.withheld.score import score_chunk
 
@@ -11,9 +11,9 @@ from rrru.studies.withheld.score import score_chunk
 def main(settings, inputs, outputs):
     """Write scores, limits and parts of the gaps of the robots of a chunk."""
     frames = {name.removeprefix("withheld_"): tables.read(path) for name, path in inputs.items()}
-    conditions = Conditions.from_config(settings)
-    library = GapSettings.from_config(settings["gap"]).library(conditions.mechanism)
-    scored = score_chunk(**frames, conditions=conditions, library=library)
+    gap = GapSettings.from_config(settings["gap"])
+    known = {name: Known(one, gap.library(one.mechanism)) for name, one in all_conditions(settings).items()}
+    scored = score_chunk(**frames, known=known)
     tables.write_all(TABLES, {f"withheld_{name}": frame for name, frame in scored._asdict().items()}, outputs)
 
 

@@ -54,7 +54,9 @@ def register(measured_mm, command_mm):
 
 def _require_spread(name, position):
     """Raise FitError unless the points (n, 3) span a plane well enough."""
-    count, distinct = len(position), len(np.unique(position, axis=0))
+    count, others, distinct = len(position), position, 0
+    while distinct < 3 and len(others):
+        others, distinct = others[(others != others[0]).any(axis=1)], distinct + 1
     if distinct < 3:
         raise FitError(f"{distinct} different {name} positions; allowed: at least 3, not on one line")
     along, off, _ = np.linalg.svd(position - position.mean(axis=0), compute_uv=False) / np.sqrt(count)

@@ -9,6 +9,7 @@ _OPEN = {"markerfacecolor": "white"}
 _VERDICTS = {
     "reproduced": {"color": style.BLUE, "marker": "o"},
     "does not belong": {"color": style.VERMILION, "marker": "D"} | _OPEN,
+    "not calibrated": {"color": style.ORANGE, "marker": "s"} | _OPEN,
 }
 _HEIGHT = {"color": style.BLUE, "marker": "o"}
 _DISTANCE = {"color": style.ORANGE, "marker": "^"}

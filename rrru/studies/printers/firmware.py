@@ -6,7 +6,8 @@ knowing its path: with the Hessian H of the cost in these numbers, each of which
 
     |saved - best|_i <= s sum_j |H^-1|_ij H_jj
 
-A saved number beyond this was not found from these readings.
+A saved number beyond this, and beyond its own rounding, was not found from these readings. The firmware saves six
+decimals; three of the endstops, where it applies a Z offset to them.
 """
 
 import numpy as np
@@ -17,11 +18,14 @@ NAMES = ("radius", "angle_a", "angle_b", "endstop_a", "endstop_b", "endstop_c", 
 UNITS = ("mm", "deg", "deg", *("mm",) * 6)
 # the firmware's weights: all squared heights together count twice as much as all squared distances
 _HEIGHTS_COUNT = 2.0
+_SAVED, _OFFSET = 5e-7, 5e-4
 
 
 def residuals_of(printer, parameter_set=None):
     """Residuals of a printer's readings with the firmware's weights; by default of the parameters they calibrate."""
-    heights, distances = len(printer.height_mm), len(printer.distance_mm)
+    distances, probed = len(printer.distance_mm), np.count_nonzero(~printer.by_hand)
+    # heights entered by hand beside probed ones are not counted
+    heights = probed or len(printer.height_mm)
     weight = _HEIGHTS_COUNT * distances / heights if distances else 1.0
     ways = -printer.height_drop_mm, printer.height_mm, -printer.distance_drop_mm, printer.distance_mm
     return HeightResiduals(printer.mechanism(parameter_set), *ways, weight)
@@ -37,6 +41,12 @@ def own_numbers(mechanism, deviations):
     slope[3:6, 0], slope[3:6, 6:] = radius / root, -np.diag(arm / root)
     count = len(deviations)
     return np.array([radius, *angle[:2], *(legs[:, 0] - root), *arm])[:count], slope[:count, :count]
+
+
+def rounding(printer):
+    """Half the last decimal (9,) of a printer's saved numbers, NAMES in UNITS."""
+    endstops = printer.endstop_mm
+    return np.where(np.arange(9) // 3 == 1, _OFFSET if (np.round(endstops, 3) == endstops).all() else _SAVED, _SAVED)
 
 
 def own_jacobian(residuals, deviations):

@@ -22,8 +22,8 @@ class LeftOut:
     """Every reading against the fit of the others.
 
     difference_mm (n,): reading less what they foretell. ratio (n,): that over its standard error, under the firmware's
-    ratio of noises. p (n,): of so large a ratio anywhere among the readings, the largest over the ratios of noises. The
-    last two are NaN where the others leave no freedom.
+    ratio of noises. p (n,): of so large a ratio anywhere among the readings; see `cause_tests`. The last two are NaN
+    where the others leave no freedom.
     """
 
     difference_mm: np.ndarray
@@ -61,7 +61,7 @@ class Cause:
     """One possible cause of what a calibration leaves.
 
     freedom_used: numbers that it adds. explained_share: of the sum of squares left, under the firmware's ratio of
-    noises. p: that noise would explain as much, the largest over the ratios; NaN without freedom. estimate,
+    noises. p: that noise would explain as much; NaN without freedom. estimate,
     standard_error: in `unit`, NaN but for causes with one number. imitated_by: causes that hold what it explains.
     """
 
@@ -95,6 +95,10 @@ class Level:
         number too; a bad reading is a matter of its own file.
         """
         return self.level / (1 + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
+
+    def of_one_more(self, tests):
+        """The limit for one cause of the machine more than those, asked for beside them."""
+        return self.level / (2 + len(tests.columns)) / self.pieces
 
 
 def causes(result, left, level):
@@ -146,7 +150,7 @@ def _bad_reading(tests, left, level):
     imitators = tests.imitators(BAD_READING, level.imitated_from, suspect or 0)
     share = p = estimate = error = np.nan
     if suspect is not None:
-        share = _share(tests, tests.bases[BAD_READING][0][suspect])
+        share = _share(tests, tests.bases[BAD_READING][suspect])
         p, estimate = left.p[suspect], left.difference_mm[suspect]
         error = estimate / left.ratio[suspect]
     verdict = _verdict(p, imitators, level.limit(tests, BAD_READING))
@@ -157,7 +161,7 @@ def _acting_on_all(tests, level):
     """The causes that act on all readings, a list."""
     answers = []
     for name, (_, unit) in tests.columns.items():
-        basis, p, imitators = tests.bases[name][0][0], float(tests.p(name)), tests.imitators(name, level.imitated_from)
+        basis, p, imitators = tests.bases[name][0], float(tests.p(name)), tests.imitators(name, level.imitated_from)
         verdict = _verdict(p, imitators, level.limit(tests, name), lambda name=name: tests.p_without_any(name))
         rank, share = basis.shape[1], _share(tests, basis)
         answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict))
@@ -166,5 +170,5 @@ def _acting_on_all(tests, level):
 
 def _share(tests, basis):
     """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
-    left = tests.weighings[0].left(tests.readings_mm)
+    left = tests.own_weighing.left(tests.readings_mm)
     return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)

@@ -9,10 +9,10 @@ from scipy import special
 from rrru.errors import FitError
 from rrru.fit.identifiability import analyse_columns, parameter_scale
 from rrru.fit.least_squares import Fit, least_squares
-from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, stop
+from rrru.studies.printers import steps
+from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, rounding, stop
 from rrru.studies.printers.heights import HeightResiduals
-from rrru.studies.printers.readings import Printer
-from rrru.studies.printers.saved_answers import changed_steps
+from rrru.studies.printers.printer import Printer
 
 _CONFIDENCE = 0.95
 # heights of the dense probing
@@ -21,12 +21,16 @@ _DENSE = 100
 
 @dataclass(frozen=True)
 class PrinterFit:
-    """A printer, its residuals, their fit and the step at which the firmware's program stops (mm and degrees)."""
+    """A printer, its residuals, their fit and the step at which the firmware's program stops (mm and degrees).
+
+    printer: its ways in the steps that its readings were counted in, step_factors (3,) as long as the file says.
+    """
 
     printer: Printer
     residuals: HeightResiduals
     fit: Fit
     stopping_step: float
+    step_factors: np.ndarray
 
     @property
     def names(self):
@@ -51,7 +55,12 @@ class PrinterFit:
     @property
     def agrees(self):
         """Which saved numbers (p,) are those of the readings."""
-        return np.abs(self.saved - self.fitted) <= self.tolerance
+        return np.abs(self.saved - self.fitted) <= self.slack
+
+    @property
+    def slack(self):
+        """How far (p,) saved numbers of these readings can lie from the best ones: the program's stop and rounding."""
+        return self.tolerance + rounding(self.printer)[: len(self.names)]
 
     @property
     def freedom(self):
@@ -78,18 +87,24 @@ class PrinterFit:
         return self.standard_errors * special.stdtrit(self.freedom, 0.5 + 0.5 * _CONFIDENCE)
 
 
-def fit_printer(printer, stopping_step):
-    """Calibrate a printer from its readings; raises FitError naming it where that fails or its numbers run away."""
-    residuals = residuals_of(printer)
+def fit_printer(printer, stopping_step, level):
+    """Calibrate a printer from its readings, in the steps that they were counted in.
+
+    level: of saying that these are not those of the file, see `steps`. Raises FitError naming the printer where that
+    fails or its numbers run away.
+    """
+    factors = steps.changed_steps(printer, level)
+    printer = steps.with_steps(printer, factors)
     try:
+        residuals = residuals_of(printer)
         fit = least_squares(residuals)
         if fit.at_bound.any() or fit.identifiability.rank < len(fit.deviations):
             allowed = "readings over the whole bed, with the steps that the file states"
             raise FitError(f"the readings do not hold its numbers; allowed: {allowed}", fit)
     except (FitError, ValueError, np.linalg.LinAlgError) as error:
-        told = "; ".join(filter(None, [str(error), changed_steps(printer, stopping_step)]))
+        told = "; ".join(filter(None, [str(error), steps.told(factors)]))
         raise FitError(f"{printer.name}: {told}", getattr(error, "result", None)) from None
-    return PrinterFit(printer, residuals, fit, stopping_step)
+    return PrinterFit(printer, residuals, fit, stopping_step, factors)
 
 
 def common_arm_error(result):
@@ -102,13 +117,16 @@ def common_arm_error(result):
 
 def dense_arm_error(result):
     """The same in mm for 100 heights with the noise of its own, spread evenly over their disc (a sunflower's seeds)."""
-    mechanism, seeds = result.residuals.mechanism, np.arange(_DENSE)
+    return _common_arm_error(result, result.residuals.mechanism.inverse(even_places(result, _DENSE)))
+
+
+def even_places(result, count):
+    """Places (count, 3) in mm on the disc of a printer's heights, as evenly as a sunflower's seeds."""
+    mechanism, seeds = result.residuals.mechanism, np.arange(count)
     reach = np.linalg.norm(mechanism.forward(-result.printer.height_drop_mm)[:, :2], axis=1).max()
-    radius, turn = reach * np.sqrt((seeds + 0.5) / _DENSE), seeds * np.pi * (3.0 - np.sqrt(5.0))
-    height = np.full(_DENSE, result.printer.height_mm.mean())
-    return _common_arm_error(
-        result, mechanism.inverse(np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1))
-    )
+    radius, turn = reach * np.sqrt((seeds + 0.5) / count), seeds * np.pi * (3.0 - np.sqrt(5.0))
+    height = np.full(count, result.printer.height_mm.mean())
+    return np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
 
 
 def _common_arm_error(result, actuators):

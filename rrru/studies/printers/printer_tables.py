@@ -9,51 +9,60 @@ from scipy.sparse import csgraph
 from rrru.errors import FitError
 from rrru.studies.printers.cause_tests import CauseTests
 from rrru.studies.printers.firmware import NAMES, UNITS
-from rrru.studies.printers.printer_causes import FOUND, Level, causes, diagnosis, left_out
-from rrru.studies.printers.printer_fit import common_arm_error, dense_arm_error, fit_printer
-from rrru.studies.printers.saved_answers import reason
+from rrru.studies.printers.judge import FAILED, judge
+from rrru.studies.printers.printer import Refused
+from rrru.studies.printers.printer_causes import Level
+from rrru.studies.printers.printer_fit import common_arm_error, dense_arm_error
 
-REPRODUCED, FOREIGN, FAILED = "reproduced", "does not belong", "not fitted"
 # below this freedom the standard errors are themselves hardly known
 _LITTLE_FREEDOM = 3
 _NOT_FITTED = {"numbers": 0, "freedom": 0, "rank": 0, "largest_difference_in": "", "verdict": FAILED}
-_NOT_FITTED |= {"suspect": "", "cause": "not decidable", "notes": ""}
+_NOT_FITTED |= {"suspect": "", "cause": "not decidable", "effector_tilt": "", "notes": ""}
 
 
 def tables(printers, settings):
     """Frames by table name: printers, printer_parameters, printer_readings, printer_causes.
 
     settings: `stopping_step`, `level` and `imitated_from` of the configuration's `printers` section. A printer that
-    cannot be fitted has a row in `printers` that says why, and none elsewhere. Printers that share readings are one
-    piece of evidence; for causes of the machines the level is divided by the pieces in which something can be found.
+    cannot be read or fitted has a row in `printers` that says why, and none elsewhere. Printers that share readings are
+    one piece of evidence; for causes of the machines the level is divided by the pieces in which anything can be found.
     """
     rows = {name: [] for name in ("printers", "printer_parameters", "printer_readings", "printer_causes")}
-    twins, groups = _shared_readings(printers), _groups(printers)
-    pieces = max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
-    level = Level(settings["level"], settings["imitated_from"], pieces)
+    sound = [printer for printer in printers if not isinstance(printer, Refused)]
+    twins, groups = _shared_readings(sound), _groups(sound)
+    level = level_of(sound, settings, groups)
     for printer in printers:
-        labels = {"printer": printer.name, "source": printer.source, "evidence": groups[printer.name]}
+        labels = {"printer": printer.name, "source": printer.source, "evidence": groups.get(printer.name, printer.name)}
+        if isinstance(printer, Refused):
+            failed = {"heights": 0, "distances": 0, "reason": printer.reason}
+            rows["printers"].append(labels | _NOT_FITTED | failed)
+            continue
         labels |= {"heights": len(printer.height_mm), "distances": len(printer.distance_mm)}
         try:
-            result = fit_printer(printer, settings["stopping_step"])
-            left = left_out(result)
+            judged = judge(printer, settings["stopping_step"], level)
         except FitError as error:
             rows["printers"].append(labels | _NOT_FITTED | {"reason": str(error)})
             continue
-        answers = causes(result, left, level)
-        rows["printers"].append(labels | _printer_row(result, left, answers, twins[printer.name]))
-        rows["printer_parameters"].append(_parameter_rows(result))
-        rows["printer_readings"].append(_reading_rows(result, left, answers[0].verdict == FOUND))
-        rows["printer_causes"].append(_cause_rows(result, answers, level))
+        rows["printers"].append(labels | _printer_row(judged, twins[printer.name]))
+        rows["printer_parameters"].append(_parameter_rows(judged))
+        rows["printer_readings"].append(_reading_rows(judged))
+        rows["printer_causes"].append(_cause_rows(judged))
     frames = {name: pd.concat(parts, ignore_index=True) for name, parts in rows.items() if name != "printers" and parts}
     return {name: pd.DataFrame() for name in rows} | frames | {"printers": pd.DataFrame(rows["printers"])}
 
 
-def _printer_row(result, left, answers, twins):
+def level_of(printers, settings, groups=None):
+    """The Level for printers that are asked together."""
+    groups = _groups(printers) if groups is None else groups
+    pieces = max(len({groups[printer.name] for printer in printers if _decides(printer)}), 1)
+    return Level(settings["level"], settings["imitated_from"], pieces)
+
+
+def _printer_row(judged, twins):
     """Row of `printers`, but for what identifies it."""
+    result, suspect, tilt = judged.result, judged.suspect, judged.tilt
     difference = np.abs(result.saved - result.fitted)
-    worst, suspect, why = int(difference.argmax()), left.suspect, reason(result)
-    common, dense = common_arm_error(result), dense_arm_error(result)
+    worst, common, dense = int(difference.argmax()), common_arm_error(result), dense_arm_error(result)
     return {
         "numbers": len(result.names),
         "freedom": result.freedom,
@@ -69,12 +78,15 @@ def _printer_row(result, left, answers, twins):
         "arm_standard_error_mm": max(result.standard_errors[6:], default=np.nan),
         "common_arm_standard_error_mm": common,
         "dense_common_arm_standard_error_mm": dense,
-        "verdict": FOREIGN if why else REPRODUCED,
-        "reason": why,
+        "verdict": judged.verdict,
+        "reason": judged.reason,
         "suspect": "" if suspect is None else result.reading_name(suspect),
-        "suspect_p": np.nan if suspect is None else left.p[suspect],
-        "cause": diagnosis(answers),
-        "notes": "; ".join([*_notes(result, answers, common, dense), *twins]),
+        "suspect_p": np.nan if judged.left.suspect is None else judged.left.p[judged.left.suspect],
+        "cause": judged.cause,
+        "effector_tilt": "" if tilt is None else tilt.text,
+        "effector_tilt_p": np.nan if tilt is None else tilt.p,
+        "effector_tilt_power": np.nan if tilt is None else tilt.power,
+        "notes": "; ".join([*_notes(result, judged.causes, common, dense), *twins]),
     }
 
 
@@ -138,8 +150,9 @@ def _decides(printer):
     return len(printer.height_mm) + len(printer.distance_mm) - len(printer.mechanism().parameters) > 1
 
 
-def _parameter_rows(result):
+def _parameter_rows(judged):
     """Rows of `printer_parameters`, all nine numbers; what was not calibrated is NaN but for what was saved."""
+    result, others = judged.result, judged.without_suspect
     saved = np.concatenate([result.saved, result.printer.arm_mm])[: len(NAMES)]
     calibrated = {
         "fitted": result.fitted,
@@ -148,14 +161,16 @@ def _parameter_rows(result):
         "standard_error": result.standard_errors,
         "half_width_95": result.half_widths,
         "agrees": result.agrees,
+        "without_suspect": np.nan if others is None else others.fitted,
     }
     rows = pd.DataFrame({"parameter": NAMES, "unit": UNITS, "saved": saved}).join(pd.DataFrame(calibrated))
     agrees = rows["agrees"].ne(False)
     return rows.assign(printer=result.printer.name, calibrated=rows["fitted"].notna(), agrees=agrees)
 
 
-def _reading_rows(result, left, bad):
-    """Rows of `printer_readings`; bad: whether the suspect is a bad reading."""
+def _reading_rows(judged):
+    """Rows of `printer_readings`."""
+    result, left = judged.result, judged.left
     residuals, count = _residuals(result), len(result.residuals)
     names = [result.reading_name(reading).split() for reading in range(count)]
     return pd.DataFrame(
@@ -169,15 +184,16 @@ def _reading_rows(result, left, bad):
             "left_out_mm": left.difference_mm,
             "studentised": left.ratio,
             "p": left.p,
-            "flagged": bad & (np.arange(count) == left.suspect),
+            "flagged": judged.flagged & (np.arange(count) == left.suspect),
         }
     )
 
 
-def _cause_rows(result, answers, level):
+def _cause_rows(judged):
     """Rows of `printer_causes`."""
+    result, level = judged.result, judged.level
     tests, rows = CauseTests(result), []
-    for one in answers:
+    for one in judged.causes:
         limit = level.limit(tests, one.cause)
         hopeless = not _decides(result.printer) or tests.always_imitated(one.cause, level.imitated_from)
         detectable = np.nan if hopeless else tests.detectable_mm(one.cause, limit)

@@ -17,21 +17,25 @@ from their endstops. `z_mm`: the nozzle's true height there. `mm`: caliper dista
 such triples. One microstep is rotation_distance / (full_steps x microsteps), divided by gear ratios such as "3:1",
 unless step_mm gives it. `source`, `distances`, `gear_ratio` and `step_mm` may be absent; so may
 `program_height_rms_mm`, `program_distance_rms_mm` and `refit_max_difference`, which are not read.
+
+"probe_offset_mm": [x, y], of a printer or of one height: where the probe sits beside the nozzle; [0, 0] for a height
+that the nozzle touched by itself. "calibrated": false where the saved numbers are not said to come from the readings.
 """
 
 import json
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from rrru.campaign.ingest.problems import Problems
-from rrru.robots.linear_delta import linear_delta
+from rrru.errors import IngestError
+from rrru.studies.printers.printer import Printer, Refused
 
 _TOWERS = ("a", "b", "c")
 _SIZES = ("angle_deg", "arm_mm", "endstop_mm")
 _DRIVE = ("rotation_distance_mm", "microsteps", "full_steps")
+_OPTIONAL = ("source", "distances", "probe_offset_mm", "calibrated")
 _NOT_READ = ("program_height_rms_mm", "program_distance_rms_mm", "refit_max_difference")
 _TEETH = r"\s*[1-9]\d*(\.\d+)?\s*:\s*[1-9]\d*(\.\d+)?\s*"
 _GEARS = re.compile(f"{_TEETH}(,{_TEETH})*")
@@ -39,39 +43,11 @@ _GEARS = re.compile(f"{_TEETH}(,{_TEETH})*")
 _NUMBERS = {"heights": 6, "distances": 9}
 
 
-@dataclass(frozen=True)
-class Printer:
-    """One printer: numbers as saved per tower a, b, c, readings, and carriages' ways down from the endstops in mm.
-
-    angle_deg, arm_mm, endstop_mm, step_mm: (3,). height_mm: (n,), height_drop_mm: (n, 3). distance_mm: (m,),
-    distance_drop_mm: (m, 2, 3).
-    """
-
-    name: str
-    source: str
-    radius_mm: float
-    angle_deg: np.ndarray
-    arm_mm: np.ndarray
-    endstop_mm: np.ndarray
-    step_mm: np.ndarray
-    height_mm: np.ndarray
-    height_drop_mm: np.ndarray
-    distance_mm: np.ndarray
-    distance_drop_mm: np.ndarray
-
-    @property
-    def parameter_set(self):
-        """Which numbers its readings calibrate: "distances" where there are any, else "heights"."""
-        return "distances" if len(self.distance_mm) else "heights"
-
-    def mechanism(self, parameter_set=None):
-        """The printer with its saved numbers as nominal ones; by default with the parameters that it calibrates."""
-        saved = self.radius_mm, np.radians(self.angle_deg), self.arm_mm, self.endstop_mm
-        return linear_delta(*saved, parameter_set or self.parameter_set)
-
-
 def read(path):
-    """Printers of a file, a tuple; raises IngestError with every problem that it has, naming printer and field."""
+    """Printers of a file, a tuple; one that is wrong is a `Refused` that names every field.
+
+    Raises IngestError where the file holds no list of printers, or none that is sound.
+    """
     problems = Problems(path)
     try:
         content = json.loads(Path(path).read_text())
@@ -84,22 +60,22 @@ def read(path):
     names = [str(entry.get("id", f"number {k}")) for k, entry in enumerate(content, start=1)]
     for name in sorted({name for name in names if names.count(name) > 1}):
         problems.add("id", column=name, value="an id that several printers have", allowed="an id per printer")
-    printers = tuple(_Reader(name, problems).printer(entry) for name, entry in zip(names, content, strict=True))
     problems.refuse()
-    for printer in printers:
-        _check_reach(printer, problems)
-    problems.refuse()
+    printers = tuple(printer_of(path, name, entry) for name, entry in zip(names, content, strict=True))
+    if all(isinstance(printer, Refused) for printer in printers):
+        raise IngestError([problem for printer in printers for problem in printer.problems])
     return printers
 
 
-def _check_reach(printer, problems):
-    """Note readings at which the saved printer's arms do not meet."""
-    robot, lost = printer.mechanism(), "a place that the saved printer cannot take"
-    for field, drops in (("heights", printer.height_drop_mm[:, None]), ("distances", printer.distance_drop_mm)):
-        for number, drop in enumerate(drops, start=1):
-            if np.isnan(robot.forward(-drop)).any():
-                where = f"{printer.name}: {field}, number {number}"
-                problems.add("reach", column=where, value=lost, allowed="its own readings")
+def printer_of(path, name, entry):
+    """The printer of an entry in the JSON's form, a Refused where something is wrong with it."""
+    problems = Problems(path)
+    printer = _Reader(name, problems).printer(entry)
+    try:
+        problems.refuse()
+    except IngestError as error:
+        return Refused(name, str(entry.get("source", "")), error.problems)
+    return printer
 
 
 class _Reader:
@@ -114,7 +90,7 @@ class _Reader:
 
     def printer(self, entry):
         """The printer of an entry, None where something is wrong with it."""
-        self._keys("", entry, ("id", "radius_mm", "towers", "heights"), ("source", "distances", *_NOT_READ))
+        self._keys("", entry, ("id", "radius_mm", "towers", "heights"), (*_OPTIONAL, *_NOT_READ))
         towers = self._of_kind(entry, "towers", dict)
         self._keys("towers", towers, _TOWERS)
         towers = {name: self._of_kind(towers, name, dict, "towers.") for name in _TOWERS}
@@ -132,6 +108,7 @@ class _Reader:
         step = np.array([self._step(f"towers.{name}", tower) for name, tower in towers.items()])
         height, height_steps = self._readings(entry, "heights", "z_mm", ("stable",))
         distance, distance_steps = self._readings(entry, "distances", "mm", ("stable1", "stable2"))
+        probe = self._probe(entry)
         radius = self._number("radius_mm", entry.get("radius_mm"), positive=True)
         self._counts(len(height), len(distance))
         if self._sound and not (arm > radius).all():
@@ -139,7 +116,28 @@ class _Reader:
         if not self._sound:
             return None
         saved = str(entry.get("source", "")), radius, angle, arm, endstop, step
-        return Printer(self._name, *saved, height, height_steps[:, 0] * step, distance, distance_steps * step)
+        ways = height_steps[:, 0] * step, distance, distance_steps * step
+        return Printer(self._name, *saved, height, *ways, probe, entry.get("calibrated", True) is True)
+
+    def _probe(self, entry):
+        """Offsets (n, 2) of the probe from the nozzle at the heights, NaN where nobody says."""
+        everywhere = self._offset("probe_offset_mm", entry.get("probe_offset_mm"), [np.nan, np.nan])
+        heights = [one for one in self._of_kind(entry, "heights", list) if isinstance(one, dict)]
+        return np.array(
+            [
+                self._offset(f"heights, number {number}, probe_offset_mm", one.get("probe_offset_mm"), everywhere)
+                for number, one in enumerate(heights, start=1)
+            ]
+        ).reshape(-1, 2)
+
+    def _offset(self, field, value, otherwise):
+        """An offset in x and y."""
+        if value is None:
+            return otherwise
+        if isinstance(value, list) and len(value) == 2:
+            return [self._number(field, "null" if number is None else number) for number in value]
+        self._refuse(field, repr(value), "two numbers, mm in x and y from the nozzle")
+        return otherwise
 
     def _keys(self, place, mapping, needed, optional=()):
         """Note keys that are missing and keys that nobody knows."""
@@ -190,7 +188,7 @@ class _Reader:
             if not isinstance(reading, dict):
                 self._refuse(where, repr(reading), "a mapping")
                 continue
-            self._keys(where, reading, (size, *places))
+            self._keys(where, reading, (size, *places), ("probe_offset_mm",) * (field == "heights"))
             sizes.append(self._number(f"{where}, {size}", reading.get(size), positive=size == "mm"))
             steps.append([self._triple(f"{where}, {place}", reading.get(place)) for place in places])
         return np.array(sizes), np.array(steps).reshape(-1, len(places), 3)

@@ -6,61 +6,84 @@ import numpy as np
 from scipy import optimize
 
 from rrru.errors import FitError
-from rrru.studies.printers.firmware import own_jacobian, residuals_of, stop
+from rrru.studies.printers import steps
+from rrru.studies.printers.firmware import own_jacobian, residuals_of, rounding, stop
 
-_ENDSTOPS = {"endstop_a", "endstop_b", "endstop_c"}
-# changes of the microstep setting that are tried
-_STEP_FACTORS = (0.0625, 0.125, 0.25, 0.5, 2.0, 4.0, 8.0, 16.0)
+_ENDSTOPS = ("endstop_a", "endstop_b", "endstop_c")
 _UNKNOWN = "unknown: no number is that of the readings, nor with other steps, arms or one other reading"
 _AFTER = "changed after the calibration"
 
 
 def reason(result):
     """Why the saved answer of a PrinterFit is not that of the readings, as far as they tell; empty where it is."""
+    return _joined(steps.told(result.step_factors), _changed_numbers(result))
+
+
+def _joined(*parts):
+    """Sentences that say something."""
+    return "; ".join(filter(None, parts))
+
+
+def _changed_numbers(result):
+    """Which of the answer's numbers, arms or readings were changed."""
     differ = [name for name, same in zip(result.names, result.agrees, strict=True) if not same]
     if not differ:
         return ""
-    shift = (result.saved - result.fitted)[3:6]
-    if set(differ) == _ENDSTOPS and np.ptp(shift) <= 2.0 * result.tolerance[3:6].max():
-        moved = "the zero of the heights was moved after the calibration"
-        return f"all endstops are {shift.mean():+.3f} mm off alike: {moved}"
-    if len(differ) < len(result.names):
-        return f"overwritten after the calibration: {', '.join(differ)}; the other numbers are those of the readings"
-    steps = changed_steps(result.printer, result.stopping_step)
-    return steps or _changed_arms(result) or _changed_reading(result) or _UNKNOWN
+    offset, shift = "", (result.saved - result.fitted)[3:6]
+    moved = 0.5 * (shift.min() + shift.max())
+    if set(_ENDSTOPS) <= set(differ) and (np.abs(shift - moved) <= result.slack[3:6]).all():
+        differ = [name for name in differ if name not in _ENDSTOPS]
+        offset = _z_offset(moved)
+    if not differ:
+        return offset
+    # an arm and a Z offset are two changes
+    if len(differ) > 2 and (arms := _changed_arms(result)):
+        return arms
+    if len(differ) < len(result.names) - len(_ENDSTOPS) * bool(offset):
+        rest = "the other numbers are those of the readings"
+        return _joined(f"overwritten after the calibration: {', '.join(differ)}; {rest}", offset)
+    return _changed_reading(result) or _UNKNOWN
 
 
-def changed_steps(printer, stopping_step):
-    """Says by how much the microsteps' length was changed, if the answer belongs to the readings with that."""
-    for factor in _STEP_FACTORS:
-        drops = {key: factor * getattr(printer, key) for key in ("height_drop_mm", "distance_drop_mm")}
-        if _belongs(replace(printer, **drops), stopping_step):
-            return f"the answer belongs to steps {factor:g} times as long: steps or microsteps were {_AFTER}"
-    return ""
+def _z_offset(moved_mm):
+    """What to say of endstops that were moved alike."""
+    return f"a Z offset was applied after the calibration: all endstops are {moved_mm:+.3f} mm off alike"
 
 
 def _changed_arms(result):
-    """Says by how much all arms were changed, if the answer of heights belongs to the readings with that."""
+    """Says by how much one arm, or all, were changed, if the answer of heights belongs to the readings with that.
+
+    A Z offset may have been applied beside.
+    """
     printer = result.printer
-    if printer.parameter_set != "heights":
-        return ""
+    for arms in (*np.eye(3), np.ones(3)) if printer.parameter_set == "heights" else ():
 
-    def with_arms(change):
-        return replace(printer, arm_mm=printer.arm_mm + change)
+        def before(change, arms=arms):
+            return replace(printer, arm_mm=printer.arm_mm + change[0] * arms, endstop_mm=printer.endstop_mm - change[1])
 
+        change = _change_that_belongs(before, rounding(printer), result.stopping_step)
+        if change is not None:
+            now, then = (one.arm_mm[arms > 0.0] for one in (printer, before(change)))
+            which = "all arms were" if len(now) == 3 else f"arm_{'abc'[int(arms.argmax())]} was"
+            told = f"the answer belongs to {now[0]:.3f} mm being {then.mean():.3f} mm: {which} {_AFTER}"
+            return _joined(told, _z_offset(change[1]) if abs(change[1]) > result.slack[3:6].max() else "")
+    return ""
+
+
+def _change_that_belongs(before, rounded, stopping_step):
+    """The change (2,) under which a printer's saved numbers are those of its readings, None if there is none."""
     try:
-        change = optimize.least_squares(lambda change: _off(with_arms(change), result.stopping_step), [0.0]).x[0]
-    except FitError:
-        return ""
-    if not _belongs(with_arms(change), result.stopping_step):
-        return ""
-    return f"the answer belongs to arms of {np.mean(printer.arm_mm + change):.3f} mm: the arms were {_AFTER}"
+        found = optimize.least_squares(lambda change: _off(before(change), rounded, stopping_step), np.zeros(2))
+    except (FitError, ValueError):
+        return None
+    # where one change leaves no number off by more than 1, the change of least squares leaves no more than p in sum
+    return found.x if (found.fun**2).sum() <= len(found.fun) else None
 
 
 def _changed_reading(result):
     """Says which reading was changed, and from what, if the answer belongs to the readings with that."""
     residuals = result.residuals
-    moves, off = _moves(residuals, result.stopping_step)
+    moves, off = _moves(residuals, rounding(result.printer), result.stopping_step)
     changes = -(off @ moves) / (moves**2).sum(axis=0)
     for reading in np.flatnonzero((np.abs(off[:, None] + moves * changes) <= 1.0).all(axis=0)):
         before = residuals.measured_mm[reading] + changes[reading] / residuals.root_weight[reading]
@@ -69,22 +92,15 @@ def _changed_reading(result):
     return ""
 
 
-def _moves(residuals, stopping_step):
-    """How far the best numbers move (p, n) per reading, and are off now (p,), in shares of the other program's stop."""
+def _moves(residuals, rounded, stopping_step):
+    """How far the best numbers move (p, n) per reading, and are off now (p,), in shares of what they may be off by."""
     start = residuals.mechanism.parameters.nominal
     jacobian = own_jacobian(residuals, start)
-    moves = np.linalg.pinv(jacobian) / stop(jacobian, stopping_step)[:, None]
+    slack = stop(jacobian, stopping_step) + rounded[: len(start)]
+    moves = np.linalg.pinv(jacobian) / slack[:, None]
     return moves, moves @ residuals.residual(start)[:, 0]
 
 
-def _off(printer, stopping_step):
+def _off(printer, rounded, stopping_step):
     """How far (p,) the saved numbers are from those of the readings, one Gauss-Newton step; see `_moves`."""
-    return _moves(residuals_of(printer), stopping_step)[1]
-
-
-def _belongs(printer, stopping_step):
-    """Whether a printer's saved numbers are those of its readings."""
-    try:
-        return bool((np.abs(_off(printer, stopping_step)) <= 1.0).all())
-    except FitError:
-        return False
+    return _moves(residuals_of(printer), rounded, stopping_step)[1]

@@ -33,14 +33,19 @@ arm_standard_error_mm  float? largest standard error of an arm's length; null wh
 common_arm_standard_error_mm float? standard error of the arms' common length if heights alone had to give it: they
     hardly see the scale
 dense_common_arm_standard_error_mm float? the same for 100 heights of the same noise, spread over the same disc
-verdict                str    whether the saved answer is that of these readings; not fitted: the readings give no
-    answer {reproduced, does not belong, not fitted}
+verdict                str    whether the saved answer is that of these readings; not calibrated: nobody says that it
+    is; not fitted: the readings give no answer {reproduced, does not belong, not calibrated, not fitted}
 reason                 str    why it does not belong, as far as the readings tell; empty where it does
-suspect                str    reading that fits worst; empty where nothing tells
-suspect_p              float? probability of so bad a reading among all of them by noise alone, the largest over the
-    noises' ratios
+suspect                str    reading that noise hardly explains, p below the limit in printer_causes; empty where there
+    is none
+suspect_p              float? probability of a reading as bad as the worst one among all of them by noise alone
 cause                  str    cause of what the calibration leaves; none found; or not decidable, with those that it
     could be
+effector_tilt          str    whether unequal rods of an arm tilt the platform, or what more to probe; empty where no
+    probe beside the nozzle is stated
+effector_tilt_p        float? probability that noise explains as much of the readings as unequal rods do
+effector_tilt_power    float? probability that 0.1 mm between the rods of one arm would be found, of the arm that shows
+    it worst
 notes                  str    what to know about this row
 
 ## printer_parameters | tables/printer_parameters.parquet | printer parameter
@@ -56,7 +61,9 @@ stop                   float? how far from the best number the other program can
 standard_error         float? with the noise from the residuals
 half_width_95          float? half the 95 % interval, Student's t with the printer's freedom
 calibrated             bool   false for the arms where only heights were measured
-agrees                 bool   whether the saved number is that of the readings; true for what is not calibrated
+agrees                 bool   whether the saved number is that of the readings, but for the firmware's rounding; true
+    for what is not calibrated
+without_suspect        float? fitted to all readings but the suspicious one; null where none is
 
 ## printer_readings | tables/printer_readings.parquet | printer kind number
 Every reading of every printer, under both answers and against the fit of all others.
@@ -71,7 +78,7 @@ left_out_mm            float  reading less what the fit of all others foretells
 studentised            float? that over its standard error, under the firmware's ratio of noises; null where the
     others leave no freedom
 p                      float? probability of so large a value anywhere among the readings by noise alone (Bonferroni),
-    the largest over ratios of the noises of a height and a distance from 0.25 to 1
+    the mean over ratios of the noises of a height and a distance from 0.125 to 2 as likely as the others make them
 flagged                bool   true for a bad reading
 
 ## printer_causes | tables/printer_causes.parquet | printer cause
@@ -84,8 +91,8 @@ cause                  str    one bad reading; an error of the calipers; a measu
 freedom_used           int    numbers that it adds, as far as the calibration does not absorb them
 explained_share        float? share of the sum of squares left that it explains, under the firmware's ratio of noises;
     null where nothing tells
-p                      float? probability that noise explains as much, the largest over the noises' ratios; null
-    without freedom
+p                      float? probability that noise explains as much, the largest over the noises' ratios, of a bad
+    reading the mean; null without freedom
 limit                  float  p has to be below it: the level over the causes and over the pieces of evidence
 estimate               float? its number; null for causes with several
 standard_error         float? of the number

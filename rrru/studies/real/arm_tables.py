@@ -11,6 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.spectra import amplitudes
 from rrru.studies.real.arms import Studied
+from rrru.studies.real.refusals import named
 from rrru.studies.real.sheets import PLACE
 from rrru.studies.real.steps import counted, held_by_robot, held_out, rms, verdict_step
 
@@ -50,9 +51,7 @@ def _verdict(studied: Studied) -> dict:
         *(note for note in studied.notes if not note.startswith(_USUAL)),
     )
     return own | {
-        "dataset": series.dataset,
-        "robot": series.section.get("robot", series.dataset),
-        "source": series.file.name,
+        **named(series),
         "predicted_share": predicted_share(studied),
         "held_out_share": 1.0 - (rms(left) / rms(before)) ** 2,
         **held_out(left),

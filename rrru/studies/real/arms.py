@@ -125,7 +125,7 @@ def studied(known: Prepared, settings: GapSettings) -> Studied:
     began, notes = time.perf_counter(), known.notes
     measured = MeasuredRobot(known.robot, NO_MASSES, known.noise[0], known.series.name, known.noise[1])
     try:
-        found = diagnose(known.measurements, measured, settings)
+        found = diagnose(known.measurements, measured, settings, details=False)
         left = held_out_mm(found.attribution.case, found.state)
     except FitError as error:
         # its calibration still tells something

@@ -119,9 +119,10 @@ def _chain(case, chosen):
     return list(dict.fromkeys(chain))
 
 
-def _first_missing(fit):
+def _first_missing(hypothesis):
     """Missing length of the first belt in mm and its standard error."""
-    return fit.model.numbers(fit.theta)[1][0], length_tables.split(fit, fit.standard_errors)[1][0]
+    fit = hypothesis.fit
+    return fit.model.numbers(fit.theta)[1][0], length_tables.split(fit, hypothesis.standard_errors)[1][0]
 
 
 def _common(case, chosen):
@@ -134,13 +135,13 @@ def _parameters(case, chosen, belts):
     """Rows of real_parameters: anchors, missing lengths and scales under the chosen laws."""
     fit = chosen.fit
     _, missing, scale = fit.model.numbers(fit.theta)
-    _, missing_errors, scale_errors = length_tables.split(fit, fit.standard_errors)
+    _, missing_errors, scale_errors = length_tables.split(fit, chosen.standard_errors)
     rows = length_tables.anchors(case, chosen, belts, "in the frame of the first two anchors")
     common = _common(case, chosen)
     if common is not None:
         note = "" if common is chosen else "if one were common to all belts; not part of the verdict. "
-        note += _smooth_words(common)
-        rows.append(length_tables.parameter("missing_length", "mm", *_first_missing(common.fit), 0.0, note))
+        note += _alike_words(common)
+        rows.append(length_tables.parameter("missing_length", "mm", *_first_missing(common), 0.0, note))
     if MISSING in chosen.effects and common is not chosen:
         rows += [
             length_tables.parameter(f"{belt}_missing_length", "mm", missing[k], missing_errors[k], 0.0, "")
@@ -156,12 +157,12 @@ def _parameters(case, chosen, belts):
     return rows
 
 
-def _smooth_words(hypothesis):
-    """What the standard error of a missing length becomes where neighbouring rows err alike."""
-    if hypothesis.evidence is None or hypothesis.evidence.smooth <= hypothesis.evidence.independent:
+def _alike_words(hypothesis):
+    """What the standard error of a missing length would be, were it not that neighbouring rows err alike."""
+    if not hypothesis.alike:
         return ""
-    error = length_tables.split(hypothesis.fit, hypothesis.evidence.standard_errors)[1][0]
-    return f"+- {error:.1f} mm if what is left is a smooth function of the place"
+    error = length_tables.split(hypothesis.fit, hypothesis.fit.standard_errors)[1][0]
+    return f"+- {error:.1f} mm if neighbouring rows did not err alike, which they do"
 
 
 def _words(case, verdict, belts):
@@ -208,13 +209,13 @@ def _misses(laws):
 def _missing_words(case, chosen, law, belts):
     """What misses, and how wrong the frame is without it."""
     _, missing, _ = chosen.fit.model.numbers(chosen.fit.theta)
-    error = length_tables.split(chosen.fit, chosen.fit.standard_errors)[1]
+    error = length_tables.split(chosen.fit, chosen.standard_errors)[1]
     acting = np.flatnonzero(error > 0.0)
     if law is case.laws[MISSING][0]:
         side = "longer" if missing[0] > 0.0 else "shorter"
         said = f"Every belt is {abs(missing[0]):.1f} +- {error[0]:.1f} mm {side} than counted"
-        smooth = _smooth_words(chosen)
-        said += f" ({smooth})" if smooth else ""
+        independent = _alike_words(chosen)
+        said += f" ({independent})" if independent else ""
     else:
         said = "; ".join(
             f"Belt {belts[k]} is {abs(missing[k]):.1f} +- {error[k]:.1f} mm"
@@ -234,7 +235,7 @@ def _none_missing_words(case, chosen):
     common = _common(case, chosen)
     if common is None:
         return "These rows are too few to tell whether a length misses."
-    value, error = _first_missing(common.fit)
+    value, error = _first_missing(common)
     if not np.isfinite(error):
         return "These rows do not tell whether a length misses."
     return f"No length misses: a common one would be {value:.1f} +- {error:.1f} mm."

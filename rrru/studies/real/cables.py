@@ -80,8 +80,28 @@ def cable_case(frame, read):
     origin = np.append(np.zeros(free), radii)
     names = tuple(f"frame_{number}" for number in range(free))
     heights = read.heights("heights_mm", anchors)
+    _check_lengths(read, wanted, angles * radii, routing, places)
     bare = LengthModel(angles, routing, heights, origin, np.eye(free + count)[:, :free], names, places)
     return LengthCase(bare, {RADIUS: _radii(bare, tuple(drums), np.array(radii))}, _starts), tuple(drums), anchors
+
+
+def _check_lengths(read, columns, taken_mm, routing, places):
+    """Raise ConfigError where drums take up more cable than the ways between the places can ask for.
+
+    From one row to another a distance to an anchor changes by the way at most; columns: of the drums' angles; taken_mm
+    (N, k): radius times angle.
+    """
+    first, second = np.triu_indices(len(places), 1)
+    way = np.linalg.norm(places[first] - places[second], axis=1)
+    taken = np.abs(taken_mm[first] - taken_mm[second])[way > 0.0] / way[way > 0.0, None]
+    # bad rows are left to the fit
+    times = np.median(taken, axis=0) / routing.sum(axis=1)
+    worst = int(times.argmax())
+    if times[worst] > 1.0:
+        value = f"{read.given('angle_unit', 'rad')}, {columns[worst]} takes up {times[worst]:.3g} times"
+        read.refuse(
+            "angle_unit", value, "what the platform's way can ask for: unit of the angles, of the places, radius"
+        )
 
 
 def _routing(read, drums, anchors):
@@ -129,7 +149,7 @@ def _parameters(case, chosen, drums, anchors):
     """Rows of real_parameters: anchors and start lengths under the verdict's laws, radii each free."""
     fit = chosen.fit
     parameter, start = length_tables.parameter, fit.model.numbers(fit.theta)[1]
-    start_errors = length_tables.split(fit, fit.standard_errors)[1]
+    start_errors = length_tables.split(fit, chosen.standard_errors)[1]
     rows = length_tables.anchors(case, chosen, anchors, "in the camera's frame")
     rows += [
         parameter(f"{drum}_start", "mm", start[k], start_errors[k], np.nan, "cable at the drum's zero")
@@ -140,7 +160,7 @@ def _parameters(case, chosen, drums, anchors):
         return rows
     note = "" if free is chosen else "with all radii free, which is not the verdict"
     radius = free.fit.model.numbers(free.fit.theta)[2]
-    spread = length_tables.split(free.fit, free.fit.standard_errors)[2]
+    spread = length_tables.split(free.fit, free.standard_errors)[2]
     nominal = case.bare.origin[-len(drums) :]
     return rows + [
         parameter(f"{drum}_radius", "mm", radius[k], spread[k], nominal[k], note) for k, drum in enumerate(drums)
@@ -158,7 +178,7 @@ def _words(case, verdict, drums):
         settled = case.probability_of(lambda laws: law in laws) > 0.9 * off
         where = law.where if settled else ""
         changed = chosen.fit.model.numbers(chosen.fit.theta)[2] - case.bare.origin[-len(drums) :]
-        error = length_tables.split(chosen.fit, chosen.fit.standard_errors)[2]
+        error = length_tables.split(chosen.fit, chosen.standard_errors)[2]
         said = [f"{drums[k]} by {changed[k]:+.2f} +- {error[k]:.2f} mm" for k in np.flatnonzero(error > 0.0)]
         notes.append(f"The radii are off, likeliest {', '.join(said)}.")
         if not settled:

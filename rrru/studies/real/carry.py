@@ -1,40 +1,116 @@
-"""What the model of one series leaves of another one of the same robot, with nothing but the frames fitted anew."""
+"""What the model of one series leaves of another one of the same robot, with nothing but the frames fitted anew.
 
-from dataclasses import replace
+Series are studied apart from each other: `told` is what has to be known of each, in numbers and texts alone.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.errors import FitError
+from rrru.gap.case import Case
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
+from rrru.gap.settings import GapSettings
 from rrru.gap.state import State
 from rrru.gap.unknown import UNKNOWN
-from rrru.studies.real.arms import NO_MASSES, Studied
+from rrru.robots.robot import Robot
+from rrru.studies import setup
+from rrru.studies.real.arms import NO_MASSES, Studied, nominal_robot
+from rrru.studies.real.series import Series
 from rrru.studies.real.steps import FRAMES, frames, held_out_mm, placed, rms
 
-
-def carried(series: list[Studied]) -> pd.DataFrame:
-    """Rows of `real_carried`: of all pairs of series of one robot, in both directions."""
-    pairs = [pair for pair in permutations(series, 2) if pair[0].series.variant == pair[1].series.variant]
-    columns = ["campaign", "carried_from", "frames_rms_mm", "geometry_rms_mm", "causes_rms_mm"]
-    return pd.DataFrame([_row(*pair) for pair in pairs], columns=columns)
+_COLUMNS = ("campaign", "carried_from", "frames_rms_mm", "geometry_rms_mm", "causes_rms_mm")
 
 
-def _row(first: Studied, second: Studied) -> dict:
-    """The row of the model of one series on another one."""
-    state, geometry = first.state, first.step("b").state.deviations
-    known = {name: effect for name, effect in first.case.library.items() if name not in UNKNOWN}
-    robot = sim(first.robot)
-    arm_mm = second.case.arm_mm if rows.has_turns(second.measurements) else np.nan
-    case = make_case(second.measurements, robot, NO_MASSES, second.case.noise_mm, {}, True, arm_mm)
-    case = replace(case, library=known | {FRAMES: frames(robot)})
-    effects = {key: values for key, values in state.effects.items() if key[0] in known}
-    models = {
-        "frames_rms_mm": State(0.0 * geometry, {}),
-        "geometry_rms_mm": State(geometry, {}),
-        "causes_rms_mm": State(state.deviations, effects, state.shape_values),
+@dataclass(frozen=True)
+class Model:
+    """A studied series as far as it carries: its measurements and robot, and the numbers found.
+
+    arm_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations (p,): of the
+    calibration alone and beside the causes; effects: these by name, with values by parameter.
+    """
+
+    series: Series
+    measurements: pd.DataFrame
+    robot: Robot
+    arm_mm: float
+    noise_mm: float
+    geometry: np.ndarray
+    deviations: np.ndarray
+    effects: Mapping[str, tuple[Effect, np.ndarray]]
+
+
+def told(studied: Studied) -> dict[str, Any]:
+    """What `model` has to be told of a studied series, beside its measurements."""
+    case, state = studied.case, studied.state
+    effects = {}
+    for key, coordinates in state.effects.items():
+        effect = case.library[key[0]]
+        values = effect.coordinates.to_values(coordinates, state.shape(case.library, key))
+        if effect.name not in UNKNOWN:
+            effects[effect.name] = {"values": np.asarray(values).tolist(), "waves": effect.waves}
+    return {
+        "arm_mm": float(case.arm_mm),
+        "noise_mm": float(case.noise_mm),
+        "geometry": studied.step("b").state.deviations.tolist(),
+        "deviations": state.deviations.tolist(),
+        "effects": effects,
     }
-    left = {name: rms(held_out_mm(case, placed(case, model))) for name, model in models.items()}
+
+
+def model(
+    series: Series,
+    numbers: Mapping[str, Any],
+    measurements: pd.DataFrame,
+    robots: Mapping[str, Any],
+    settings: GapSettings,
+) -> Model:
+    """The Model of a series that `told` has told the numbers of."""
+    robot = setup.measured_robot(nominal_robot(series, robots), measurements)
+    library, effects = settings.library(robot), {}
+    for name, one in numbers["effects"].items():
+        effect = library[name].with_waves(one["waves"]) if one["waves"] else library[name]
+        effects[name] = effect, np.array(one["values"])
+    deviations = (np.array(numbers[key]) for key in ("geometry", "deviations"))
+    return Model(series, measurements, robot, numbers["arm_mm"], numbers["noise_mm"], *deviations, effects)
+
+
+def carried(models: Sequence[Model]) -> pd.DataFrame:
+    """Rows of `real_carried`: of all pairs of series of one robot, in both directions."""
+    pairs = [pair for pair in permutations(models, 2) if pair[0].series.variant == pair[1].series.variant]
+    return pd.DataFrame([_row(*pair) for pair in pairs], columns=_COLUMNS)
+
+
+def _row(first: Model, second: Model) -> dict:
+    """The row of the model of one series on another one."""
+    robot = sim(first.robot)
+    arm_mm = second.arm_mm if rows.has_turns(second.measurements) else np.nan
+    case = make_case(second.measurements, robot, NO_MASSES, second.noise_mm, {}, True, arm_mm)
+    laws = {
+        name: replace(effect, coordinates=plain_coordinates(effect.parameters, 1.0))
+        for name, (effect, _) in first.effects.items()
+    }
+    case = replace(case, library=laws | {FRAMES: frames(robot)})
+    values = {(name, 0): values for name, (_, values) in first.effects.items()}
+    models = {
+        "frames_rms_mm": State(0.0 * first.geometry, {}),
+        "geometry_rms_mm": State(first.geometry, {}),
+        "causes_rms_mm": State(first.deviations, values),
+    }
+    left = {name: _left_mm(case, state) for name, state in models.items()}
     return {"campaign": second.series.name, "carried_from": first.series.name, **left}
+
+
+def _left_mm(case: Case, state: State) -> float:
+    """Rms that a state with frames of its own leaves on the rows held out, NaN where these are not found."""
+    try:
+        return rms(held_out_mm(case, placed(case, state)))
+    except FitError:
+        return np.nan

@@ -15,6 +15,7 @@ _ROW_MM, _JOINT_MM, _LOW_MM, _MANY = 56.0, 36.0, 24.0, 8
 # characters in a line of a title over a panel, by panels beside each other
 _LINE = {1: 110, 2: 54, 3: 34}
 _LEAST = 0.005
+NOTHING = "no file of this set is here, or none that can be used"
 _MICRORAD = 1e6
 
 
@@ -26,8 +27,10 @@ def steps(tables, options):
     is made of, with 95 % intervals; parts that take from each other add up to more than all of it.
     """
     verdicts, models, budget = (tables[name] for name in ("real_verdicts", "real_steps", "real_budget"))
+    # of those that are refused there is nothing to draw
+    verdicts = verdicts[verdicts["campaign"].isin(models["campaign"])]
     if verdicts.empty:
-        return style.note(f"{options['set']}: no file of this set is here")
+        return style.note(f"{options['set']}: {NOTHING}")
     figure = style.new(style.DOUBLE_MM, 8.0 + _ROW_MM * len(verdicts))
     panels = figure.subplots(len(verdicts), 2, squeeze=False, width_ratios=(1.2, 1.0))
     for row, (left, right) in zip(verdicts.to_dict("records"), panels, strict=True):
@@ -81,7 +84,7 @@ def spectrum(tables, options):
     """
     waves = tables["real_spectrum"]
     if waves.empty:
-        return style.note(f"{options['set']}: no file of this set is here")
+        return style.note(f"{options['set']}: {NOTHING}")
     names, joints = (list(dict.fromkeys(waves[name])) for name in ("campaign", "joint"))
     row_mm = _LOW_MM if len(joints) > _MANY else _JOINT_MM
     figure = style.new(style.DOUBLE_MM, 16.0 + row_mm * len(joints))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from rrru.figures import style
+from rrru.studies.real.figures import NOTHING
 
 _BARE = {"color": style.VERMILION, "marker": "D", "markerfacecolor": "white"}
 _FOUND = {"color": style.BLUE, "marker": "s"}
@@ -21,7 +22,7 @@ def lengths(tables, options):
     points, parameters = tables["real_points"], tables["real_parameters"]
     names = list(dict.fromkeys(points["campaign"])) if "campaign" in points else [""]
     if points.empty:
-        return style.note(f"{options['set']}: no file of this set is here")
+        return style.note(f"{options['set']}: {NOTHING}")
     figure = style.new(style.DOUBLE_MM, 14.0 + _ROW_MM * len(names))
     panels = figure.subplots(len(names), 3, squeeze=False, width_ratios=(1.3, 1.0, 1.0))
     for name, (frame, bare, found) in zip(names, panels, strict=True):

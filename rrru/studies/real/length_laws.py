@@ -17,16 +17,14 @@ from rrru.fit.lengths_only import fit_lengths, stands_out
 from rrru.fit.lengths_search import search
 
 UNEXPLAINED = "unexplained"
-# starts beside the fit that judged the readings
-_STARTS = 3
-# readings that a law's fit leaves free at least
-_FREEDOM = 3
+# starts beside the fit that judged the readings; readings that a law's fit leaves free at least
+_STARTS, _FREEDOM = 3, 3
 # rows are foretold from the others in so many parts of every tenth row
 _FOLDS, _FEW = 10, 20
 # standard deviations from which a reading is named
 _STANDS_OUT = 5.0
-# probability from which a smooth error is named
-_SURE = 0.9
+# probability from which a smooth error is named, and the logarithm of its odds
+_SURE, _ODDS = 0.9, np.log(9.0)
 _DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
@@ -59,6 +57,16 @@ class Hypothesis:
     def effects(self):
         """Names of the effects of its laws."""
         return tuple(law.effect for law in self.laws)
+
+    @property
+    def alike(self):
+        """Whether neighbouring rows err alike: whether a smooth error beside is all but sure."""
+        return self.evidence is not None and self.evidence.smooth - self.evidence.independent > _ODDS
+
+    @property
+    def standard_errors(self):
+        """Of the numbers as `LengthFit` has them, where neighbouring rows err alike those beside the smooth error."""
+        return self.evidence.standard_errors if self.alike else self.fit.standard_errors
 
     def logs(self):
         """Log evidence without and with a smooth error, each half believed beside the laws' own beliefs; (2,)."""
@@ -174,18 +182,11 @@ class LengthCase:
 
 def ways_of(effect, told, reach):
     """Laws of an effect from (where, adds, columns, believed); reach(columns): how far its numbers may go, 1 sigma."""
-    return tuple(
-        Law(
-            effect,
-            where,
-            adds,
-            columns,
-            tuple(f"{effect}_{k}" for k in range(columns.shape[1])),
-            reach(columns),
-            believed,
-        )
-        for where, adds, columns, believed in told
-    )
+    laws = []
+    for where, adds, columns, believed in told:
+        names = tuple(f"{effect}_{k}" for k in range(columns.shape[1]))
+        laws.append(Law(effect, where, adds, columns, names, reach(columns), believed))
+    return tuple(laws)
 
 
 def frame_columns(count, dimensions, readings):

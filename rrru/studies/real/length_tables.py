@@ -28,7 +28,7 @@ def anchors(case, chosen, names, note):
         if hypothesis is None:
             continue
         fit = hypothesis.fit
-        values, errors = fit.model.numbers(fit.theta)[0], split(fit, fit.standard_errors)[0]
+        values, errors = fit.model.numbers(fit.theta)[0], split(fit, hypothesis.standard_errors)[0]
         for name, place, error in zip(names, values, errors, strict=True):
             coordinates = zip("xyz", place, error, strict=False)
             rows += [

@@ -17,7 +17,8 @@ dataset                str    its set in the configuration
 robot                  str    what was measured
 source                 str    file
 effects                str    names joined by + in the order of their share; none; unexplained where no law holds it;
-    undiagnosed where there are too few rows, and the numbers of a diagnosis are null
+    undiagnosed where there are too few rows, and the numbers of a diagnosis are null; refused where the file cannot
+    be used: notes says why, and every other number is null
 probability            float? of this whole verdict, 0 to 1
 where                  str    where the effects act; empty where nothing acts or no site is told
 confusable_with        str    what the series cannot tell from the verdict; empty where nothing
@@ -111,9 +112,9 @@ out.
 --
 campaign
 carried_from           str    the series that the model was fitted on
-frames_rms_mm          float  nominal model
-geometry_rms_mm        float  its calibrated geometry alone
-causes_rms_mm          float  its model with all named causes
+frames_rms_mm          float? nominal model
+geometry_rms_mm        float? its calibrated geometry alone
+causes_rms_mm          float? its model with all named causes
 
 ## real_seconds | timings/real_seconds.parquet | campaign step
 How long it took.
@@ -127,3 +128,5 @@ TABLES = (
     *read_tables(_OWN),
     replace(_BUDGET, name="real_budget", path="tables/real_budget.parquet", description="The gap's budget by series."),
 )
+# those of one series, whatever the others of its set
+SERIES_TABLES = tuple(table for table in TABLES if table.name != "real_carried")

@@ -159,9 +159,13 @@ def _label(pattern: str, file: Path) -> str:
     return file.name.removeprefix(before).removesuffix(after) if star else ""
 
 
-def files(config: Mapping[str, Any], name: str) -> list[str]:
-    """The files of a data set and of what describes its robot, none where they are not here."""
-    result = list(dict.fromkeys(one.file for one in found(config["real"], name)))
+def files(config: Mapping[str, Any], name: str, series: str | None = None) -> list[str]:
+    """The files of a data set, or of one of its series, and of what describes its robot; none where they are not here.
+
+    series: its name, by default all are meant.
+    """
+    every = found(config["real"], name)
+    result = list(dict.fromkeys(one.file for one in every if series in (None, one.name)))
     section = config["real"]["sets"][name]
     if "chain" in section:
         result += sorted({one.parent / section["chain"] for one in result})

@@ -16,15 +16,17 @@ from rrru.studies.real.series import Series
 
 # flags of the rows that are kept out of every fit, and the numbers of the rows in the file
 HELD_OUT, PLACE = "held_out", "row"
+TEMPERATURE = "temperature_c"
 
 
 def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
     """Columns of a campaign file, and HELD_OUT and PLACE; rows in the order driven, the targets of each together.
 
     The set's section says which columns are what: joints, {actuator column: theirs}, in joint_unit, absent where they
-    are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; held_out. The number
-    of the row stands for the time. Targets that were not seen are left out. Raises ConfigError for a column that is not
-    there or not of numbers, for a blank joint of a row with readings, and where nothing was read.
+    are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; temperature, in
+    degrees Celsius; held_out. The number of the row stands for the time. Targets that were not seen are left out.
+    Raises ConfigError for a column that is not there or not of numbers, for a blank joint of a row with readings, and
+    where nothing was read.
     """
     section, parts = series.section, []
     common = {"trajectory": "poses", "time_s": np.arange(len(raw), dtype=float), HELD_OUT: _held_out(series, raw)}
@@ -32,6 +34,8 @@ def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
     for ours, theirs in joints.items():
         scale = 1.0 if ours.endswith("_mm") else RAD[section.get("joint_unit", "rad")]
         common[ours] = scale * _numbers(series, raw, "joints", theirs)
+    if "temperature" in section:
+        common[TEMPERATURE] = _numbers(series, raw, "temperature", section["temperature"])
     for target, reading in section["readings"].items():
         part = pd.DataFrame(common | dict(_read(series, raw, target, reading)))
         parts.append(part.assign(target=target, **{PLACE: np.arange(1, len(raw) + 1)}))
@@ -56,7 +60,7 @@ def joint_columns(series: Series, raw: pd.DataFrame) -> Mapping[str, str]:
 
 def retold(error: IngestError, series: Series, whole: pd.DataFrame) -> IngestError:
     """What ingest says of a sheet, in rows and columns of the series' file."""
-    theirs, told = dict(series.section.get("joints", {})), []
+    theirs, told = dict(series.section.get("joints", {})) | {TEMPERATURE: series.section.get("temperature")}, []
     for problem in error.problems:
         row, column, names = problem.get("row"), problem.get("column"), theirs
         if row is not None and row <= len(whole):
@@ -86,16 +90,20 @@ def in_file(text: str, whole: pd.DataFrame) -> str:
 def stated_noise(series: Series, raw: pd.DataFrame) -> tuple[float | None, float | None]:
     """Noise per axis that the instrument states: of positions in mm and of orientations in rad, None where it does not.
 
-    See `rrru.campaign.noise.typical`.
+    See `rrru.campaign.noise.typical`. Raises ConfigError for a column whose median is not above 0: no
+    instrument is without noise.
     """
     result = []
     for key, scales, unit in (("position_std", MM, "unit"), ("rotation_std", RAD, "rotation_unit")):
-        axes = [
-            scales[reading.get(unit, "mm" if scales is MM else "rad")]
-            * _numbers(series, raw, f"readings.{target}", name)
-            for target, reading in series.section["readings"].items()
-            for name in reading.get(key, ())
-        ]
+        axes = []
+        for target, reading in series.section["readings"].items():
+            scale = scales[reading.get(unit, "mm" if scales is MM else "rad")]
+            for name in reading.get(key, ()):
+                stated = _numbers(series, raw, f"readings.{target}", name)
+                if np.isfinite(stated).any():
+                    axes.append(scale * stated)
+                    if np.nanmedian(stated) <= 0.0:
+                        raise ConfigError(f"{series.file}: column {name}: 0 or less at the median; allowed: above 0")
         result.append(typical(axes) if axes else None)
     return result[0], result[1]
 

@@ -15,6 +15,7 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
+from rrru.gap.attribute import calibrate
 from rrru.gap.case import Case
 from rrru.gap.fit_effects import fit_effects, identified
 from rrru.gap.state import State
@@ -111,12 +112,13 @@ def steps(case: Case) -> tuple[Step, ...]:
     numbers = len(library[FRAMES].coordinates), _identified(case, state, False), time.perf_counter() - began
     result = [Step("a", "frames", state, *numbers, *_left(case, state))]
     names: tuple[str, ...] = ()
+    calibrated = calibrate(case)
     for model, adds, effect in _MODELS:
         if effect and effect not in library:
             continue
         began, names = time.perf_counter(), (*names, effect) if effect else names
         try:
-            fit = fit_effects(case, names)
+            fit = fit_effects(case, names, calibrated=calibrated)
         except FitError:
             if not effect:
                 raise

@@ -1,15 +1,25 @@
 """The robots of the check on withheld effects in chunks: jobs of little memory, however many they are."""
 
+from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from rrru.errors import ConfigError
+from rrru.studies import config as parts
+from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.noise import NOISES
+
+# checks on robots of files, each the name of the plant that drives them
+PLANTS = ("mujoco", "own")
+# so many kinds of causes further on every next file begins
+_APART = 4
 
 
 class Member(NamedTuple):
-    """One robot: check (label, effect, noise, many or background), what it is about, number.
+    """One robot: check (label, effect, noise, many, background, or a plant), what it is about, number.
 
-    about: the effect that the diagnosis has to do without, the noise, or nothing.
+    about: the effect that the diagnosis has to do without, the noise, the robot's entry in `robots:`, or nothing.
     """
 
     check: str
@@ -26,6 +36,11 @@ class Member(NamedTuple):
         """The effect that the diagnosis has to do without, empty for none."""
         return self.about if self.check == "effect" else ""
 
+    @property
+    def file(self):
+        """The entry in `robots:` of a robot that is read from a file, empty for the 3-RRRU of our own."""
+        return self.about if self.check in PLANTS else ""
+
 
 def noise_of(name):
     """The noise that a robot of that check has by its name, empty for other robots."""
@@ -39,8 +54,31 @@ def chunks(section):
     members += [Member("effect", e, k) for e in section["effects"] for k in range(section["per_effect"])]
     members += [Member("noise", noise, k) for noise in NOISES for k in range(section["per_noise"])]
     members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
-    size = section["chunk"]
-    return {f"robots_{k:04d}": members[k : k + size] for k in range(0, len(members), size)}
+    driven = [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
+    # a chunk's robots have the same drives
+    groups = [members, *([one for one in driven if one.file == file] for file in section["files"])]
+    result, size = {}, section["chunk"]
+    for k, group in zip(np.cumsum([0, *map(len, groups)]).tolist(), groups, strict=False):
+        result |= {f"robots_{k + first:04d}": group[first : first + size] for first in range(0, len(group), size)}
+    return result
+
+
+def _of_file(plant, files, k):
+    """One of the robots of files on a plant: the files take turns."""
+    turn, which = divmod(k, len(files))
+    return Member(plant, files[which], turn + _APART * which)
+
+
+def described(config, members):
+    """What is known of the robots of files among Members, by the file's entry: robot and masses."""
+    names = dict.fromkeys(member.file for member in members if member.file)
+    return {name: {"robot": _robot(config, name), "masses": parts.masses(config, {"robot": name})} for name in names}
+
+
+def _robot(config, name):
+    """A robot of a file with all its numbers, and the reflectors whose places are known."""
+    targets = MODELS[Path(config["robots"][name]["mjcf"]).stem].targets
+    return parts.robot(config, {"robot": name, "errors": "full"} | ({"targets": targets} if targets else {}))
 
 
 def rivalled(section):
@@ -62,3 +100,8 @@ def check(config):
         for name in section[key]:
             if name not in known:
                 raise ConfigError(f"withheld.{key} has {name!r}; known: {', '.join(known)}")
+    for name in section["files"]:
+        file = parts.entry(config, "robots", name, "withheld.files").get("mjcf", "")
+        if Path(file).stem not in MODELS:
+            known = ", ".join(f"{model}.xml" for model in MODELS)
+            raise ConfigError(f"withheld.files: {name} has the mjcf {file!r}; allowed: one of {known}")

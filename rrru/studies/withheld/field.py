@@ -20,6 +20,7 @@ def score_field(verdicts, answers):
     truth = truth.rename(columns={"campaign": "robot", "effects": "truth", "leg": "truth_leg"})
     strength = verdicts["gap_rms_mm"] / verdicts["noise_rms_mm"]
     told = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
+    told = told.assign(file="", cause=told["truth"], numbers=0, held=0)
     right = [is_right(*pair, "field") for pair in zip(told["truth"], told["effects"], strict=True)]
     return scores(told.assign(right=right))
 

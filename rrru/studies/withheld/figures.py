@@ -7,6 +7,7 @@ from matplotlib.ticker import LogLocator, MultipleLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import style
+from rrru.studies.withheld.chunks import PLANTS
 from rrru.studies.withheld.summary import wilson
 from rrru.studies.withheld.verdicts import PREFIX, UNEXPLAINED, is_outside
 
@@ -16,6 +17,8 @@ _CHECKS = {
     "effect": ("effect withheld", style.SPIRAL),
     "noise": ("noise not as stated", {"color": style.SKY, "marker": "v", "linestyle": (0, (4, 2, 1, 2))}),
     "background": ("axis errors in all", {"color": style.GREY, "marker": "P", "linestyle": (0, (1, 2))}),
+    "mujoco": ("driven by MuJoCo", style.LINES),
+    "own": ("the same, own plant", style.SPIRAL),
     "many": ("many causes", {"color": style.BLACK, "marker": "x", "linestyle": (0, (6, 2))}),
     "field": ("field campaigns", style.PUBLISHED),
 }
@@ -40,6 +43,16 @@ _ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "lin
 
 
 @style.printed
+def plants(tables, options):
+    """Robots of files with the same causes, driven by MuJoCo and by our own plant, whose laws are those of the
+    diagnosis; as the figure of the other checks: confusion tables, then the share of right verdicts against the stated
+    probability and against the gap over the noise, and the share of the gap closed as predicted and in truth. Last the
+    parts of the gaps, found against true, filled where the verdict names them.
+    """
+    return _check(tables, PLANTS, PLANTS)
+
+
+@style.printed
 def withheld(tables, options):
     """The diagnosis where the answer was withheld. Confusion tables: counts, shaded by their share of the row,
     right answers framed; of the effect check, the row is the effect that was taken out of the library. Unexplained
@@ -49,11 +62,16 @@ def withheld(tables, options):
     as stated: found against true, filled where the verdict names them (scatter and runs: where they are more probable
     than not), 25 % off between the dotted lines, what is missed or not there on the edges.
     """
+    return _check(tables, [name for name in _CHECKS if name not in PLANTS], _PARTED)
+
+
+def _check(tables, checks, parted):
+    """The figure of some checks, and below it parts of the gaps of some."""
     scores, confusion = tables["withheld_scores"], tables["withheld_confusion"]
-    if scores.empty:
+    checks = [name for name in checks if (scores["check"] == name).any()]
+    if not checks:
         raise ConfigError("withheld: table withheld_scores has no robot")
-    parted = [name for name in _PARTED if (tables["withheld_parts"]["check"] == name).any()]
-    checks = [name for name in _CHECKS if (scores["check"] == name).any()]
+    parted = [name for name in parted if (tables["withheld_parts"]["check"] == name).any()]
     cells = _cells(confusion[confusion["check"].isin(checks[:2])])
     names = sorted({*cells["row"], *cells["column"]} - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
     maps = [_map(cells[cells["check"] == name], names) for name in checks[:2]]

@@ -29,6 +29,13 @@ class Limits:
     imitated_share: float = np.nan
 
 
+def of_displacement(gain):
+    """Limits of data whose chi-square the true displacement, its size fitted, lowers by a gain."""
+    from scipy.stats import chi2
+
+    return Limits(gain, 1, bool(gain > chi2.ppf(1.0 - _FALSE_ALARMS, 1)))
+
+
 def with_truth(library, acting):
     """A library by name with the acting causes in their true shapes besides."""
     return library | {f"{_TRUE}{one.effect}": one.law for one in acting}

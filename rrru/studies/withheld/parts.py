@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 
 from rrru.studies.withheld.noise import NoiseLaw
-from rrru.studies.withheld.outside import OUTSIDE
 from rrru.studies.withheld.verdicts import CAUSES, NONE, UNEXPLAINED
 
 _NOISES = ("scatter", "runs")
@@ -39,12 +38,13 @@ def parts(robot, effects, budget, noise_rms_mm, taken_out=""):
 
 def _true(robot, taken_out):
     """All parts of a robot: name, kind, strength (rms over that of the stated noise)."""
-    outside = {one.effect for one in robot.acting if one.effect in OUTSIDE or one.effect == taken_out}
-    rows = [(one.effect, "outside" if one.effect in outside else "effect", one.strength) for one in robot.acting]
+    acting = [one for one in robot.acting if one.effect]
+    outside = {one.effect for one in acting if one.outside or one.effect == taken_out}
+    rows = [(one.effect, "outside" if one.effect in outside else "effect", one.strength) for one in acting]
     rows += [(one.effect, "background", one.strength) for one in robot.background]
     law = NoiseLaw(**robot.noise)
     rows += [("scatter", "scatter", law.beyond), ("runs", "runs", law.runs)]
-    unknown = [one.strength for one in robot.acting if one.effect in outside]
+    unknown = [one.strength for one in acting if one.effect in outside]
     return [*rows, (UNEXPLAINED, UNEXPLAINED, float(np.linalg.norm(unknown)))]
 
 

@@ -60,6 +60,10 @@ class Conditions:
         """Rms distance of the noise."""
         return self.noise_mm * np.sqrt(3.0)
 
+    def seen(self, _):
+        """The nominal robot with the numbers that a measurement table tells."""
+        return self.mechanism
+
 
 class WithheldCampaign(setup.VirtualCampaign):
     """The campaign of one robot of the check."""
@@ -82,6 +86,11 @@ class Acting:
     coordinates: tuple
     leg: int
     strength: float
+
+    @property
+    def outside(self):
+        """Whether the library does not hold it."""
+        return self.effect in OUTSIDE
 
     @property
     def law(self):
@@ -119,6 +128,7 @@ class Robot:
     acting: tuple = ()
     background: tuple = ()
     noise: dict = field(default_factory=dict)
+    file = ""
 
     @property
     def causes(self):
@@ -158,6 +168,15 @@ class Robot:
         names = sorted(acting.effect for acting in self.acting)
         return "+".join(f"{PREFIX}:{name}" if name in OUTSIDE else name for name in names) or "none"
 
+    @property
+    def cause(self):
+        """What acts, as a plant names it."""
+        return self.truth
+
+    def numbers(self, _):
+        """True values of the library's parameters by effect and name."""
+        return {one.effect: one.law.parameters.mapping(one.values) for one in self.causes if not one.outside}
+
     def answer(self, conditions):
         """The robot's row of `withheld_answers`."""
         return {
@@ -171,9 +190,8 @@ class Robot:
         }
 
     @classmethod
-    def from_json(cls, text):
-        """The robot of the column `drawn` of its answer."""
-        section = json.loads(text)
+    def from_mapping(cls, section):
+        """The robot of its fields, as JSON holds them."""
         causes = {key: tuple(map(Acting.from_mapping, section[key])) for key in ("acting", "background")}
         return cls(**(section | causes | {"deviations": tuple(section["deviations"])}))
 

@@ -6,6 +6,7 @@ Those below withheld/ pass between the rules, chunk by chunk of the robots.
 from dataclasses import replace
 
 from rrru.campaign.schemas import TABLES as CAMPAIGN_TABLES
+from rrru.campaign.schemas import measurement_table
 from rrru.store.schema import read_tables
 
 _TABLES = read_tables("""
@@ -13,20 +14,24 @@ robot                  str    name of the robot or field campaign
 kind                   str    paper (each trajectory once), full (reverse runs, speeds, payloads) or file {paper,
     full, file}
 truth                  str    true effects joined by +; none; or outside:<name> for what the library does not hold
-truth_leg              int    the one leg at fault, 1 to 3; 0 for all or none
+file                   str    entry in robots of a robot that is read from a file; empty for the 3-RRRU of our own
+cause                  str    what acts, as its plant names it, see rrru/studies/withheld/faults.py; of the 3-RRRU of
+    our own the truth
+truth_leg              int    the one leg at fault, from 1 on; 0 for all or none
 strength               float  true gap rms over noise rms, without noise
 weakest                float  the same of the weakest cause alone; 0 where nothing acts
 oracle_detects         bool   a likelihood-ratio test that knows the true law detects it at 1 % false alarms; of
-    label and effect, false in the other checks
+    label, effect, mujoco and own, false in the other checks
 check                  str    label: the robots' effects are hidden; effect: the robot's effect is taken out of the
     library; noise: the noise is not as stated; many: three to six effects, axis errors and scatter; background: axis
-    errors in every robot; field: recorded by another simulator {label, effect, noise, many, background, field}
+    errors in every robot; mujoco: robots of files that MuJoCo drives; own: the same, driven by our own laws; field:
+    recorded by another simulator {label, effect, noise, many, background, mujoco, own, field}
 
 ## withheld_answers | withheld/answers/{chunk}.parquet | robot
 What was drawn for each robot: read by the virtual robot and by the scoring, never by the diagnosis.
 --
 robot kind truth truth_leg strength weakest
-drawn                  str    all of the robot, as JSON: trajectories, seven deviations (rad, mm), causes
+drawn                  str    all of the robot, as JSON: trajectories, deviations (rad, mm), causes
 
 ## withheld_states | withheld/states/{chunk}.parquet | robot
 The sims of the diagnosis: calibrated without and corrected with effects.
@@ -36,6 +41,7 @@ calibrated             str    the mechanism's deviations (rad, mm) of the calibr
 deviations             str    the mechanism's deviations of the corrected sim, as a JSON list
 fitted_effects         str    effects of the corrected sim, as a JSON list of [name, shape, coordinates]
 shapes                 str    shapes' parameters that were fitted further, as JSON by effect and name
+numbers                str    numbers of the effects, as a JSON list of [effect, parameter, value, standard error]
 
 ## withheld_budget | withheld/budget/{chunk}.parquet | robot part
 The budget of each robot's gap by the diagnosis.
@@ -50,7 +56,8 @@ share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question
 
 ## withheld_limits | tables/withheld_limits.parquet | check robot
-What the data of each robot could tell somebody who knows the true law; of the checks label and effect.
+What the data of each robot could tell somebody who knows the true law; of the checks label, effect, mujoco and own,
+of the last two by the displacement that its cause truly makes.
 --
 check                  str    as in withheld_scores
 robot weakest
@@ -68,7 +75,7 @@ What the diagnosis says about each withheld robot; made without knowing any answ
 check robot kind
 effects                str    as in gap_verdicts
 probability            float  of the whole verdict, 0 to 1
-leg                    int    the one leg at fault, 1 to 3; 0 for all or none
+leg                    int    the one leg at fault, from 1 on; 0 for all or none
 gap_rms_mm             float  gap under the calibrated sim, 3-D
 noise_rms_mm           float  measuring noise, 3-D
 share_closed           float  share of the gap that the verdict's effects close on held-out runs
@@ -78,7 +85,7 @@ next_runs              str    as in gap_verdicts
 ## withheld_scores | tables/withheld_scores.parquet | check robot
 Each verdict beside the truth.
 --
-check robot kind truth truth_leg strength
+check robot kind file cause truth truth_leg strength
 verdict                str    the diagnosis's effects
 right                  bool   it names exactly the truth or, where the library lacks that, says unexplained;
     background: joint_axis_error may be named; many: it names all causes of 30 % of the gap, nothing that is not there,
@@ -88,6 +95,9 @@ probability            float  that the diagnosis gave its verdict, 0 to 1
 oracle_detects
 share_closed_true      float? share of the true gap that the corrected sim closes
 share_closed           float? the same as the diagnosis predicts it; null where it predicts none
+numbers                int    true numbers of the cause (play, compliance, clearance, strain, lag) that it gives with a
+    standard error
+held                   int    how many of them its 95 % intervals hold
 
 ## withheld_parts | tables/withheld_parts.parquet | check robot part
 Each part of each robot's gap: its true size beside what the diagnosis finds.
@@ -138,7 +148,7 @@ The scores in figures, against what the tool is meant to reach.
 check
 group                  str    which robots are counted
 figure                 str    what is counted
-robots                 int    robots in the group, or parts of their gaps
+robots                 int    robots in the group, parts of their gaps, or numbers of their causes
 value                  float? the figure; null where the group is empty
 low                    float? lower end of the 95 % Wilson interval; null where the figure is no share
 high                   float? upper end
@@ -189,13 +199,23 @@ low                    float? lower end of the 95 % Wilson interval
 high                   float? upper end
 """)
 _ANSWERS = _TABLES[0]
-_MEASURED = next(table for table in CAMPAIGN_TABLES if table.name == "measurements")
-_MEASUREMENTS = replace(
-    _MEASURED,
-    name="withheld_measurements",
-    path="withheld/measurements/{chunk}.parquet",
-    description="One row per commanded point of each robot: all that the diagnosis is given.",
-    columns=(*_ANSWERS.columns[:2], *_MEASURED.columns),
-    key=("robot", "run", "point"),
-)
-TABLES = (_ANSWERS, _MEASUREMENTS, *_TABLES[1:])
+
+
+def _measurements(measured):
+    """The table of measurements of several robots out of that of one."""
+    return replace(
+        measured,
+        name="withheld_measurements",
+        path="withheld/measurements/{chunk}.parquet",
+        description="One row per commanded point of each robot: all that the diagnosis is given.",
+        columns=(*_ANSWERS.columns[:2], *measured.columns),
+        key=("robot", "run", "point"),
+    )
+
+
+TABLES = (_ANSWERS, _measurements(next(t for t in CAMPAIGN_TABLES if t.name == "measurements")), *_TABLES[1:])
+
+
+def tables_of(robot, names):
+    """All tables, that of the measurements with a robot's own columns and those of `names` beyond them."""
+    return (_ANSWERS, _measurements(measurement_table(robot, names)), *_TABLES[1:])

@@ -9,17 +9,17 @@ import pandas as pd
 from rrru.effects.library import HOLDS
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
-from rrru.studies.withheld.draw import fresh
-from rrru.studies.withheld.oracle import Limits, limits, with_truth
-from rrru.studies.withheld.outside import EFFECTS
+from rrru.studies.withheld.chunks import PLANTS
+from rrru.studies.withheld.members import fresh_runs, robot_of
+from rrru.studies.withheld.numbers import held
+from rrru.studies.withheld.oracle import Limits, limits, of_displacement, with_truth
 from rrru.studies.withheld.parts import is_enough, parts
-from rrru.studies.withheld.robots import Robot, noise_free
 from rrru.studies.withheld.states import state_of
 from rrru.studies.withheld.verdicts import is_right, scores
 
 _LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
 # checks of one or two causes under the stated noise, whose limits are computed
-_LIMITED = ("label", "effect")
+_LIMITED = ("label", "effect", *PLANTS)
 
 
 class Scored(NamedTuple):
@@ -30,41 +30,54 @@ class Scored(NamedTuple):
     parts: pd.DataFrame
 
 
-def score_chunk(answers, measurements, verdicts, states, budget, conditions, library=EFFECTS):
+def score_chunk(answers, measurements, verdicts, states, budget, known):
     """What is Scored of the robots of a chunk from the five frames about them.
 
-    library: effects by name that the diagnosis knew.
+    known: what is Known of their robots by the entry of their files, with an empty name of our own.
     """
     told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
     points, found = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget))
     measured, listed = [], []
     for row in told.to_dict("records"):
-        name = row["robot"]
+        name, robot = row["robot"], robot_of(row["drawn"])
+        about = known[robot.file]
         taken_out = row["truth"] if row["check"] == "effect" else ""
-        own = parts(Robot.from_json(row["drawn"]), row["effects"], found[name], conditions.noise_rms_mm, taken_out)
-        measured.append(_measured(row, points[name], conditions, library, taken_out) | {"right": _right(row, own)})
+        own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
+        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, robot, own)})
         listed.append(own.assign(check=row["check"], robot=name))
     told = told.assign(**pd.DataFrame(measured, index=told.index))
     limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
     return Scored(scores(told), limited, pd.concat(listed, ignore_index=True))
 
 
-def _right(row, listed):
-    """Whether the verdict of a row is right; listed: the robot's rows of `withheld_parts`."""
+def _right(row, robot, listed):
+    """Whether the verdict of a row on a robot is right; listed: the robot's rows of `withheld_parts`."""
     if row["check"] == "many":
         return is_enough(listed, row["strength"])
-    return is_right(row["truth"], row["effects"], row["check"])
+    effects = row["effects"]
+    if robot.file:
+        effects = "+".join(name for name in effects.split("+") if name not in robot.beside) or effects
+    return is_right(row["truth"], effects, row["check"])
 
 
-def _measured(row, points, conditions, library, taken_out):
-    """What is computed from a robot itself: its limits and the share of its gap that is truly closed."""
-    robot = Robot.from_json(row["drawn"])
+def _measured(row, robot, points, about, taken_out):
+    """What is computed from a robot itself: limits, the share of its gap that is truly closed, numbers that hold."""
     calibrated, state = state_of(row)
-    limit = Limits()
-    if row["check"] in _LIMITED:
-        case = _case(points.reset_index(drop=True), conditions, with_truth(library, robot.acting))
-        limit = limits(case, calibrated, robot.acting, _known(library, taken_out))
-    return asdict(limit) | {"share_closed_true": true_share(robot, conditions, calibrated, state, library)}
+    case = _case(points.reset_index(drop=True), about, about.library)
+    closed = true_share(robot, about, case.mechanism, calibrated, state)
+    numbers, hold = held(row["numbers"], robot.numbers(about.conditions))
+    told = {"file": robot.file, "cause": robot.cause, "share_closed_true": closed, "numbers": numbers, "held": hold}
+    return told | asdict(_limits(row, robot, points, about, calibrated, taken_out))
+
+
+def _limits(row, robot, points, about, calibrated, taken_out):
+    """The Limits of a robot."""
+    if row["check"] not in _LIMITED:
+        return Limits()
+    if robot.file:
+        return of_displacement(robot.oracle_chi2)
+    case = _case(points.reset_index(drop=True), about, with_truth(about.library, robot.acting))
+    return limits(case, calibrated, robot.acting, _known(about.library, taken_out))
 
 
 def _known(library, taken_out):
@@ -72,16 +85,21 @@ def _known(library, taken_out):
     return [name for name in library if name != taken_out and taken_out not in HOLDS.get(name, ())]
 
 
-def _case(measurements, conditions, library):
-    """The case of measurements under what all robots share."""
-    return make_case(measurements, conditions.mechanism, conditions.masses, conditions.noise_mm, library)
+def _case(measurements, about, library, mechanism=None):
+    """The case of measurements under what is Known, with the numbers that these tell by default."""
+    conditions = about.conditions
+    mechanism = mechanism or conditions.seen(measurements)
+    return make_case(measurements, mechanism, conditions.masses, conditions.noise_mm, library)
 
 
-def true_share(robot, conditions, calibrated, state, library):
-    """Share of the true gap that the corrected sim closes on runs never driven; NaN without gap or with a lost pose."""
-    driven = noise_free(fresh(robot, conditions), conditions) if robot.causes else None
+def true_share(robot, about, mechanism, calibrated, state):
+    """Share of the true gap that the corrected sim closes on runs never driven; NaN without gap or with a lost pose.
+
+    mechanism: with the numbers that were calibrated.
+    """
+    driven = fresh_runs(robot, about.conditions)
     if driven is None:
         return np.nan
-    case = _case(driven, conditions, library)
+    case = _case(driven, about, about.library, mechanism)
     before, after = case.residual(State(calibrated, {})), case.residual(state)
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))

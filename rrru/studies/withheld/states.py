@@ -19,8 +19,8 @@ VERDICT = [
 ]
 
 
-def state_row(robot, calibrated, state):
-    """Row of `withheld_states` from the calibrated deviations (p,) and the corrected sim."""
+def state_row(robot, calibrated, state, numbers="[]"):
+    """Row of `withheld_states` from the calibrated deviations (p,), the corrected sim and its numbers' errors."""
     effects = [[name, int(shape), np.asarray(value).tolist()] for (name, shape), value in sorted(state.effects.items())]
     return {
         "robot": robot,
@@ -28,6 +28,7 @@ def state_row(robot, calibrated, state):
         "deviations": json.dumps(np.asarray(state.deviations).tolist()),
         "fitted_effects": json.dumps(effects),
         "shapes": json.dumps(state.shape_values, sort_keys=True),
+        "numbers": numbers,
     }
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.withheld.chunks import noise_of
+from rrru.studies.withheld.chunks import PLANTS, noise_of
 from rrru.studies.withheld.verdicts import CAUSES, in_order, is_outside
 
 # of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
@@ -11,8 +11,10 @@ _BINS, _PER_BIN = 10, 20
 _NEAR = 0.05
 # share of a part's true size that the found one may be off
 _NEAR_PART = 0.25
+_WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PREDICTED = f"share closed predicted within {_NEAR:g}"
-_STRONG = "acts == 'one' and strength >= 1.5"
+_SEEN = 1.5
+_STRONG = f"acts == 'one' and strength >= {_SEEN}"
 _WEAK = "acts == 'one' and 0.3 <= strength <= 1.0"
 _WEAK_GROUP = "one effect, gap 0.3 to 1 x noise"
 _ALL_ACTS = ("none", "one", "two", "outside")
@@ -38,6 +40,7 @@ def calibration_error(probability, right):
 
 
 _CALIBRATED = ("all", "expected calibration error", "", None, 0.05)
+_HELD = ("numbers of causes named", "95 % intervals hold the true one", "numbers > 0 and right", "held", 0.9)
 # per check: group, what is counted, which robots (all where empty), column of hits, share asked for or None
 _LABEL = (
     ("one effect, gap >= 1.5 x noise", "named exactly", _STRONG, "right", 0.98),
@@ -52,6 +55,7 @@ _LABEL = (
     (_WEAK_GROUP, "named exactly", _WEAK, "right", None),
     _CALIBRATED,
     ("one effect named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
+    _HELD,
 )
 _EFFECT = (
     ("all", "unexplained", "", "right", 0.95),
@@ -69,10 +73,28 @@ _BACKGROUND = (
     ("one effect besides", "named exactly, with or without joint_axis_error", "acts == 'one'", "right", 0.92),
     _CALIBRATED,
 )
+_OUTSIDE = "acts == 'outside' and strength >= 2"
+_FILE = (
+    ("one cause, gap >= 1.5 x noise", "named exactly", _STRONG, "right", 0.95),
+    ("nothing shows", "false alarms", "acts == 'none'", "wrong", 0.02),
+    ("outside the library, gap >= 2 x noise", "unexplained", _OUTSIDE, "right", None),
+    ("outside the library, gap >= 2 x noise", f"unexplained, or its part {_WITHIN}", _OUTSIDE, "sized", 0.9),
+    ("one place at fault, gap >= 1.5 x noise", "place named", f"{_STRONG} and truth_leg > 0", "leg_right", None),
+    ("one cause, gap below 1.5 x noise", "named exactly", "acts == 'one' and strength < 1.5", "right", None),
+    (
+        "one cause, gap below 1.5 x noise",
+        "oracle detects it",
+        "acts == 'one' and strength < 1.5",
+        "oracle_detects",
+        None,
+    ),
+    _CALIBRATED,
+    ("one cause named, gap >= 1.5 x noise", _PREDICTED, f"{_STRONG} and right", "predicted", 0.9),
+    _HELD,
+)
 _MANY = (("all", "what matters named, nothing that is not there", "", "right", None), _CALIBRATED)
 # of the parts of these robots' gaps
 _SIZED = "kind != 'outside' and strength >= 2"
-_WITHIN = f"found within {100 * _NEAR_PART:g} %"
 _PARTS = (
     ("causes in the library, 0.3 of the gap or more", "named", "kind == 'effect' and share >= 0.3", "named", 0.95),
     ("causes named", "not there", f"kind in {CAUSES} and named", "invented", 0.02),
@@ -95,6 +117,7 @@ _CHECKS = {
     "noise": _NOISE,
     "many": _MANY,
     "background": _BACKGROUND,
+    **dict.fromkeys(PLANTS, _FILE),
     "field": _FIELD,
 }
 
@@ -110,6 +133,7 @@ def summary(scores, limits, parts):
         nothing_wrong=[set(verdict.split("+")) <= set(truth.split("+")) for truth, verdict in pairs],
         predicted=(off <= _NEAR).astype(float).where(off.notna()),
         noise=scores["robot"].map(noise_of),
+        sized=scores["right"] | scores["robot"].isin(_sized(parts)),
     )
     rows = []
     for check, own in _CHECKS.items():
@@ -122,8 +146,31 @@ def summary(scores, limits, parts):
     return pd.DataFrame(rows)
 
 
+def _sized(parts):
+    """Names of robots whose unexplained part is found nearly as large as it is."""
+    return parts.loc[(parts["kind"] == "unexplained") & (parts["strength"] > 0.0) & _near(parts), "robot"]
+
+
+def _near(parts):
+    """Which parts are found nearly as large as they are."""
+    return (parts["found_rms_mm"] - parts["true_rms_mm"]).abs() <= _NEAR_PART * parts["true_rms_mm"]
+
+
 def _each(check, robots):
-    """The rows for single effects and noises, see `_LABEL`."""
+    """The rows for single effects, noises, causes and files, see `_LABEL`."""
+    if check in PLANTS:
+        for cause, own in robots.groupby("cause"):
+            yield cause, "right", f"cause == '{cause}'", "right", None
+            if (own["strength"] >= _SEEN).any():
+                yield (
+                    f"{cause}, gap >= 1.5 x noise",
+                    "right",
+                    f"cause == '{cause}' and strength >= {_SEEN}",
+                    "right",
+                    None,
+                )
+        for file in sorted(robots["file"].unique()):
+            yield file, "right", f"file == '{file}'", "right", None
     if check == "label":
         for effect in sorted(robots.query("acts == 'one'")["truth"].unique()):
             of_it = f"truth == '{effect}'"
@@ -150,7 +197,7 @@ def _seen(parts, robots):
         largest=parts.index.isin(causes.groupby("robot")["strength"].idxmax()),
         joined=parts["robot"].isin(outside),
         invented=parts["strength"] == 0.0,
-        near=(parts["found_rms_mm"] - parts["true_rms_mm"]).abs() <= _NEAR_PART * parts["true_rms_mm"],
+        near=_near(parts),
     )
 
 
@@ -162,7 +209,9 @@ def _row(robots, group, counted, which, column, asked):
         count, value, low, high = len(robots), calibration_error(robots["probability"], robots["right"]), np.nan, np.nan
     else:
         hits = robots[column].dropna().astype(float)
-        count, value = len(hits), hits.mean() if len(hits) else np.nan
+        # of its numbers a robot has several
+        count = int(robots["numbers"].sum()) if column == "held" else len(hits)
+        value = hits.sum() / count if count else np.nan
         low, high = wilson(hits.sum(), count)
     asked = np.nan if asked is None else asked
     return {

@@ -6,7 +6,20 @@ UNEXPLAINED, NONE = "unexplained", "none"
 CAUSES = ("effect", "background")
 # what acts in every robot of the check on a background, asked for or not
 _BACKGROUND = "joint_axis_error"
-_SCORES = ["check", "robot", "kind", "truth", "truth_leg", "strength", "verdict", "right", "leg_right", "probability"]
+_SCORES = [
+    "check",
+    "robot",
+    "kind",
+    "file",
+    "cause",
+    "truth",
+    "truth_leg",
+    "strength",
+    "verdict",
+    "right",
+    "leg_right",
+    "probability",
+]
 
 
 def is_right(truth, verdict, check):
@@ -36,7 +49,7 @@ def scores(told):
         leg_right=(told["leg"] == told["truth_leg"]).astype(float).where(has_leg),
         share_closed=told["share_closed"].where(~told["effects"].isin([NONE, UNEXPLAINED])),
     )
-    return told[[*_SCORES, "oracle_detects", "share_closed_true", "share_closed"]]
+    return told[[*_SCORES, "oracle_detects", "share_closed_true", "share_closed", "numbers", "held"]]
 
 
 def in_order(effects):

@@ -7,14 +7,14 @@ import numpy as np
 
 from rrru.robots.spheres import lower_intersection
 from rrru.studies.printers import firmware, printer_causes, printer_fit
-from rrru.studies.printers.readings import read
+from rrru.studies.printers.files import read
 from tests.places import DATA
 
 SOURCE = DATA / "linear_delta.json"
 ENTRIES = {entry["id"]: entry for entry in json.loads(SOURCE.read_text())}
 PRINTERS = {printer.name: printer for printer in read(SOURCE)}
-STEP = 1e-5
-SETTINGS = {"stopping_step": STEP, "level": 0.05, "imitated_from": 0.95}
+STEP, LEVEL = 1e-5, 0.05
+SETTINGS = {"stopping_step": STEP, "level": LEVEL, "imitated_from": 0.95}
 NINE = np.array([0.6, 0.002, -0.003, 0.4, -0.3, 0.2, 0.7, -0.5, 0.4])
 HEIGHTS, DISTANCES = PRINTERS["printer_16"], PRINTERS["printer_22"]
 # noise of a simulated distance; the firmware's weights make a height as much better
@@ -67,7 +67,7 @@ def with_many_heights(printer, side=6):
 
 def diagnosed(printer):
     """Fit, left-out readings, causes by name and the diagnosis of a printer."""
-    result = printer_fit.fit_printer(printer, STEP)
+    result = printer_fit.fit_printer(printer, STEP, LEVEL)
     left = printer_causes.left_out(result)
-    answers = printer_causes.causes(result, left, printer_causes.Level(SETTINGS["level"], SETTINGS["imitated_from"]))
+    answers = printer_causes.causes(result, left, printer_causes.Level(LEVEL, SETTINGS["imitated_from"]))
     return result, left, {one.cause: one for one in answers}, printer_causes.diagnosis(answers)

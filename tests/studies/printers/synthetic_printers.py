@@ -18,6 +18,8 @@ def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "
             "radius_saved_mm": 150.0 + size,
             "noise_mm": 0.03,
             "suspect_p": np.nan,
+            "effector_tilt_p": np.nan,
+            "effector_tilt_power": np.nan,
         }
         numbers |= {
             "largest_difference": size * (k + 1),
@@ -37,6 +39,7 @@ def printers(count=8, verdicts=("reproduced", "does not belong", "reproduced", "
             "reason": "",
             "suspect": "",
             "cause": "not decidable",
+            "effector_tilt": "",
             "notes": "",
         }
         counts = {"heights": 7, "distances": distances, "numbers": 6, "freedom": 1, "rank": 6}

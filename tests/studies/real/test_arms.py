@@ -1,5 +1,7 @@
 """A small arm of a made-up user through the whole of the study, and what of it is refused."""
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -7,8 +9,7 @@ import yaml
 from rrru.errors import ConfigError, IngestError
 from rrru.gap.settings import GapSettings
 from rrru.store.tables import check
-from rrru.studies.real import arm_tables, arms, figures
-from rrru.studies.real.carry import carried
+from rrru.studies.real import arm_tables, arms, carry, figures
 from rrru.studies.real.schemas import TABLES
 from rrru.studies.real.series import found
 from tests.places import ROOT
@@ -47,7 +48,9 @@ def test_compliance_and_lost_zero_of_a_strange_arm_are_named(studied):
 def test_models_get_better_and_carry(studied):
     steps = arm_tables.tables(studied)["real_steps"].set_index("model")["held_out_rms_mm"]
     assert steps["a"] > 5.0 * steps["b"] > 5.0 * steps["c"]
-    other = carried([studied, studied])
+    numbers = json.loads(json.dumps(carry.told(studied)))
+    one = carry.model(studied.series, numbers, studied.measurements, ROBOTS, _settings())
+    other = carry.carried([one, one])
     assert (other["causes_rms_mm"] < 0.03).all()
 
 

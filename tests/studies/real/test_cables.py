@@ -74,6 +74,16 @@ def test_wrong_section_is_refused(change, message):
     assert message in str(error.value) and "real.sets.mine" in str(error.value)
 
 
+def test_drums_that_take_up_more_than_the_way_are_refused():
+    frame, _ = simulated.cables(5)
+    for drum in ("drum1_rad", "drum2_rad", "drum3_rad"):
+        turned = frame.assign(**{drum: np.degrees(frame[drum])})
+        with pytest.raises(ConfigError, match=rf"mine\.angle_unit: got 'rad, {drum} takes up .* times"):
+            cables.study(turned, SECTION, "mine")
+    with pytest.raises(ConfigError, match="unit of the angles, of the places, radius"):
+        cables.study(frame, SECTION | {"unit": "mm"}, "mine")
+
+
 def test_wrong_readings_are_refused():
     frame, _ = simulated.cables(0)
     with pytest.raises(IngestError, match="column drum2_rad: got no such column"):

@@ -87,6 +87,15 @@ def test_noise_is_that_of_the_usual_reading():
     reading = {"position": ["X", "Y", "Z"], "unit": "mm", "position_std": ["s", "s", "s"]}
     noise_mm, noise_rad = stated_noise(_series(readings={"tcp": reading}), raw)
     assert noise_mm == pytest.approx(0.01) and noise_rad is None
+    for stated in (0.0, -0.01):
+        with pytest.raises(ConfigError, match=r"log_x\.csv: column s: 0 or less at the median"):
+            stated_noise(_series(readings={"tcp": reading}), RAW.assign(s=stated))
+
+
+def test_a_temperature_is_handed_on_and_blanks_of_it_are_told_by_its_name():
+    found = sheet(_series(temperature="T"), RAW.assign(T=21.5))
+    assert (found["temperature_c"] == 21.5).all()
+    _refused(RAW, r"mine\.temperature: no column 'T'", temperature="T")
 
 
 def test_what_ingest_refuses_is_told_in_the_words_of_the_file():

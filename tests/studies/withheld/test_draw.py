@@ -14,14 +14,16 @@ from rrru.gap.make_case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.studies.withheld import draw
-from rrru.studies.withheld.chunks import Member, check, chunks, noise_of
+from rrru.studies.withheld.chunks import PLANTS, Member, check, chunks, noise_of
+from rrru.studies.withheld.members import robot_of
 from rrru.studies.withheld.noise import NOISES
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS, OUTSIDE
-from rrru.studies.withheld.robots import Robot, noise_free, true_gap_mm
+from rrru.studies.withheld.robots import noise_free, true_gap_mm
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
 _MECHANISM = CONDITIONS.mechanism
+_CONFIG = {"campaigns": {"paper": {}}, "robots": {"rrru3": {"L1_mm": 400.0}, "mine": {"mjcf": "mine.xml"}}}
 
 
 def _calibrated(measurements):
@@ -47,7 +49,7 @@ def test_a_robot_is_its_seed_and_survives_as_text(number):
     robot = draw.draw(member, CONDITIONS)
     assert robot == draw.draw(member, CONDITIONS)
     assert robot != draw.draw(member, replace(CONDITIONS, seed=2022))
-    assert Robot.from_json(robot.answer(CONDITIONS)["drawn"]) == robot
+    assert robot_of(robot.answer(CONDITIONS)["drawn"]) == robot
     campaign = robot.campaign(CONDITIONS)
     measured, again = (rows.measured(campaign.run()[0]) for _ in range(2))
     np.testing.assert_array_equal(measured, again)
@@ -176,9 +178,9 @@ def test_the_laws_from_outside_do_as_they_say():
 
 def test_chunks_hold_every_robot_once():
     section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
-    parts = list(chunks(section | {"per_noise": 0, "many": 0, "background": 0}).values())
-    count = 7 + 3 * len(EFFECTS)
-    assert [len(part) for part in parts] == [*[4] * (count // 4), *([count % 4] if count % 4 else [])]
+    others = {"per_noise": 0, "many": 0, "background": 0, "mujoco": 0, "own": 0, "files": []}
+    parts = list(chunks(section | others).values())
+    assert [len(part) for part in parts] == [4] * 10 + [3]
     names = [member.name for part in parts for member in part]
     assert names[:8] == [*(f"label_{k:04d}" for k in range(7)), "effect_backlash_0000"]
     assert names[7:] == [f"effect_{effect}_{k:04d}" for effect in EFFECTS for k in range(3)]
@@ -186,16 +188,46 @@ def test_chunks_hold_every_robot_once():
 
 def test_chunks_hold_the_robots_of_every_check():
     section = {"robots": 1, "per_effect": 1, "effects": ["backlash"], "per_noise": 2, "many": 3, "background": 2}
-    (members,) = chunks(section | {"chunk": 100}).values()
+    section |= {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]}
+    members = [member for chunk in chunks(section | {"chunk": 100}).values() for member in chunk]
     counted = Counter(member.check for member in members)
-    assert counted == {"label": 1, "effect": 1, "noise": 2 * len(NOISES), "many": 3, "background": 2}
+    assert counted == {
+        "label": 1,
+        "effect": 1,
+        "noise": 2 * len(NOISES),
+        "many": 3,
+        "background": 2,
+        "mujoco": 4,
+        "own": 3,
+    }
     assert len({member.name for member in members}) == len(members)
     for member in members:
         assert noise_of(member.name) == (member.about if member.check == "noise" else "")
         assert member.taken_out == ("backlash" if member.check == "effect" else "")
+        assert member.file == (member.about if member.check in PLANTS else "")
+    driven = {plant: [(one.about, one.number) for one in members if one.check == plant] for plant in PLANTS}
+    # the same robots on either plant, and the files take turns
+    assert set(driven["own"]) < set(driven["mujoco"])
+    assert Counter(file for file, _ in driven["mujoco"]) == {"a_file": 2, "b_file": 2}
+
+
+def test_robots_of_a_chunk_have_the_same_drives():
+    section = {"robots": 3, "per_effect": 0, "effects": [], "per_noise": 0, "many": 0, "background": 0, "chunk": 2}
+    parts = chunks(section | {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]})
+    assert [len({member.file for member in members}) for members in parts.values()] == [1] * len(parts)
+    assert sum(map(len, parts.values())) == 10 and list(parts)[:2] == ["robots_0000", "robots_0002"]
 
 
 @pytest.mark.parametrize(("key", "value"), [("field", ["nosuch"]), ("effects", ["nosuch"])])
 def test_unknown_names_are_refused(key, value):
     with pytest.raises(ConfigError, match=f"withheld.{key} has 'nosuch'"):
-        check({"campaigns": {"paper": {}}, "withheld": {"field": ["paper"], "effects": ["backlash"]} | {key: value}})
+        check(_CONFIG | {"withheld": {"field": ["paper"], "effects": ["backlash"], "files": []} | {key: value}})
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [("nosuch", "robots has no 'nosuch'"), ("rrru3", "has the mjcf ''"), ("mine", "has the mjcf 'mine.xml'")],
+)
+def test_files_that_the_check_has_no_places_in_are_refused(file, message):
+    with pytest.raises(ConfigError, match=message):
+        check(_CONFIG | {"withheld": {"field": [], "effects": [], "files": [file]}})

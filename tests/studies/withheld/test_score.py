@@ -14,6 +14,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.state import State
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.field import field_verdicts, read_field_answers, score_field
+from rrru.studies.withheld.members import Known
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.robots import noise_free
@@ -54,7 +55,7 @@ def _scored(robots, verdicts, states):
     told = answers[["robot", "kind"]].merge(told, on="robot")
     corrected = pd.DataFrame([state_row(name, *state) for name, state in states.items()])
     budget = pd.DataFrame([{"robot": name} | _PART for name in robots])
-    scored = score_chunk(answers, measurements, told, corrected, budget, CONDITIONS)
+    scored = score_chunk(answers, measurements, told, corrected, budget, {"": Known(CONDITIONS)})
     for name, frame in scored._asdict().items():
         check(f"withheld_{name}", frame)
     return scored.scores.set_index("robot")
@@ -196,6 +197,10 @@ def _scores(*entries):
         "oracle_detects": True,
         "share_closed": 0.8,
         "share_closed_true": 0.82,
+        "file": "",
+        "cause": "",
+        "numbers": 0,
+        "held": 0,
     }
     return pd.DataFrame(
         [

@@ -12,6 +12,7 @@ rule calibrate:
         **named(["measurements", "campaigns"], part),
     output:
         **named(CALIBRATION_TABLES, part),
+        robot=f"{RESULTS}/campaigns/{{campaign}}/robot.json",
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:

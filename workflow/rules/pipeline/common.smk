@@ -1,6 +1,7 @@
 import hashlib
 from pathlib import Path
 
+import rrru.report
 from rrru.objects import module_file
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
@@ -18,6 +19,8 @@ CHECKS = ["rrru.studies.config:check"]
 # what a study has of a paper's numbers, by the paper's letter: its package with `published` and `audit`, the tables
 # that hold its own numbers, and what it reads of the configuration
 PAPERS = {}
+# tables of studies that are no part of the default run: a page shows what lies there of them, and makes none of it
+OPTIONAL = ["withheld_summary", "withheld_advice_summary", "real_verdicts", "real_steps", "real_budget"]
 
 
 wildcard_constraints:
@@ -27,6 +30,11 @@ wildcard_constraints:
 def part(name, campaign="{campaign}"):
     """Path of one campaign's part of a table."""
     return f"{RESULTS}/campaigns/{campaign}/{name}.parquet"
+
+
+def verdict(campaign="{campaign}"):
+    """Path of one campaign's answer for scripts."""
+    return f"{RESULTS}/campaigns/{campaign}/verdict.json"
 
 
 def table(name):
@@ -45,8 +53,9 @@ def named(names, place=table):
 
 
 def drawn(figures, folder="figures"):
-    """Paths of figures as PDF and PNG, by name."""
-    return {f"{name}_{kind}": f"{RESULTS}/{folder}/{name}.{kind}" for name in figures for kind in ("pdf", "png")}
+    """Paths of figures as PDF, PNG and SVG, by name."""
+    kinds = ("pdf", "png", "svg")
+    return {f"{name}_{kind}": f"{RESULTS}/{folder}/{name}.{kind}" for name in figures for kind in kinds}
 
 
 def shown(figures):
@@ -106,7 +115,7 @@ def diagnosed(wildcards):
         "noise_rad": section.get("noise_rad"),
         "noise_known": section.get("noise_known", False),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
-        "figures": GAP_FIGURE,
+        "figures": GAP_FIGURES,
         "options": {"campaign": wildcards.campaign},
         **reads("seed", "gap"),
     }
@@ -138,3 +147,31 @@ def paper_options():
         "sweep_operators": config["genetic"]["operators"],
         "sweep_calibration": reproduce["line_calibration"],
     }
+
+
+def template_digests():
+    """Digests of a page's templates, by name."""
+    files = sorted(Path(rrru.report.__file__).parent.glob("templates/*"))
+    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def optional_digests(_):
+    """Digests of the optional studies' tables that are there."""
+    files = [Path(table(name)) for name in OPTIONAL]
+    return {file.stem: hashlib.sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()}
+
+
+def campaign_page(wildcards):
+    """All that the page of one campaign shows."""
+    name = wildcards.campaign
+    calibrated = name in CAMPAIGNS
+    tables = [*GAP_TABLES, *(CAMPAIGN_TABLES if calibrated else [])]
+    own = drawn(CAMPAIGN_FIGURES, "figures" if name == REPRODUCED else f"figures/{name}") if calibrated else {}
+    drawings = (own | drawn(GAP_FIGURES, f"figures/{name}")).values()
+    return [verdict(name), *(part(one, name) for one in tables), *drawings]
+
+
+def diagnosed_as(kind):
+    """Pattern of the campaigns whose robot's file is written back as this kind, "" for those without one."""
+    names = (name for name, section in DIAGNOSED.items() if parts.corrected_kind(config, section) == kind)
+    return "|".join(names) or "(?!)"

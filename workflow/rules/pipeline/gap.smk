@@ -11,25 +11,21 @@ GAP_TABLES = [
     "gap_next_runs",
     "gap_next_poses",
 ]
-GAP_FIGURE = {
-    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"])
+GAP_FIGURES = {
+    "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"]),
+    "gap_map": ("rrru.figures.gap:where", ["gap_verdicts", "gap_points"]),
 }
 
 
-def diagnosed_as(kind):
-    """Pattern of the campaigns whose robot's file is written back as this kind, "" for those without one."""
-    names = (name for name, section in DIAGNOSED.items() if parts.corrected_kind(config, section) == kind)
-    return "|".join(names) or "(?!)"
-
-
-# one job per campaign, its figure included: starting another would take longer than drawing it. It sees the
+# one job per campaign, its figures included: starting another would take longer than drawing them. It sees the
 # measurements and what the configuration says of the robot
 rule diagnose:
     input:
         measurements=part("measurements"),
     output:
         **named([*GAP_TABLES, "gap_points"], part),
-        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        **drawn(GAP_FIGURES, "figures/{campaign}"),
+        verdict=verdict(),
     log:
         f"{RESULTS}/logs/diagnose/{{campaign}}.log",
     wildcard_constraints:
@@ -37,7 +33,7 @@ rule diagnose:
     params:
         settings=diagnosed,
         own_effects=own_effects_digests(),
-        code=code("diagnose", GAP_FIGURE),
+        code=code("diagnose", GAP_FIGURES),
     script:
         "../../scripts/diagnose.py"
 
@@ -46,7 +42,8 @@ rule diagnose:
 use rule diagnose as diagnose_mjcf with:
     output:
         **named([*GAP_TABLES, "gap_points", "corrected_drives"], part),
-        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        **drawn(GAP_FIGURES, "figures/{campaign}"),
+        verdict=verdict(),
         corrected=f"{RESULTS}/campaigns/{{campaign}}/corrected.xml",
     wildcard_constraints:
         campaign=diagnosed_as("xml"),
@@ -55,7 +52,8 @@ use rule diagnose as diagnose_mjcf with:
 use rule diagnose as diagnose_urdf with:
     output:
         **named([*GAP_TABLES, "gap_points", "corrected_drives"], part),
-        **drawn(GAP_FIGURE, "figures/{campaign}"),
+        **drawn(GAP_FIGURES, "figures/{campaign}"),
+        verdict=verdict(),
         corrected=f"{RESULTS}/campaigns/{{campaign}}/corrected.urdf",
     wildcard_constraints:
         campaign=diagnosed_as("urdf"),
@@ -74,6 +72,7 @@ rule gap:
     input:
         named(GAP_TABLES).values(),
         [f"{RESULTS}/figures/{campaign}/gap.png" for campaign in DIAGNOSED],
+        [verdict(campaign) for campaign in DIAGNOSED],
 
 
 TARGETS += rules.gap.input

@@ -6,13 +6,15 @@ PRINTER_TABLES = ["printers", "printer_parameters", "printer_readings", "printer
 PRINTER_FIGURES = {"printers": ("rrru.studies.printers.figures:printers", ["printers"])}
 FIGURES["printer"] = PRINTER_FIGURES
 
-if not Path(config["printers"]["file"]).is_file():
-    raise ConfigError(f"printers.file: there is no file {config['printers']['file']}")
+PRINTER_FILES = config["printers"]["files"]
+for _file in PRINTER_FILES:
+    if not Path(_file).is_file():
+        raise ConfigError(f"printers.files: there is no file {_file}")
 
 
 rule calibrate_printers:
     input:
-        file=config["printers"]["file"],
+        files=PRINTER_FILES,
     output:
         **named(PRINTER_TABLES),
     log:

@@ -1,5 +1,5 @@
 from rrru.studies.real import series as real_series
-from rrru.studies.real.schemas import TABLES as REAL_SCHEMAS
+from rrru.studies.real.schemas import SERIES_TABLES as SERIES_SCHEMAS, TABLES as REAL_SCHEMAS
 
 CHECKS.append("rrru.studies.real.series:check")
 REAL_TABLES = [one.name for one in REAL_SCHEMAS]
@@ -15,9 +15,46 @@ ARM_FIGURES = {
 LENGTH_FIGURES = {"lengths": ("rrru.studies.real.figures_lengths:lengths", ["real_points", "real_parameters"])}
 
 
+# series of the arms' sets by name of the set
+REAL_SERIES = {name: [one.name for one in real_series.found(config["real"], name)] for name in REAL_ARMS}
+ONE_SERIES = under("real/{set}/{series}")
+
+
+def of_series(place):
+    """Input function: a file of every series of a set, from its path with their names as wildcards."""
+    return lambda wildcards: [
+        place.replace("{set}", wildcards.set).replace("{series}", series) for series in REAL_SERIES[wildcards.set]
+    ]
+
+
+rule study_series:
+    input:
+        files=lambda wildcards: real_series.files(config, wildcards.set, wildcards.series),
+    output:
+        **named([one.name for one in SERIES_SCHEMAS], ONE_SERIES),
+        measurements=ONE_SERIES("measurements"),
+        model=f"{RESULTS}/real/{{set}}/{{series}}/model.json",
+    log:
+        f"{RESULTS}/logs/real/{{set}}/{{series}}.log",
+    wildcard_constraints:
+        set="|".join(REAL_ARMS) or "(?!)",
+    params:
+        settings=lambda wildcards: {
+            "series": wildcards.series,
+            **real_series.part(config, wildcards.set),
+            **reads("seed", "gap"),
+        },
+        own_effects=own_effects_digests(),
+        code=code("real_series"),
+    script:
+        "../../scripts/real_series.py"
+
+
 rule study_arm:
     input:
-        files=lambda wildcards: real_series.files(config, wildcards.set),
+        **{one.name: of_series(ONE_SERIES(one.name)) for one in SERIES_SCHEMAS},
+        measurements=of_series(rules.study_series.output.measurements),
+        model=of_series(rules.study_series.output.model),
     output:
         **named(REAL_TABLES, under("real/{set}")),
         **drawn(ARM_FIGURES, "figures/real/{set}"),
@@ -32,25 +69,26 @@ rule study_arm:
             **reads("seed", "gap"),
         },
         own_effects=own_effects_digests(),
-        code=code("real", ARM_FIGURES),
+        code=code("real_arm", ARM_FIGURES),
     script:
-        "../../scripts/real.py"
+        "../../scripts/real_arm.py"
 
 
-use rule study_arm as study_lengths with:
+rule study_lengths:
+    input:
+        files=lambda wildcards: real_series.files(config, wildcards.set),
     output:
         **named(REAL_TABLES, under("real/{set}")),
         **drawn(LENGTH_FIGURES, "figures/real/{set}"),
+    log:
+        f"{RESULTS}/logs/real/{{set}}.log",
     wildcard_constraints:
         set="|".join(REAL_LENGTHS) or "(?!)",
     params:
-        settings=lambda wildcards: {
-            "figures": LENGTH_FIGURES,
-            **real_series.part(config, wildcards.set),
-            **reads("seed", "gap"),
-        },
-        own_effects=own_effects_digests(),
-        code=code("real", LENGTH_FIGURES),
+        settings=lambda wildcards: {"figures": LENGTH_FIGURES, **real_series.part(config, wildcards.set)},
+        code=code("real_lengths", LENGTH_FIGURES),
+    script:
+        "../../scripts/real_lengths.py"
 
 
 use rule gather as gather_real with:

@@ -1,4 +1,4 @@
-from rrru.studies.withheld.chunks import chunks, rivalled
+from rrru.studies.withheld.chunks import chunks, described, rivalled
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
@@ -13,7 +13,15 @@ WITHHELD_FIGURES = {
         ["withheld_scores", "withheld_confusion", "withheld_parts"],
     )
 }
+PLANTS_FIGURES = {
+    "withheld_plants": (
+        "rrru.studies.withheld.figures:plants",
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+    )
+}
 FIGURES["withheld"] = WITHHELD_FIGURES
+if config["withheld"]["mujoco"] + config["withheld"]["own"]:
+    FIGURES["withheld"] = WITHHELD_FIGURES | PLANTS_FIGURES
 # and those among them on which other ways to find a cause are tried
 RIVALLED = rivalled(config["withheld"])
 # what is known of every robot
@@ -22,6 +30,11 @@ WITHHELD_ROBOT = {
     "masses": parts.masses(config, {}),
     **reads("seed", "withheld.noise_mm"),
 }
+
+
+def withheld_known(wildcards):
+    """What is known of the robots of a chunk, those of files by the file's entry."""
+    return {"files": described(config, WITHHELD[wildcards.chunk]), **WITHHELD_ROBOT}
 
 
 wildcard_constraints:
@@ -34,7 +47,11 @@ rule withheld_robots:
     log:
         f"{RESULTS}/logs/withheld_robots/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {"members": WITHHELD[wildcards.chunk], **WITHHELD_ROBOT, **reads("motion")},
+        settings=lambda wildcards: {
+            "members": WITHHELD[wildcards.chunk],
+            **withheld_known(wildcards),
+            **reads("motion"),
+        },
         code=code("withheld_robots"),
     script:
         "../../scripts/withheld_robots.py"
@@ -50,8 +67,8 @@ rule withheld_diagnose:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
         settings=lambda wildcards: {
-            "robots": {member.name: (member.check, member.taken_out) for member in WITHHELD[wildcards.chunk]},
-            **WITHHELD_ROBOT,
+            "robots": {one.name: (one.check, one.taken_out, one.file) for one in WITHHELD[wildcards.chunk]},
+            **withheld_known(wildcards),
             **reads("gap"),
         },
         own_effects=own_effects_digests(),
@@ -71,7 +88,7 @@ rule withheld_score:
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        settings={**WITHHELD_ROBOT, **reads("motion", "gap")},
+        settings=lambda wildcards: {**withheld_known(wildcards), **reads("motion", "gap")},
         own_effects=own_effects_digests(),
         code=code("withheld_score"),
     script:
@@ -152,4 +169,4 @@ rule withheld:
     input:
         named([*WITHHELD_TABLES, *WITHHELD_ADVICE]).values(),
         rules.withheld_methods.output,
-        drawn(WITHHELD_FIGURES).values(),
+        drawn(FIGURES["withheld"]).values(),

@@ -1,0 +1,38 @@
+"""Thermal expansion: all links have the length that belongs to the temperature that was measured.
+
+With its coefficient of expansion a every length l of the drawing, which holds at 20 degrees, is at the temperature T
+
+    l (1 + a (T - 20 C))
+
+It enters at the lengths. `thermal_growth` is about a robot that warms up by itself and has a limit; this law follows
+what a file states, up and down. Which of the two a campaign shows the evidence tells.
+
+Assumptions: the robot has the temperature of the probe: one that sits on it, or in air that changes slowly; one
+material, no drift of the tracker.
+
+Source: ISO 1:2022 (reference temperature); coefficients 1.2e-5 (steel) and 2.3e-5 per kelvin (aluminium), Incropera and
+DeWitt, Fundamentals of Heat and Mass Transfer, table A.1.
+"""
+
+import numpy as np
+
+from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.parameters import Parameter, ParameterSet
+
+# a law of campaigns that state a temperature: it is tested where a configuration names it
+BY_NAME_ONLY = True
+
+_PARAMETERS = ParameterSet((Parameter("expansion", "1/K", 0.0, 0.0, 1e-4, "aluminium 2.3e-5, steel 1.2e-5"),))
+_TYPICAL, _DRAWN_C = 2e-5, 20.0
+
+
+def for_robot(_robot):
+    """The law, the same for every robot."""
+    coordinates = plain_coordinates(_PARAMETERS, _TYPICAL)
+    return Effect("thermal_expansion", _PARAMETERS, coordinates, _grown, ("temperature_c",))
+
+
+def _grown(motion, values):
+    """Shifts of every link's end by its growth under a coefficient (1,); none where no temperature is known."""
+    share = values[0] * np.nan_to_num(motion.temperature_c - _DRAWN_C)
+    return Contribution(np.multiply.outer(share, motion.robot.legs.growth))

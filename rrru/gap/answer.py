@@ -1,0 +1,191 @@
+"""The answer of a diagnosis for people and for scripts: sentences in plain words, and the same facts as `verdict.json`.
+
+`workflow/schemas/verdict.schema.yaml` says what stands in it. mm, rad; sizes are root mean squares of 3-D distances.
+"""
+
+import numpy as np
+
+from rrru.effects.library import summary
+
+SCHEMA = 1
+_VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
+_NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
+_PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
+_NUMBER = ("parameter", "unit", "value", "standard_error", "at_bound")
+_RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
+_APART = ("none", "unexplained")
+_OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+# more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs
+_LISTED, _WORTH, _SURE = 3, 0.05, 0.9
+
+
+def answer(campaign, verdict, tables):
+    """The facts of one campaign as a mapping, which `rrru.store.facts` writes.
+
+    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name.
+    """
+    budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
+    names = [name for name in verdict["effects"].split("+") if name not in _APART]
+    facts = {
+        "schema": SCHEMA,
+        "campaign": campaign,
+        "effects": [_effect(name, tables, budget) for name in names],
+        "unexplained": "unexplained" in verdict["effects"].split("+"),
+        "probability": verdict["probability"],
+        "leg": verdict["leg"] or None,
+        "where": verdict["where"],
+        "confusable_with": [name for name in verdict["confusable_with"].split(", ") if name],
+        **_row(verdict, _VERDICT + _NOISE),
+        "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
+        "budget": budget,
+        "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
+        **_row(verdict, ("points", "dropped_points")),
+        "notes": [note for note in verdict["notes"].split("; ") if note],
+    }
+    return facts | {"sentences": sentences(facts)}
+
+
+def sentences(facts):
+    """What the facts say, in sentences for somebody who knows the robot and no statistics."""
+    said = [_missed(facts), *_causes(facts), *_scatter(facts)]
+    said += _left(facts) if facts["effects"] else []
+    if facts["confusable_with"]:
+        others = ", ".join(_OUTSIDE.get(name, readable(name)) for name in facts["confusable_with"])
+        said.append(f"{'Parts of it could be' if facts['unexplained'] else 'These data cannot rule out'}: {others}.")
+    return [*said, _next(facts)]
+
+
+def readable(name):
+    """The name of an effect, or of several joined by +, as words."""
+    return name.replace("_", " ").replace("+", " + ")
+
+
+def rounded(value, digits=2):
+    """A number to some significant digits, without an exponent."""
+    if not (value and np.isfinite(value)):
+        return "0"
+    places = digits - 1 - int(np.floor(np.log10(abs(value))))
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def with_error(value, error):
+    """A number and its standard error, both to the error's digits: one, two where it begins with 1."""
+    exponent = int(np.floor(np.log10(error)))
+    places = -exponent + (error < 2.0 * 10.0**exponent)
+    value, error = round(value, places), round(error, places)
+    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f}"
+
+
+def probability(value):
+    """A probability to two digits that claims no certainty."""
+    return "more than 0.99" if value > 0.995 else "less than 0.01" if value < 0.005 else f"{value:.2f}"
+
+
+def percent(share):
+    """A share in per cent; what effects that imitate each other have too much is left out."""
+    return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
+
+
+def _row(values, names):
+    """Some entries of a mapping."""
+    return {name: values[name] for name in names}
+
+
+def _effect(name, tables, budget):
+    """Facts of one effect of the verdict."""
+    share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
+    cause = tables["gap_attribute"].set_index("effect").loc[name]
+    numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
+    return {
+        "name": name,
+        "meaning": summary(name),
+        "probability": cause["probability"],
+        "legs": cause["legs"] if isinstance(cause["legs"], str) else "",
+        **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
+        "parameters": [_row(number, _NUMBER) for number in numbers],
+    }
+
+
+def _missed(facts):
+    """How far off the calibrated robot is."""
+    gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
+    if facts["effects"] or facts["unexplained"]:
+        return f"After calibration the robot still misses by {gap} mm."
+    sure = probability(facts["probability"])
+    return (
+        f"After calibration nothing systematic is left that these data could show (probability {sure}): "
+        f"the robot misses by {gap} mm, the measuring noise is {noise} mm."
+    )
+
+
+def _causes(facts):
+    """What makes the gap, and how sure that is."""
+    said = [_cause(effect, "" if number else " of that") for number, effect in enumerate(facts["effects"])]
+    if sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + _WORTH:
+        said.append("These shares overlap, since the effects imitate each other in part.")
+    if facts["unexplained"]:
+        share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
+        if said:
+            said.append(f"Beside that {share} is systematic and like no effect of the library.")
+        else:
+            said.append(
+                f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
+            )
+    if said:
+        said.append(f"Probability of this answer: {probability(facts['probability'])}.")
+    return said
+
+
+def _cause(effect, follow):
+    """One effect: its share, name, leg, sizes and meaning."""
+    share = f"{percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
+    leg = f" in leg {effect['legs']}" if effect["legs"].isdigit() else ""
+    sizes = _sizes(effect["parameters"])
+    size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
+    meaning = f": {effect['meaning']}" if effect["meaning"] else ""
+    return f"{share} {readable(effect['name'])}{leg}{size}{meaning}."
+
+
+def _sizes(parameters):
+    """Numbers that were fitted with their errors, those that are one number under several names once."""
+    by_size = {}
+    for one in parameters:
+        if np.isfinite(one["standard_error"] or np.nan):
+            unit = "" if one["unit"] == "1" else f" {one['unit']}"
+            by_size.setdefault(with_error(one["value"], one["standard_error"]) + unit, []).append(one["parameter"])
+    return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
+
+
+def _scatter(facts):
+    """What does not repeat, where it matters."""
+    share = sum(part["share"] for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
+    if share < _WORTH:
+        return []
+    return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
+
+
+def _left(facts):
+    """What is left once the effects are in the simulator."""
+    after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
+    what = "it" if len(facts["effects"]) == 1 else "them"
+    return [f"Add {what} to the simulator and {after} mm is left on runs it has not seen; the noise is {noise} mm."]
+
+
+def _next(facts):
+    """What to measure next."""
+    if facts["next"]:
+        best = facts["next"][0]
+        verb = "measure" if best["kind"] == "poses" else "drive"
+        return f"Next: {verb} {best['run']}. That decides {_contest(best['separates'])}."
+    if facts["unexplained"]:
+        return "Next: no run is advised, since the library has nothing to test; see where the gap lies."
+    if facts["probability"] >= _SURE:
+        return "Next: nothing more needs to be measured for this answer."
+    return "Next: no further run that was tried in computation would settle it."
+
+
+def _contest(separates):
+    """In what two answers "a+b / a+c" differ, in words."""
+    first, second = (set(side.split("+")) for side in separates.split(" / "))
+    sides = [" + ".join(map(readable, sorted(one - other))) for one, other in ((first, second), (second, first))]
+    return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"

@@ -1,0 +1,114 @@
+"""The answers on the first screen: one card per campaign, from its `verdict.json` and what is told of the campaign."""
+
+from dataclasses import dataclass
+
+from rrru.gap.answer import percent, probability, readable, rounded
+
+# colours of the budget's parts: effects in the order of their share, then what is no effect
+_EFFECTS = ("blue", "sky", "green", "pink", "yellow")
+_OTHERS = {"unexplained": "vermilion", "scatter": "grey", "runs": "light"}
+_WORDS = {
+    "scatter": "does not repeat",
+    "runs": "offsets between runs",
+    "unexplained": "nothing in the library explains it",
+}
+_LEAST_SHARE = 0.005
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the budget: words, colour, share of the bar (%), and its share with its interval as text."""
+
+    words: str
+    colour: str
+    width: float
+    share: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """A bar of before and after: words, size as text, share of the longest bar (%), and its look."""
+
+    words: str
+    size: str
+    width: float
+    look: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead
+    sentence, the others, what is next, notes, and parts and steps of the bars.
+    """
+
+    campaign: str
+    source: str
+    short: str
+    misses: str
+    left: str
+    noise: str
+    lead: str
+    sentences: list
+    next: str
+    notes: list
+    parts: list
+    steps: list
+
+
+def card(facts, source="", before_mm=None):
+    """The Card of facts; source: where the campaign came from; before_mm: rms error before any calibration."""
+    lead, *others, following = facts["sentences"]
+    if before_mm is not None:
+        others = [f"Before any calibration the error was {rounded(before_mm)} mm.", *others]
+    return Card(
+        facts["campaign"],
+        source,
+        _short(facts),
+        rounded(facts["gap_rms_mm"]),
+        rounded(facts["gap_after_rms_mm"]),
+        rounded(facts["noise_rms_mm"]),
+        lead,
+        others,
+        following,
+        facts["notes"],
+        _parts(facts["budget"]),
+        _steps(facts),
+    )
+
+
+def _short(facts):
+    """The answer in a line: causes with their shares, how sure, and what is next."""
+    named = [(readable(effect["name"]), effect["share"]) for effect in facts["effects"]]
+    if facts["unexplained"]:
+        share = next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained")
+        named.append(("something unexplained", share))
+    causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
+    following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
+    return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
+
+
+def _parts(budget):
+    """Parts of the budget that add up, effects by share first."""
+    shown = [part for part in budget if part["kind"] in ("effect", *_OTHERS) and part["share"] > _LEAST_SHARE]
+    effects = sorted((p for p in shown if p["kind"] == "effect"), key=lambda part: -part["share"])
+    others = [part for kind in _OTHERS for part in shown if part["kind"] == kind]
+    whole = sum(part["share"] for part in shown) or 1.0
+    return [
+        Part(
+            _WORDS.get(part["kind"], readable(part["part"])),
+            _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
+            round(100.0 * part["share"] / whole, 2),
+            f"{percent(part['share'])} ({percent(part['share_low'])} to {percent(part['share_high'])})",
+        )
+        for number, part in enumerate([*effects, *others])
+    ]
+
+
+def _steps(facts):
+    """The gap before and after the effects are added, beside the noise."""
+    rows = [("after calibration", facts["gap_rms_mm"], "before")]
+    if facts["effects"]:
+        rows.append(("with the effects too", facts["gap_after_rms_mm"], "after"))
+    rows.append(("measuring noise", facts["noise_rms_mm"], "noise"))
+    longest = max(size for _, size, _ in rows) or 1.0
+    return [Step(words, f"{rounded(size)} mm", round(100.0 * size / longest, 2), look) for words, size, look in rows]

@@ -1,0 +1,129 @@
+"""Two calibrated campaigns of one kind of robot: whether their fitted numbers differ beyond their errors. mm, rad."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy.stats import chi2
+
+from rrru.errors import ConfigError
+from rrru.fit.campaign_fit import CalibrationSettings
+from rrru.store import facts, tables
+
+METHOD = "least_squares"
+_READ = ("measurements", "parameters", "correlations", "calibrations", "gap_points")
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two: a name, the campaign, what it was calibrated as, its tables by name and its verdict."""
+
+    name: str
+    campaign: str
+    told: dict
+    frames: dict
+    verdict: dict
+
+    @property
+    def settings(self):
+        """How it was calibrated."""
+        return CalibrationSettings.from_config(self.told["calibration"])
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Differences of fitted numbers: a row per parameter, their chi-square, its degrees of freedom, and how probable
+    chance makes as much.
+    """
+
+    rows: pd.DataFrame
+    chi_square: float
+    freedom: int
+    chance: float
+
+
+def read(folder, campaign, name):
+    """The Side of a campaign in a folder of results; raises ConfigError where it is not there or is not calibrated."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise ConfigError(f"compare: there is no folder {folder}")
+    place = folder / "campaigns" / campaign
+    known = calibrated(folder)
+    if campaign not in known:
+        raise ConfigError(
+            f"compare: {folder} has no calibrated campaign {campaign!r}; it has {', '.join(known) or 'none'}"
+        )
+    missing = [one for one in _READ if not (place / f"{one}.parquet").is_file()]
+    if missing or not (place / "verdict.json").is_file():
+        wanted = ", ".join([*missing, "verdict.json"][:3])
+        raise ConfigError(f"compare: {place} lacks {wanted}; run `snakemake` for it first")
+    frames = {one: tables.read(place / f"{one}.parquet") for one in _READ}
+    return Side(name, campaign, facts.read(place / "robot.json"), frames, facts.read(place / "verdict.json"))
+
+
+def calibrated(folder):
+    """Names of the campaigns of a folder of results that can be compared."""
+    return [place.parent.name for place in sorted(Path(folder).glob("campaigns/*/robot.json"))]
+
+
+def widest(first, second):
+    """The set of trajectories that both are calibrated on, with most points; raises ConfigError where there is none."""
+    counts = [
+        side.frames["calibrations"].query("method == @METHOD").set_index("calibration")["points"]
+        for side in (first, second)
+    ]
+    common = counts[0].index.intersection(counts[1].index)
+    if common.empty:
+        lists = _listed((first, second), (count.index for count in counts))
+        raise ConfigError(f"compare: no set of trajectories that both are calibrated on; {lists}")
+    total = counts[0][common] + counts[1][common]
+    return total.sort_index().idxmax()
+
+
+def _listed(sides, names):
+    """Names of both sides for a message."""
+    return " and ".join(f"{side.name}: {', '.join(own)}" for side, own in zip(sides, names, strict=True))
+
+
+def check(first, second):
+    """Raise ConfigError where the numbers of two sides mean different things."""
+    one, other = first.told["nominal"], second.told["nominal"]
+    if one["name"] != other["name"]:
+        raise ConfigError(f"compare: {first.name} is of a robot {one['name']}, {second.name} of {other['name']}")
+    for key in sorted({*one["dimensions"], *other["dimensions"]}):
+        values = [nominal["dimensions"].get(key) for nominal in (one, other)]
+        if values[0] != values[1]:
+            what = f"{first.name} has {key} {values[0]}, {second.name} {values[1]}"
+            raise ConfigError(f"compare: the nominal robots differ: {what}; deviations count from these")
+
+
+def difference(first, second, calibration):
+    """The Difference of two calibrations on a set; raises ConfigError where they have other parameters."""
+    values, covariances = zip(*(_estimate(side, calibration) for side in (first, second)), strict=True)
+    if list(values[0].index) != list(values[1].index):
+        lists = _listed((first, second), (value.index for value in values))
+        raise ConfigError(f"compare: calibrated with different numbers; {lists}")
+    known = np.isfinite(np.diag(covariances[0])) & np.isfinite(np.diag(covariances[1]))
+    step = (values[1]["value"] - values[0]["value"]).to_numpy()
+    covariance = sum(covariances)[np.ix_(known, known)]
+    error = np.sqrt([np.diag(one) for one in covariances])
+    together = np.hypot(*error)
+    square = float(step[known] @ np.linalg.solve(covariance, step[known])) if known.any() else 0.0
+    frame = pd.DataFrame({"parameter": values[0].index, "unit": values[0]["unit"].to_numpy()})
+    for side, value, own in zip("ab", values, error, strict=True):
+        frame[side], frame[f"{side}_error"] = value["value"].to_numpy(), own
+    frame = frame.assign(difference=step, in_errors=step / together)
+    freedom = int(known.sum())
+    return Difference(frame, square, freedom, float(chi2.sf(square, freedom)) if freedom else 1.0)
+
+
+def _estimate(side, calibration):
+    """Values of a calibration by parameter, and their covariance, NaN for what has no standard error."""
+    own = side.frames["parameters"].query("calibration == @calibration and method == @METHOD").set_index("parameter")
+    pairs = side.frames["correlations"].query("calibration == @calibration")
+    matrix = pd.DataFrame(np.eye(len(own)), index=own.index, columns=own.index)
+    for first, second, value in pairs[["parameter_a", "parameter_b", "correlation"]].itertuples(index=False):
+        matrix.loc[first, second] = matrix.loc[second, first] = value
+    error = own["standard_error"].where(own["seen"] & ~own["at_bound"]).to_numpy()
+    return own, matrix.to_numpy() * np.outer(error, error)

@@ -1,0 +1,186 @@
+"""One page on which of two calibrations to trust: `python -m rrru.report.compare_page A B page.html`.
+
+A and B are folders of results, campaigns of `results`, or `folder:campaign`.
+"""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from rrru.errors import ConfigError, RrruError
+from rrru.gap.answer import probability, readable, rounded
+from rrru.report import cells, compare, page
+from rrru.report.compare_gap import gap_difference
+from rrru.report.compare_unseen import same_points, unseen
+
+_RESULTS = "results"
+# less likely by chance than this counts as a difference
+_LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """What the page says of one pair of campaigns: key, title, sentences, what points were used, tables."""
+
+    key: str
+    title: str
+    sentences: list
+    points: str
+    grids: list
+
+
+def pairs(first, second):
+    """Pairs ((folder, campaign), (folder, campaign)) of two arguments; raises ConfigError where they give none."""
+    places = [_place(text) for text in (first, second)]
+    if places[0] == places[1]:
+        raise ConfigError(f"compare: A and B are both {first}; give two folders, or two campaigns of {_RESULTS}")
+    (one, campaign), (other, other_campaign) = places
+    if campaign or other_campaign:
+        return [((one, campaign or other_campaign), (other, other_campaign or campaign))]
+    common = [name for name in compare.calibrated(one) if name in compare.calibrated(other)]
+    if not common:
+        lists = " and ".join(
+            f"{folder} has {', '.join(compare.calibrated(folder)) or 'none'}" for folder in (one, other)
+        )
+        raise ConfigError(f"compare: no calibrated campaign that both folders have: {lists}")
+    return [((one, name), (other, name)) for name in common]
+
+
+def write(first, second, path):
+    """Write the page of two arguments as a whole or not at all."""
+    chapters = [_chapter(*pair) for pair in pairs(first, second)]
+    page.save(page.render("compare.html", chapters=chapters, first=first, second=second), path)
+
+
+def _place(text):
+    """Folder and campaign of an argument, None for all campaigns of a folder."""
+    folder, colon, campaign = text.rpartition(":")
+    if colon:
+        return folder, campaign
+    if Path(text).is_dir():
+        return text.rstrip("/"), None
+    known = compare.calibrated(_RESULTS)
+    if text not in known:
+        listed = ", ".join(known) or "none"
+        raise ConfigError(f"compare: {text!r} is no folder, and no calibrated campaign of {_RESULTS}; it has {listed}")
+    return _RESULTS, text
+
+
+def _chapter(first, second):
+    """What there is to say of two campaigns."""
+    names = [campaign for _, campaign in (first, second)]
+    if names[0] == names[1]:
+        names = [f"{campaign} in {folder}" for folder, campaign in (first, second)]
+    one, other = (compare.read(*place, name) for place, name in zip((first, second), names, strict=True))
+    compare.check(one, other)
+    calibration = compare.widest(one, other)
+    found, gap = compare.difference(one, other, calibration), gap_difference(one, other)
+    judged, shared = unseen(one, other, calibration), same_points(one, other)
+    sentences = [_numbers(found, shared), *_gap(one, other, gap), *_better((one, other), judged)]
+    key = "-".join(dict.fromkeys(campaign for _, campaign in (first, second)))
+    shown = [("Fitted numbers", found.rows), ("What the miss is made of, with 95 % intervals", gap.rows)]
+    if judged:
+        rows = pd.concat([place.rows for place in judged], ignore_index=True)
+        shown.append(("Errors at points that neither has seen", rows))
+    grids = [
+        cells.grid(frame, f"{key}-{number}", title, heads=_heads(frame, names))
+        for number, (title, frame) in enumerate(shown, start=1)
+    ]
+    return Chapter(key, f"{names[0]} beside {names[1]}", sentences, _points(judged, calibration, shared), grids)
+
+
+def _numbers(found, shared):
+    """Whether the fitted numbers differ."""
+    known = found.rows.dropna(subset=["in_errors"])
+    if known.empty:
+        return "The fitted numbers cannot be compared: none has a standard error on both sides."
+    largest = known.loc[known["in_errors"].abs().idxmax()]
+    square = f"chi-square {cells.short(found.chi_square)} with {found.freedom} numbers"
+    measure = f"{square}, by chance with probability {_chance(found.chance)}"
+    most = f"most {largest['parameter']}, by {abs(largest['in_errors']):.1f} standard errors"
+    said = "differ by more than their errors" if found.chance < _LEVEL else "do not differ beyond their errors"
+    beside = f" Both share {shared} measured points, so that the true chi-square is no smaller." if shared else ""
+    return f"The fitted numbers {said} ({measure}; {most}).{beside}"
+
+
+def _gap(one, other, gap):
+    """What each side leaves, and whether that differs."""
+    for side in (one, other):
+        facts = side.verdict
+        names = [effect["name"] for effect in facts["effects"]] + ["unexplained"] * facts["unexplained"]
+        causes = readable("+".join(names)) or "nothing to add"
+        sure = probability(facts["probability"])
+        gap_mm = rounded(facts["gap_rms_mm"])
+        yield f"{side.name} misses by {gap_mm} mm after calibration: {causes} (probability {sure})."
+    differs = list(gap.rows.loc[gap.rows["differs"], "part"])
+    said = "differ" if gap.chance < _LEVEL else "do not differ beyond chance"
+    parts = f" Parts that differ: {', '.join(map(readable, differs))}." if differs else ""
+    yield f"As a whole the two {said} (by chance with probability {_chance(gap.chance)}).{parts}"
+
+
+def _better(sides, judged):
+    """Which side foretells better, campaign by campaign, and what follows."""
+    winners = []
+    for place in judged:
+        sizes = f"{rounded(place.rms_mm[0])} mm against {rounded(place.rms_mm[1])} mm"
+        where = f"On {place.points} points of {place.campaign} that neither has seen"
+        clear = place.chance < _LEVEL
+        winners.append((sides[0] if place.gain_mm2 > 0.0 else sides[1]) if clear else None)
+        said = f"{winners[-1].name} is better" if clear else "they are equally good, but for chance"
+        yield f"{where} {said}: {sizes} (by chance with probability {_chance(place.chance)})."
+    yield f"Which to trust: {_trusted(sides, winners)}"
+
+
+def _trusted(sides, winners):
+    """The advice that follows from who is better on whose points."""
+    distinct = {side.name for side in winners if side}
+    if not winners:
+        return "cannot be said, there are no points that neither has seen."
+    if not distinct:
+        return "either; these points do not tell them apart."
+    if len(distinct) == 1:
+        return f"{distinct.pop()}."
+    if winners == list(sides):
+        return "each on its own measurements: the robot or its frame has changed in between, or these are two robots."
+    return "neither: each is worse on its own measurements than the other."
+
+
+def _points(judged, calibration, shared):
+    """Which points the comparison was made on."""
+    listed = " and ".join(f"{place.points} of {place.campaign}" for place in judged) or "none"
+    same = " Points that both have measured are left out of both fits." if shared else ""
+    return (
+        f"The points: {listed}, of the set {calibration!r}. Each is foretold by the other campaign's calibration, "
+        "which has not seen it, and by its own campaign's, fitted again without the trajectory, run or stretch of it."
+        f"{same} Chance is counted over the runs. Standard errors hold if the model lacks nothing: where effects are "
+        "named, fitted numbers may differ for these."
+    )
+
+
+def _heads(frame, names):
+    """Words of the columns of both sides: their names for a and b."""
+    own = {"a": names[0], "b": names[1]}
+    sides = [name for name in frame if name.partition("_")[0] in own]
+    return {name: f"{own[name[0]]} {cells.words(name[2:])}".strip() for name in sides}
+
+
+def _chance(value):
+    """A probability by chance."""
+    return "less than 0.001" if value < 0.001 else f"{value:.3f}" if value < 0.1 else f"{value:.2f}"
+
+
+def main(arguments):
+    """The command: A, B and the page to write; an error ends it with a message."""
+    if len(arguments) != 3 or not all(arguments):
+        sys.exit("usage: make compare A=.. B=..: two folders of results, or two campaigns of results")
+    try:
+        write(*arguments)
+    except RrruError as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+    print(arguments[2])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,131 @@
+"""Which of two calibrations foretells better, at points that neither has seen. Errors in mm."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t
+
+from rrru.campaign import measurements as rows
+from rrru.compensate.evaluate import model_residual
+from rrru.errors import FitError
+from rrru.fit.campaign_fit import deviation_vector, select
+from rrru.fit.least_squares import least_squares
+from rrru.report.compare import METHOD
+from rrru.studies import setup
+
+# with fewer trajectories or runs than this a campaign is cut into as many stretches
+_FOLDS = 4
+_SAME = [f"{kind}_{axis}_mm" for kind in ("command", "measured") for axis in "xyz"]
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """Errors at points of one campaign that neither side has seen.
+
+    rows: per trajectory; points: how many; rms_mm (2,): of both sides; gain_mm2: mean squared error of the second less
+    that of the first; chance: how probable chance over the runs makes as much.
+    """
+
+    campaign: str
+    rows: pd.DataFrame
+    points: int
+    rms_mm: tuple
+    gain_mm2: float
+    chance: float
+
+
+def same_points(first, second):
+    """Points that both were measured at and read the same there: the same measurement."""
+    return int(_rows_of(first.frames["measurements"], second.frames["measurements"]).sum())
+
+
+def unseen(first, second, calibration):
+    """The Unseen of each campaign that has points which neither side has seen.
+
+    A point is foretold by the other campaign's calibration, which has not seen it, and by its own, fitted again without
+    the trajectory that it lies on (the run or the stretch where there are few of them). What both have measured is left
+    out of both.
+    """
+    found = [(place, _foretold(place, (first, second), calibration)) for place in _places(first, second)]
+    return [_compared(place.campaign, frame) for place, frame in found if len(frame)]
+
+
+def _compared(campaign, frame):
+    """The Unseen of errors (mm) a and b with their trajectory and run."""
+    frame = frame.assign(gain=frame["b"] ** 2 - frame["a"] ** 2)
+    gain, error = over_runs(frame["gain"], frame["run"])
+    count = frame["run"].nunique()
+    chance = float(2.0 * t.sf(abs(gain) / error, count - 1)) if error > 0.0 else 1.0
+    table = frame.groupby("trajectory", sort=False).agg(
+        points=("a", "size"), a_rms_mm=("a", _rms), b_rms_mm=("b", _rms)
+    )
+    table = table.reset_index()
+    table.insert(0, "measured_in", campaign)
+    return Unseen(campaign, table, len(frame), (_rms(frame["a"]), _rms(frame["b"])), gain, chance)
+
+
+def over_runs(values, runs):
+    """Mean of values (n,) and its standard error, runs taken as what chance draws; 0 where there is one run."""
+    by_run = values.groupby(runs).agg(["mean", "size"])
+    mean, weight, count = values.mean(), by_run["size"] / len(values), len(by_run)
+    square = (weight**2 * (by_run["mean"] - mean) ** 2).sum() * count / max(count - 1, 1)
+    return float(mean), float(np.sqrt(square))
+
+
+def _places(first, second):
+    """Sides whose points are asked for: one where both were measured together."""
+    together = same_points(first, second) == len(first.frames["measurements"]) == len(second.frames["measurements"])
+    return (first,) if together else (first, second)
+
+
+def _foretold(place, sides, calibration):
+    """Errors (mm) of both sides, a and b, at the points of one of them, with their trajectory and run."""
+    measurements = place.frames["measurements"].reset_index(drop=True)
+    usable = rows.usable(measurements, place.settings.use_near_singularity)
+    chosen = usable & rows.on_trajectories(measurements, place.settings.sets[calibration])
+    errors = measurements[["trajectory", "run"]].assign(a=np.nan, b=np.nan)
+    for _, fold in measurements[chosen].groupby(_folds(measurements[chosen])):
+        for letter, side in zip("ab", sides, strict=True):
+            try:
+                robot, deviations = _without(side, fold, calibration)
+                made = model_residual(measurements.loc[fold.index], robot, deviations)
+            except FitError:
+                continue
+            errors.loc[fold.index, letter] = made["error_mm"].to_numpy()
+    return errors[chosen].dropna()
+
+
+def _without(side, fold, calibration):
+    """A side's robot and its deviations from all of its points but those of a fold."""
+    own = side.frames["measurements"]
+    robot = setup.measured_robot(side.told["nominal"], own)
+    seen = _rows_of(own, fold)
+    if not seen.any():
+        return robot, deviation_vector(side.frames["parameters"], calibration, METHOD, robot)
+    arm_mm = side.told["arm_mm"] or np.nan
+    rest = rows.hold_out(own, seen)
+    residuals = select(rest, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
+    if residuals is None:
+        raise FitError(f"{side.name}: too few points are left")
+    fit = least_squares(residuals, side.told["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
+    return robot, fit.deviations
+
+
+def _rows_of(measurements, others):
+    """Rows (n,) of measurements that are among others: commanded and measured at the same place."""
+    known = pd.MultiIndex.from_frame(others[_SAME].round(9))
+    return pd.MultiIndex.from_frame(measurements[_SAME].round(9)).isin(known)
+
+
+def _folds(measurements):
+    """What points are left out together: their trajectory, their run, or a stretch."""
+    for name in ("trajectory", "run"):
+        if measurements[name].nunique() >= _FOLDS:
+            return measurements[name].to_numpy()
+    return np.arange(len(measurements)) * _FOLDS // max(len(measurements), 1)
+
+
+def _rms(values):
+    """Root mean square."""
+    return float(np.sqrt((values**2).mean()))

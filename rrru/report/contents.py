@@ -1,0 +1,205 @@
+"""What stands on the page, section by section: figures and tables by name. What a run has not made is left out."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A table: its name, its title, the columns shown, as far as they are there (all where empty),
+    and the rows (a query; all where empty).
+    """
+
+    name: str
+    title: str
+    columns: str = ""
+    rows: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section: its key, title and introduction, names of figures with their titles, and tables.
+
+    own: figures of every campaign, which lie in a folder of its name; those of the reproduced one lie beside the
+    study's.
+    """
+
+    key: str
+    title: str
+    about: str
+    figures: tuple = ()
+    own: tuple = ()
+    tables: tuple = ()
+
+
+_LEAST_SQUARES = "method in ('least_squares', 'none')"
+
+SECTIONS = (
+    Section(
+        "diagnosis",
+        "Behind the answers",
+        "How each answer came about. The gap is what the calibrated simulator still gets wrong, with the measuring "
+        "noise taken out. Probabilities are meant literally: of answers with 0.9, nine in ten should be right.",
+        own=(("gap", "The whole diagnosis"),),
+        tables=(
+            Shown("gap_budget", "What the gap is made of"),
+            Shown("gap_attribute", "How probable each cause is"),
+            Shown("gap_shrink", "How far the gap shrinks", rows="trajectory == '*'"),
+            Shown("gap_parameters", "Numbers for the simulator, calibration and effects fitted together"),
+            Shown("gap_locate", "Where the gap lies"),
+            Shown("gap_identifiability", "What these data could show at all"),
+            Shown("gap_next_runs", "Runs that would tell more"),
+            Shown("gap_next_poses", "Poses that would tell more"),
+        ),
+    ),
+    Section(
+        "calibration",
+        "Calibration: which numbers may be trusted",
+        "Each number with its standard error: the truth lies within twice that in 95 of 100 cases, if the model lacks "
+        "nothing. Where the diagnosis has found effects, numbers that change by more with them are biased.",
+        own=(
+            ("observability", "What the measured points see"),
+            ("workspace", "Where the points lie"),
+            ("convergence", "How the genetic algorithm converges"),
+        ),
+        tables=(
+            Shown(
+                "calibrations",
+                "Every calibration",
+                "campaign calibration method points mean_mm rms_mm max_mm noise_mm noise_from rank condition "
+                "parameters_at_bound",
+            ),
+            Shown("genetic_against_least_squares", "The genetic algorithm beside least squares"),
+            Shown("gauge", "Numbers that these poses do not tell apart"),
+            Shown("campaigns", "Campaigns: where they came from, and what was noted"),
+        ),
+    ),
+    Section(
+        "cross",
+        "Every calibration on every trajectory",
+        "A calibration that helps only where it learned is of little use: rows say where it learned, columns where it "
+        "was applied.",
+        own=(("cross", "Calibrated here, applied there"),),
+        tables=(
+            Shown(
+                "error_summary",
+                "Errors before and after",
+                "campaign calibration mode trajectory points mean_mm rms_mm max_mm path_accuracy_mm repeatability_mm",
+                _LEAST_SQUARES,
+            ),
+        ),
+    ),
+    Section(
+        "reproduction",
+        "What the reproduction shows",
+        "The published study of the 3-RRRU robot beside this one, on a virtual robot.",
+        figures=(
+            ("fig09", "Group 1 before and after (Fig. 9)"),
+            ("fig10", "Lines after calibration (Fig. 10)"),
+            ("fig11", "Spiral (Fig. 11)"),
+            ("fig12", "Lines under the spiral's calibration (Fig. 12)"),
+            ("fig06", "Crossover fraction (Fig. 6)"),
+            ("fig07", "Migration fraction (Fig. 7)"),
+        ),
+        tables=(
+            Shown("published", "Published numbers beside these"),
+            Shown("redraw_counts", "How often they are met over other draws of chance"),
+            Shown("twin_numbers", "Numbers that were searched for the virtual robot"),
+            Shown("sweep_effect", "Do the algorithm's settings matter?"),
+            Shown("sweep_match", "Which reading of the algorithm comes nearest?"),
+        ),
+    ),
+    Section(
+        "audit",
+        "Audit of the papers",
+        "What the papers print that contradicts itself or the mechanism, each shown by a computation.",
+        tables=(Shown("audit", "Misprints, contradictions and claims"),),
+    ),
+    Section(
+        "ptt",
+        "Sister study: 3-PTT, Jacobian and RBF network",
+        "Five experiments with play and load; the benefit counts on points that the network has not seen.",
+        figures=(
+            ("ptt_benefit", "Benefit per axis and experiment"),
+            ("ptt_extrapolation", "Benefit off the curve"),
+            ("ptt_errors", "Errors along the curve"),
+            ("ptt_path", "The curve"),
+            ("ptt_network", "What the network learns"),
+            ("ptt_training", "Training"),
+            ("ptt_corrections", "Corrections of the sliders"),
+            ("ptt_backlash", "Play of the screws"),
+            ("ptt_singularity", "Singularities"),
+        ),
+        tables=(
+            Shown("ptt_benefit", "Benefit", rows="set == 'test'"),
+            Shown("ptt_backlash", "Play"),
+            Shown("ptt_repeatability", "Scatter of the sliders"),
+        ),
+    ),
+    Section(
+        "delta",
+        "Sister study: Delta, zero offsets from images",
+        "Three zero offsets found by a camera on the platform that sees dots on a plane.",
+        figures=(
+            ("delta_errors", "Errors on the plane before and after"),
+            ("delta_observability", "What images can tell"),
+            ("delta_images", "What the camera sees"),
+        ),
+        tables=(
+            Shown(
+                "delta_calibrations",
+                "Calibrations",
+                "variant source measure planes poses equations rank condition residual_rms_mm plane_mean_mm "
+                "plane_max_mm base_mean_mm base_max_mm",
+            ),
+            Shown("delta_draws", "Over other draws of chance"),
+            Shown("delta_robots", "Over other robots"),
+            Shown("delta_camera", "The camera"),
+        ),
+    ),
+    Section(
+        "printers",
+        "Real printers",
+        "Linear deltas from what their owners measured, beside the answer saved with them.",
+        figures=(("printers", "Every printer"),),
+        tables=(
+            Shown(
+                "printers",
+                "Printers",
+                "printer source verdict reason cause suspect heights distances height_rms_fitted_mm "
+                "distance_rms_fitted_mm arm_standard_error_mm notes",
+            ),
+            Shown("printer_causes", "Causes tried"),
+            Shown("printer_readings", "Readings"),
+        ),
+    ),
+    Section(
+        "methods",
+        "Which method for which robot",
+        "Every method learned from the same points; errors count on other points, inside and outside.",
+        figures=(("methods", "Every method on every robot"),),
+        tables=(Shown("methods", "Methods"),),
+    ),
+    Section(
+        "withheld",
+        "How far the diagnosis may be trusted",
+        "Virtual robots whose causes were withheld from the diagnosis and counted afterwards.",
+        figures=(("withheld", "Answers beside the truth"),),
+        tables=(
+            Shown("withheld_summary", "Counts"),
+            Shown("withheld_advice_summary", "Does the advised run settle it?"),
+        ),
+    ),
+    Section(
+        "real",
+        "Measured series of real robots",
+        "Robots that others measured; rows that were left out say how well the model foretells.",
+        own=(("steps", "Step by step"), ("spectrum", "Waves of every joint"), ("lengths", "Lengths")),
+        tables=(
+            Shown("real_verdicts", "Answers"),
+            Shown("real_budget", "What the gap is made of"),
+            Shown("real_steps", "Step by step"),
+        ),
+    ),
+)
+# figures of a campaign that its own page shows, and sections that it has
+OF_A_CAMPAIGN = ("diagnosis", "calibration", "cross")

@@ -1,0 +1,183 @@
+"""The report: one HTML file that needs nothing else, from what lies in a folder of results."""
+
+import base64
+import html
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import jinja2
+
+from rrru.report import cards, cells, contents, svg
+from rrru.report.trust import trust
+from rrru.store import facts, tables
+from rrru.studies import glossary
+
+TEMPLATES = Path(__file__).parent / "templates"
+# a figure that is larger than this as SVG is shown as its PNG
+_LARGEST_SVG = 400_000
+_TRUST = ("parameters", "correlations", "calibrations", "gap_parameters", "gap_verdicts")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the page: key, title, caption, and its markup."""
+
+    key: str
+    title: str
+    caption: str
+    markup: str
+    width: int
+
+
+@dataclass(frozen=True)
+class Part:
+    """A section with what there is for it."""
+
+    key: str
+    title: str
+    about: str
+    pictures: list
+    grids: list
+
+
+@dataclass(frozen=True)
+class Results:
+    """What a run has written to a folder.
+
+    reproduced: the campaign whose figures lie beside the study's; campaign: the one whose own parts are read, None for
+    the whole study's; glyphs: what all figures that were asked for draw their text with.
+    """
+
+    folder: Path
+    reproduced: str
+    campaign: str | None = None
+    glyphs: dict = field(default_factory=dict)
+
+    @cached_property
+    def schemas(self):
+        """All tables that the package knows, by name."""
+        return glossary.tables()
+
+    def place(self, name):
+        """Path of a table."""
+        if self.campaign:
+            return self.folder / "campaigns" / self.campaign / f"{name}.parquet"
+        return self.folder / "tables" / f"{name}.parquet"
+
+    def frame(self, name):
+        """A table as a frame, None where it was not made or holds nothing."""
+        place = self.place(name)
+        frame = tables.read(place) if place.is_file() else None
+        return None if frame is None or frame.empty else frame
+
+    def campaigns(self):
+        """Campaigns that the last run has diagnosed, measured ones first."""
+        frame, sources = self.frame("gap_verdicts"), self.sources()
+        names = [] if frame is None else frame["campaign"]
+        return sorted(names, key=lambda name: (not sources.get(name, "").startswith("file"), name))
+
+    def owners(self):
+        """Whose figures belong here: what lies beside them may be of an earlier run."""
+        frame = self.frame("real_verdicts")
+        return {self.reproduced, *self.campaigns(), *(() if frame is None else frame["dataset"])}
+
+    def sources(self):
+        """Where each campaign came from, by name."""
+        frame = self.frame("campaigns")
+        return {} if frame is None else dict(zip(frame["campaign"], frame["source"], strict=True))
+
+    def before_mm(self):
+        """Root mean square error before any calibration by campaign."""
+        frame = self.frame("error_summary")
+        if frame is None:
+            return {}
+        rows = frame.query("mode == 'before' and trajectory == 'all'")
+        return dict(zip(rows["campaign"], rows["rms_mm"], strict=True))
+
+    def picture(self, name, title):
+        """A figure of a path below figures/ without its ending, None where it was not drawn."""
+        place = self.folder / "figures" / f"{name}.svg"
+        if not place.is_file():
+            return None
+        text, key = place.read_text(), name.replace("/", "-")
+        caption = svg.caption(text)
+        drawn = svg.inline(text, key, title)
+        if len(drawn.markup) <= _LARGEST_SVG:
+            self.glyphs.update(drawn.glyphs)
+            return Picture(key, title, caption, drawn.markup, drawn.width)
+        data = base64.b64encode(place.with_suffix(".png").read_bytes()).decode()
+        return Picture(
+            key, title, caption, f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}">', drawn.width
+        )
+
+    def grid(self, shown):
+        """A table of the page, None where there is nothing to show."""
+        frame = self.frame(shown.name)
+        if frame is None:
+            return None
+        frame = frame.query(shown.rows) if shown.rows else frame
+        columns = [name for name in shown.columns.split() or frame if name in frame]
+        frame = frame[columns].dropna(axis="columns", how="all")
+        place = self.place(shown.name).relative_to(self.folder)
+        made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place))
+        return made if made.rows else None
+
+
+def write(folder, path, reproduced, campaign=None):
+    """Write the page of a folder of results, or of one of its campaigns, as a whole or not at all; see Results."""
+    results = Results(Path(folder), reproduced, campaign)
+    names = results.campaigns()
+    sources, before = results.sources(), results.before_mm()
+    answers = []
+    for name in names:
+        answer = facts.read(results.folder / "campaigns" / name / "verdict.json")
+        drawn = results.picture(f"{name}/gap_map", f"{name}: where it misses")
+        answers.append((cards.card(answer, sources.get(name, "virtual robot of a study"), before.get(name)), drawn))
+    chosen = [s for s in contents.SECTIONS if campaign is None or s.key in contents.OF_A_CAMPAIGN]
+    parts = [part for part in (_part(results, section) for section in chosen) if part]
+    values = {"answers": answers, "parts": parts, "campaign": campaign, "glyphs": results.glyphs}
+    save(render("report.html", **values), path)
+
+
+def render(template, **values):
+    """A page of a template of this folder."""
+    loader = jinja2.FileSystemLoader(TEMPLATES)
+    strict = {"undefined": jinja2.StrictUndefined, "trim_blocks": True, "lstrip_blocks": True}
+    environment = jinja2.Environment(loader=loader, autoescape=True, **strict)
+    return environment.get_template(template).render(**values)
+
+
+def save(text, path):
+    """Write a page as a whole or not at all."""
+    partial = Path(f"{path}.partial")
+    partial.write_text(text)
+    partial.replace(path)
+
+
+def _part(results, section):
+    """A section with what there is for it, None where there is nothing."""
+    wanted = [(name, title) for name, title in section.figures] if results.campaign is None else []
+    wanted += [(place, title) for name, text in section.own for place, title in _own(results, name, text)]
+    pictures = [one for one in (results.picture(*each) for each in wanted) if one]
+    grids = [one for one in map(results.grid, section.tables) if one]
+    if section.key == "calibration" and (judged := _trust(results)):
+        grids.insert(0, judged)
+    return Part(section.key, section.title, section.about, pictures, grids) if pictures or grids else None
+
+
+def _own(results, name, title):
+    """Places and titles of a figure that every campaign has."""
+    folder = results.folder / "figures"
+    found = [place.relative_to(folder).with_suffix("") for place in sorted(folder.rglob(f"{name}.svg"))]
+    whose = [(str(place), place.parent.name or results.reproduced) for place in found]
+    known = results.owners() if results.campaign is None else {results.campaign}
+    return [(place, f"{own}: {title}") for place, own in whose if own in known]
+
+
+def _trust(results):
+    """The table of which numbers may be trusted, None where nothing was calibrated."""
+    frames = [results.frame(name) for name in _TRUST]
+    if any(frame is None for frame in frames):
+        return None
+    return cells.grid(trust(*frames).dropna(axis="columns", how="all"), "trust", "Which numbers may be trusted")

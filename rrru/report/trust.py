@@ -1,0 +1,71 @@
+"""Which of a calibration's numbers may be trusted, in words. Values in mm and rad."""
+
+import pandas as pd
+
+from rrru.gap.answer import rounded, with_error
+from rrru.report.cells import MINUS
+
+# a correlation that makes two numbers one, and standard errors that make a difference more than chance
+_TOGETHER, _CLEAR = 0.95, 2.0
+_NO_EFFECTS = ("none", "unexplained")
+COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
+
+
+def trust(parameters, correlations, calibrations, corrected, verdicts):
+    """A row per campaign and parameter of its calibration on most points, least squares: value, error and judgement.
+
+    corrected: rows of `gap_parameters`, which say what becomes of the number once the effects are in the model;
+    verdicts: rows of `gap_verdicts`.
+    """
+    answers = verdicts.set_index("campaign")["effects"]
+    by_least_squares = calibrations[calibrations["method"] == "least_squares"]
+    widest = by_least_squares.sort_values("points", kind="stable", ascending=False).drop_duplicates("campaign")
+    rows = parameters.merge(widest[["campaign", "calibration", "method", "points"]], how="inner")
+    # without effects it is the same calibration, but for the points that a diagnosis leaves out
+    with_effects = corrected[~corrected["campaign"].map(answers).isin(_NO_EFFECTS)]
+    moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value"]]
+    rows = rows.merge(moved.rename(columns={"value": "moved"}), how="left", on=["campaign", "parameter"])
+    rows = rows.assign(unexplained=rows["campaign"].map(answers).fillna("").str.contains("unexplained"))
+    said = {
+        "value": _value,
+        "judgement": lambda row: _judged(row, _tied(row, correlations)),
+        "with_effects": lambda row: _plain(row["moved"], row["unit"]),
+        "true_value": lambda row: _plain(row["true_value"], row["unit"]),
+    }
+    return rows.assign(**{name: [say(row) for row in rows.to_dict("records")] for name, say in said.items()})[COLUMNS]
+
+
+def _plain(value, unit):
+    """A number with its unit, None where there is none."""
+    return None if pd.isna(value) else f"{rounded(value, 3)} {unit}".replace("-", MINUS)
+
+
+def _value(row):
+    """A number with its error and unit."""
+    if not row["standard_error"] > 0.0:
+        return _plain(row["value"], row["unit"])
+    return f"{with_error(row['value'], row['standard_error'])} {row['unit']}".replace("-", MINUS)
+
+
+def _judged(row, tied):
+    """What a user may do with one number; tied: parameters that the points see only together with it."""
+    error = _CLEAR * row["standard_error"]
+    if not row["seen"]:
+        return "do not use: the points do not show it"
+    if row["at_bound"]:
+        return "do not use: the fit ended at a bound"
+    if abs(row["moved"] - row["value"]) > error:
+        return "biased: the diagnosed effects change it by more than its error"
+    if row["unexplained"]:
+        return "doubtful: something acts that no effect explains"
+    if tied:
+        return f"use only together with {', '.join(tied)}"
+    return "use: differs from the drawing" if abs(row["value"]) > error else "use: as drawn, within its error"
+
+
+def _tied(row, correlations):
+    """Parameters whose estimates nearly rise and fall with this one's."""
+    own = (correlations["campaign"] == row["campaign"]) & (correlations["calibration"] == row["calibration"])
+    strong = correlations[own & (correlations["correlation"].abs() > _TOGETHER)]
+    pairs = zip(strong["parameter_a"], strong["parameter_b"], strict=True)
+    return sorted({name for pair in pairs if row["parameter"] in pair for name in pair} - {row["parameter"]})

@@ -1,0 +1,83 @@
+"""`rrru-printer`: what a delta printer's own file says of its calibration, on the terminal and in a page."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import yaml
+from jinja2 import Environment
+
+import rrru
+from rrru.errors import FitError, RrruError
+from rrru.studies.printers.answers import answer, failed
+from rrru.studies.printers.files import read_all
+from rrru.studies.printers.judge import judge
+from rrru.studies.printers.printer import Refused
+from rrru.studies.printers.printer_tables import level_of
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
+<title>Delta printers</title>
+<style>
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 sans-serif; max-width: 50em; margin: 2em auto; padding: 0 1em; }
+dt { font-weight: bold; } dd { margin: 0 0 .6em 1em; } pre { padding: .6em; border: 1px solid; overflow-x: auto; }
+</style>
+{% for answer in answers %}<h1>{{ answer.name }}</h1>
+<dl>{% for topic, text in answer.sentences.items() %}<dt>{{ topic }}</dt><dd>{{ text }}</dd>
+{% endfor %}</dl>
+{% for title, text in answer.settings.items() %}<h2>{{ title }}</h2><pre>{{ text }}</pre>
+{% endfor %}{% endfor %}</html>
+"""
+
+
+def main(arguments=None):
+    """Answer for the printers of the files on the command line; ends with 2 where a printer gives no answer."""
+    options = _parser().parse_args(arguments)
+    try:
+        answers = answers_of(options.files)
+        if options.page:
+            page = Environment(autoescape=True).from_string(_PAGE).render(answers=answers)
+            Path(options.page).write_text(page, encoding="utf-8")
+    except RrruError as error:
+        sys.exit(f"{type(error).__name__}: {error}")
+    except OSError as error:
+        sys.exit(f"{options.page}: cannot be written ({error.strerror}); allowed: a file in a folder that can be")
+    print("\n\n".join(_text(one) for one in answers))
+    if any(not one.settings for one in answers):
+        sys.exit(2)
+
+
+def _parser():
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="rrru-printer", description="Check the calibration of delta printers.")
+    told = "Klipper's printer.cfg, or JSON as docs/printers.md describes it"
+    parser.add_argument("files", nargs="+", metavar="FILE", help=told)
+    parser.add_argument("--page", metavar="FILE.html", help="write the answer into a page, too")
+    return parser
+
+
+def answers_of(paths):
+    """The Answer for every printer of the files; raises IngestError where none of them can be read."""
+    settings = yaml.safe_load((Path(rrru.__file__).parents[1] / "config.yaml").read_text())["printers"]
+    printers = read_all(paths)
+    level = level_of([printer for printer in printers if not isinstance(printer, Refused)], settings)
+    return [_answer(printer, settings["stopping_step"], level) for printer in printers]
+
+
+def _answer(printer, stopping_step, level):
+    """The Answer for one printer."""
+    if isinstance(printer, Refused):
+        return failed(printer.name, printer.reason)
+    try:
+        return answer(judge(printer, stopping_step, level))
+    except FitError as error:
+        return failed(printer.name, str(error))
+
+
+def _text(answer):
+    """An Answer for the terminal."""
+    lines = [answer.name, *(f"  {topic}: {text}" for topic, text in answer.sentences.items())]
+    for title, text in answer.settings.items():
+        lines += [f"  {title}:", *(f"    {line}" for line in text.splitlines())]
+    return "\n".join(lines)

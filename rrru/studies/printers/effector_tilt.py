@@ -1,0 +1,192 @@
+"""Unequal rods of an arm tilt the platform, and a probe beside the nozzle takes the tilt for the bed's shape.
+
+Where the two rods of arm i, a distance s apart along the tangent t_i, differ in length by d_i, the platform turns by w
+and its point in the joints' plane moves by v, to first order (n_i: down the arm, u_i: to its joints, r: how far)
+
+    (t_i x n_i) . w = d_i / s,    n_i . v = -r n_i . (w x u_i)
+
+A probe at the offset o stands v_z + (w x o)_z higher than the platform says. All else that is smooth over the bed may
+look like it: arms of other lengths than saved, leaning towers, a bed bent to second order, the probe's own zero.
+A bed's slope is a gradient and the tilt is none, so that probing on three sides of the nozzle tells them apart. All of
+them are fitted beside the tilt, and F says how likely noise explains as much as the tilt then does, see
+`cause_tests`. Whether readings can tell is known before: it is the probability that 0.1 mm on any one arm passes.
+
+# ASSUME rods as far apart and joints as far out as those of `rrru.robots.linear_delta`, the nozzle in the joints' plane
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import stats
+
+from rrru.studies.printers.cause_columns import arm_columns, lean_columns
+from rrru.studies.printers.cause_tests import CauseTests
+from rrru.studies.printers.printer_fit import PrinterFit
+from rrru.studies.printers.weighing import Weighing, largest_p
+
+# the difference of an arm's rods that readings have to show
+SHOWN_MM = 0.1
+# ASSUME how well a probe repeats, where the readings do not tell
+PROBE_MM = 0.01
+# Gauss-Newton steps, and the part of the largest singular value from which on the readings see a combination
+_REFITS, _SEEN = 3, 1e-3
+_CONFIDENCE = 0.95
+# ASSUME noise of a height touched by hand, over that of a probed one
+_HAND = (1.0, 2.0, 4.0)
+
+
+def tilts(robot, places, actuators, deviations):
+    """Turn (n, 3, 3) in rad and shift (n, 3, 3) in mm of the platform at places (n, 3), per mm that each arm's rods
+    differ by.
+    """
+    arms = robot.link_directions(places, actuators, deviations)
+    turn = np.linalg.inv(np.cross(robot.tangent, arms)) / robot.spacing_mm
+    carried = np.cross(np.moveaxis(turn, 2, 1)[:, None], robot.radial[:, None])
+    return turn, np.linalg.solve(arms, -robot.r_mm * np.einsum("nia,nika->nik", arms, carried))
+
+
+@dataclass(frozen=True)
+class TiltTest:
+    """The test of a PrinterFit for an effector that tilts.
+
+    probe_mm (n, 2): offsets of the probe at the heights. noise_mm: of a reading of weight 1, by default from the
+    readings.
+    """
+
+    result: PrinterFit
+    probe_mm: np.ndarray
+    noise_mm: float | None = None
+
+    @cached_property
+    def places(self):
+        """Where the nozzle stands, see `HeightResiduals.places`."""
+        return self.result.residuals.places(self.result.fit.deviations)
+
+    @cached_property
+    def columns(self):
+        """Change (n, 3) of the readings per mm that the rods of each arm differ by."""
+        residuals, heights = self.result.residuals, len(self.probe_mm)
+        turn, shift = tilts(residuals.mechanism, self.places, residuals.actuators, self.result.fit.deviations)
+        changes = np.einsum("rna,nak->rk", residuals.gradient(self.places), shift)
+        x, y = self.probe_mm.T[..., None]
+        changes[:heights] += y * turn[:heights, 0] - x * turn[:heights, 1]
+        return changes
+
+    @cached_property
+    def rivals(self):
+        """Change (n, k) of the readings by all that may look like a tilt."""
+        arms = () if len(self.result.residuals.distance_mm) else (arm_columns(self.result),)
+        return np.concatenate([*arms, lean_columns(self.result), self.bed], axis=1)
+
+    @cached_property
+    def bed(self):
+        """Change (n, k) of the readings by the zero of every place of the probe, and by three shapes of the bed."""
+        kinds = np.unique(self.probe_mm, axis=0)
+        zeros = (self.probe_mm[:, None] == kinds[1:]).all(axis=2).astype(float)
+        x, y = (self.places[: len(self.probe_mm), :2] + self.probe_mm).T
+        shapes = np.stack([x**2 + y**2, x**2 - y**2, 2.0 * x * y], axis=1) / np.hypot(x, y).max() ** 2
+        return self._of_heights(np.concatenate([zeros, shapes], axis=1))
+
+    def with_bent_bed(self):
+        """The test about the answer beside which the bed may be bent, as far as the readings see that.
+
+        An answer that took the bed for flat turns and stretches the places under the probe.
+        """
+        result = self.result
+        for _ in range(_REFITS):
+            test = replace(self, result=result)
+            weight, count = result.residuals.root_weight[:, None], len(result.fit.deviations)
+            columns = np.concatenate(
+                [-result.residuals.jacobian(result.fit.deviations)[:, 0], test.bed * weight], axis=1
+            )
+            scale = np.linalg.norm(columns, axis=0)
+            move = np.linalg.lstsq(columns / scale, test._readings * weight[:, 0], rcond=_SEEN)[0] / scale
+            deviations = result.fit.deviations + move[:count]
+            result = replace(result, fit=replace(result.fit, deviations=deviations))
+        return replace(self, result=result)
+
+    def _of_heights(self, columns):
+        """Columns (heights, k) with zeros (n, k) for the distances."""
+        return np.pad(columns, ((0, len(self.result.residuals) - len(columns)), (0, 0)))
+
+    def _weighing(self, weight, hand):
+        """The fit with all rivals, by weight (n,) of the readings and noise by hand over that of the probe."""
+        residuals, touched = self.result.residuals, (self.probe_mm == 0.0).all(axis=1)
+        weight = weight / np.where(self._of_heights(touched[:, None])[:, 0], hand, 1.0)
+        jacobian = residuals.jacobian(self.result.fit.deviations)[:, 0] / residuals.root_weight[:, None]
+        return Weighing.of(jacobian, weight).beside(self.rivals)
+
+    @cached_property
+    def _left(self):
+        """Sum of squares in mm^2 of what neither rivals nor tilt explain, and its freedom."""
+        free = self._own_weighing.beside(self.columns)
+        return (free.left(self._readings) ** 2).sum(), len(self._readings) - free.absorbed.shape[1]
+
+    @cached_property
+    def noise(self):
+        """Noise in mm of a reading of weight 1: as given, of what neither rivals nor tilt explain, or a probe's."""
+        if self.noise_mm is not None:
+            return self.noise_mm
+        left, freedom = self._left
+        return np.sqrt(left / freedom) if freedom > 0 else PROBE_MM
+
+    @cached_property
+    def most_noise(self):
+        """What the noise is below with a confidence of 95 %: few readings promise too little of it."""
+        left, freedom = self._left
+        given = self.noise_mm is not None or freedom < 1
+        return self.noise if given else np.sqrt(left / stats.chi2.ppf(1.0 - _CONFIDENCE, freedom))
+
+    @property
+    def _hands(self):
+        """Ratios of noises that are tried: of heights by hand to probed ones, where there are both."""
+        touched = (self.probe_mm == 0.0).all(axis=1)
+        return _HAND if touched.any() and not touched.all() else (1.0,)
+
+    @cached_property
+    def _readings(self):
+        return CauseTests(self.result).readings_mm
+
+    @cached_property
+    def _weighings(self):
+        weights = [one.weight for one in CauseTests(self.result).weighings]
+        return [self._weighing(weight, hand) for weight in weights for hand in self._hands]
+
+    @cached_property
+    def _own_weighing(self):
+        """Under the firmware's ratio and the middle one of the hand's."""
+        hands = self._hands
+        return self._weighing(self.result.residuals.root_weight, hands[len(hands) // 2])
+
+    @cached_property
+    def p(self):
+        """Probability that noise explains as much as unequal rods do; NaN without freedom."""
+        return self._p(self._weighings, self.columns)
+
+    def _p(self, weighings, columns):
+        """Largest p of columns (n, k) over weighings; NaN where their rank depends on the ratio."""
+        bases = [(basis[None], volume) for basis, volume in (one.basis(columns) for one in weighings)]
+        ranks = {basis.shape for basis, _ in bases}
+        return float(largest_p(weighings, bases, self._readings)[0]) if len(ranks) == 1 else np.nan
+
+    def power(self, limit):
+        """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
+
+        Under `most_noise`.
+        """
+        own = self._own_weighing
+        rank = own.basis(self.columns)[0].shape[1]
+        freedom = len(self.columns) - own.absorbed.shape[1] - rank
+        if freedom < 1 or rank < self.columns.shape[1]:
+            return 0.0
+        seen = (own.left(self.columns.T) ** 2).sum(axis=1) * (SHOWN_MM / self.most_noise) ** 2
+        return float(stats.ncf.sf(stats.f.isf(limit, rank, freedom), rank, freedom, seen).min())
+
+    def alone(self, arm):
+        """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
+        column, own = self.columns[:, [arm]], self._own_weighing
+        seen = own.left(column[:, 0])
+        size = abs(seen @ own.left(self._readings)) / (seen @ seen)
+        beside = [one.beside(column) for one in self._weighings]
+        return size, self.noise / np.sqrt(seen @ seen), self._p(beside, np.delete(self.columns, arm, axis=1))

@@ -1,0 +1,70 @@
+"""All that one printer's readings say: its calibration, a suspicious reading, causes, an effector that tilts."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.errors import FitError
+from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
+from rrru.studies.printers.printer_causes import FOUND, LeftOut, Level, causes, diagnosis, left_out, without
+from rrru.studies.printers.printer_fit import PrinterFit, fit_printer
+from rrru.studies.printers.saved_answers import reason
+from rrru.studies.printers.tilt_answers import TiltAnswer, tilt_answer
+
+REPRODUCED, FOREIGN, UNTRIED, FAILED = "reproduced", "does not belong", "not calibrated", "not fitted"
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A printer's fit, every reading against the others, its causes, and the tilt where a probe sits beside the nozzle.
+
+    reason: why its saved answer does not belong; empty where it does.
+    """
+
+    result: PrinterFit
+    left: LeftOut
+    causes: tuple
+    tilt: TiltAnswer | None
+    level: Level
+    reason: str
+
+    @property
+    def verdict(self):
+        """Whether the saved answer is that of the readings."""
+        if not self.result.printer.calibrated:
+            return UNTRIED
+        return FOREIGN if self.reason else REPRODUCED
+
+    @cached_property
+    def suspect(self):
+        """Number from 0 of the reading that noise hardly explains, None where there is none."""
+        passed = self.causes[0].p < self.level.limit(CauseTests(self.result), BAD_READING)
+        return self.left.suspect if passed else None
+
+    @property
+    def flagged(self):
+        """Whether the suspicious reading is found to be bad."""
+        return self.suspect is not None and self.causes[0].verdict == FOUND
+
+    @cached_property
+    def without_suspect(self):
+        """The PrinterFit of the other readings, None where none is suspicious."""
+        return None if self.suspect is None else without(self.result, self.suspect)
+
+    @property
+    def cause(self):
+        """What the causes say together."""
+        return diagnosis(self.causes)
+
+
+def judge(printer, stopping_step, level):
+    """The Judged printer; raises FitError naming it where it cannot be fitted."""
+    result = fit_printer(printer, stopping_step, level.level)
+    try:
+        left = left_out(result)
+        answers = causes(result, left, level)
+        tilt = tilt_answer(result, level.of_one_more(CauseTests(result)))
+    except (FitError, ValueError, np.linalg.LinAlgError) as error:
+        raise FitError(f"{printer.name}: {error}", getattr(error, "result", None)) from None
+    return Judged(result, left, answers, tilt, level, reason(result) if printer.calibrated else "")

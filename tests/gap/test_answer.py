@@ -1,0 +1,121 @@
+"""The answer in words and as facts: it says what the tables say, whatever they say, and its numbers keep their size."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rrru.effects.library import BY_NAME_ONLY, NAMES, summary
+from rrru.gap import answer
+from rrru.store import facts
+from tests.figures import synthetic_gap
+from tests.figures import synthetic_tables as synthetic
+from tests.places import ROOT
+
+CAMPAIGN = synthetic.CAMPAIGN
+SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+
+
+def answered(budget=None, runs=(), **verdict):
+    """Facts of a made-up diagnosis as a file holds them."""
+    tables = {
+        "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
+        "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN),
+        "gap_parameters": pd.DataFrame(
+            [
+                ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, False),
+                ("backlash", "width1", "rad", 4.04e-4, 0.2e-4, False),
+                ("backlash", "width2", "rad", 4.04e-4, 0.2e-4, False),
+                ("backlash", "width3", "rad", 0.0, np.nan, False),
+            ],
+            columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"),
+        ),
+        "gap_next_runs": pd.DataFrame(list(runs), columns=answer._RUN),
+    }
+    row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
+    return answer.answer(CAMPAIGN, row, tables)
+
+
+RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash / backlash+servo_lag", 14.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"effects": "none", "leg": 0, "where": "", "next_runs": "", "confusable_with": ""},
+        {"effects": "unexplained", "leg": 0, "confusable_with": "backlash, none"},
+        {"effects": "link_flexure+unexplained", "noise_stated_mm": np.nan, "notes": "a; b"},
+    ],
+)
+@pytest.mark.parametrize("runs", [(), (RUN,)])
+def test_the_facts_fit_their_schema_and_are_the_same_bytes_every_time(changes, runs, tmp_path):
+    for name in ("first", "again"):
+        facts.write(answered(runs=runs, **changes), tmp_path / name)
+    jsonschema.validate(facts.read(tmp_path / "first"), SCHEMA)
+    assert (tmp_path / "first").read_bytes() == (tmp_path / "again").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again", "first"]
+
+
+def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
+    said = " ".join(answered(runs=(RUN,))["sentences"])
+    for words in (
+        "misses by 0.37 mm",
+        "60 % of that is link flexure in leg 2 (flexure2 = 0.00123 ± 0.00011 mm/N)",
+        "20 % is backlash (width1 = width2 = 0.00040 ± 0.00002 rad): play between motor and drive arm.",
+        "Probability of this answer: 0.97.",
+        "10 % does not repeat",
+        "Add them to the simulator and 0.020 mm is left",
+        "the noise is 0.035 mm",
+        "cannot rule out: drive compliance",
+        "Next: drive line_1 in reverse. That decides whether servo lag acts.",
+    ):
+        assert words in said
+
+
+def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
+    nothing = " ".join(answered(effects="none", leg=0, confusable_with="")["sentences"])
+    assert "nothing systematic is left" in nothing and " is backlash" not in nothing
+    unknown = " ".join(answered(effects="unexplained", leg=0)["sentences"])
+    assert "no effect of the library explains it: 5 % of it" in unknown and " is backlash" not in unknown
+    assert "Parts of it could be: drive compliance." in unknown
+
+
+@pytest.mark.parametrize("name", [*NAMES, *BY_NAME_ONLY])
+def test_every_effect_of_the_library_is_told_in_a_few_words(name):
+    words = summary(name)
+    assert 20 < len(words) < 130 and "\n" not in words and not words.endswith(".")
+
+
+def test_an_effect_of_the_user_s_own_has_no_words():
+    assert summary("drift") == ""
+
+
+@given(st.floats(1e-7, 1e6), st.integers(1, 5))
+def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
+    text = answer.rounded(-value, digits)
+    assert abs(float(text) + value) <= 0.5000001 * 10.0 ** (np.floor(np.log10(value)) - digits + 1)
+    assert "e" not in text
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))
+def test_a_number_with_its_error_is_told_to_the_error_s_digits(value, error):
+    told, spread = (float(part) for part in answer.with_error(value, error).split(" ± "))
+    assert abs(spread - error) <= 0.26 * error and abs(told - value) <= 0.26 * error + 1e-12 * abs(value)
+
+
+@pytest.mark.parametrize(("value", "text"), [(1.0, "more than 0.99"), (1e-9, "less than 0.01"), (0.5, "0.50")])
+def test_a_probability_claims_no_certainty(value, text):
+    assert answer.probability(value) == text
+
+
+def test_numbers_of_numpy_and_what_is_not_finite_are_plain_in_a_file(tmp_path):
+    facts.write(
+        {"a": np.float64(2.5), "b": np.nan, "c": (np.int64(3), np.bool_(True)), "d": {"e": -np.inf}}, tmp_path / "f"
+    )
+    assert json.loads((tmp_path / "f").read_text()) == {"a": 2.5, "b": None, "c": [3, True], "d": {"e": None}}

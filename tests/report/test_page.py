@@ -1,0 +1,57 @@
+"""The page of whatever is there: parts of a run, nothing at all, left-overs of an earlier one."""
+
+import pytest
+
+from rrru.figures import style
+from rrru.report import page
+from rrru.store import facts, tables
+from tests.figures import synthetic_gap
+from tests.gap.test_answer import CAMPAIGN, answered
+from tests.schemas import TABLES
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Results of one diagnosed campaign, and what an earlier run has left of another."""
+    for name in (CAMPAIGN, "earlier"):
+        (tmp_path / "campaigns" / name).mkdir(parents=True)
+        facts.write(answered(notes="a <b> & c") | {"campaign": name}, tmp_path / f"campaigns/{name}/verdict.json")
+        with style.print_style():
+            figure = style.new(style.SINGLE_MM, 30.0)
+            figure.subplots().plot([0.0, 1.0])
+        style.save(figure, {kind: tmp_path / f"figures/{name}/gap.{kind}" for kind in ("svg", "png")}, "What to see.")
+    verdicts = synthetic_gap.gap_verdicts(CAMPAIGN)
+    tables.write(TABLES["gap_verdicts"], verdicts, tmp_path / "tables/gap_verdicts.parquet")
+    tables.write(TABLES["gap_budget"], synthetic_gap.gap_budget(CAMPAIGN), tmp_path / "tables/gap_budget.parquet")
+    return tmp_path
+
+
+def written(folder, campaign=None):
+    page.write(folder, folder / "page.html", "paper", campaign)
+    return (folder / "page.html").read_text()
+
+
+def test_a_part_of_a_run_is_shown_and_what_an_earlier_one_has_left_is_not(folder):
+    text = written(folder)
+    assert (
+        f'id="answer-{CAMPAIGN}"' in text and f'id="figure-{CAMPAIGN}-gap"' in text and 'id="table-gap_budget"' in text
+    )
+    assert "earlier" not in text and "What to see." in text
+    for lacking in ("table-gap_shrink", 'id="calibration"', 'id="printers"'):
+        assert lacking not in text
+    assert written(folder) == text and not list(folder.glob("*.partial"))
+
+
+def test_texts_of_files_are_texts_on_the_page(folder):
+    assert "a &lt;b&gt; &amp; c" in written(folder)
+
+
+def test_a_folder_without_a_diagnosis_says_what_to_run(tmp_path):
+    assert "No campaign has been diagnosed yet" in written(tmp_path)
+
+
+def test_a_figure_that_is_large_as_svg_is_shown_as_a_picture(folder, monkeypatch):
+    assert "data:image/png" not in written(folder)
+    monkeypatch.setattr(page, "_LARGEST_SVG", 100)
+    text = written(folder)
+    assert f'<img alt="{CAMPAIGN}: The whole diagnosis" src="data:image/png;base64,' in text

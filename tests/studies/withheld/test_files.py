@@ -1,0 +1,128 @@
+"""Robots of files with a fault, on our own plant and on MuJoCo's: the same fault, and the right answer to it."""
+
+import json
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.studies.withheld import foreign
+from rrru.studies.withheld.chunks import Member
+from rrru.studies.withheld.faults import KINDS, draw_fault, kinds_of
+from rrru.studies.withheld.members import robot_of
+from rrru.studies.withheld.parts import parts
+from rrru.studies.withheld.plants import mujoco
+from rrru.studies.withheld.verdicts import NONE, PREFIX
+from tests.studies.withheld.files import FILES, conditions, short
+
+# of these MuJoCo and our laws say the same, but for what friction and acceleration do besides: (file, kind), share
+_ALIKE = (
+    ("hexapod_file", "soft_servo", 0.05),
+    ("hexapod_file", "slow_servo", 0.02),
+    ("hexapod_file", "length", 0.01),
+    ("hexapod_file", "warming", 0.01),
+    ("arm6_file", "soft_link", 0.02),
+    ("arm6_file", "tilted_axis", 0.01),
+    ("arm6_file", "base_on_springs", 0.03),
+    ("arm6_file", "soft_servo_on_a_slope", 0.03),
+    ("arm6_file", "soft_servo_under_a_load", 0.03),
+)
+
+
+def _fault(file, kind, seed=5):
+    known = conditions(file)
+    return draw_fault(kind, known.model, known.mechanism, np.random.default_rng(seed))
+
+
+def _moved(file, fault):
+    """What a fault does to the positions on our own plant and on MuJoCo's, (m, 3) each."""
+    known = conditions(file)
+    for plant in ("own", "mujoco"):
+        read = [foreign.noise_free(short(plant, file, acting), known) for acting in ((fault,), ())]
+        yield rows.measured(read[0]) - rows.measured(read[1])
+
+
+@pytest.mark.parametrize(("file", "kind", "share"), _ALIKE)
+def test_a_fault_is_the_same_on_both_plants(file, kind, share):
+    own, other = _moved(file, _fault(file, kind))
+    assert np.abs(own).max() > 1e-3
+    assert np.linalg.norm(own - other) < share * np.linalg.norm(own)
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_fault_has_its_places_in_the_file(file):
+    known = conditions(file)
+    kinds = set(kinds_of(known.model, known.mechanism)) - {NONE}
+    assert {"play", "soft_servo", "slow_servo", "length", "base_on_springs", "speed_friction"} <= kinds
+    for kind in kinds:
+        for seed in range(4):
+            mujoco(known, short("mujoco", file).offsets, _fault(file, kind, seed)).machine(3.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_right_answer_is_a_law_that_the_diagnosis_tries_or_none(kind):
+    file = next(f for f in FILES if kind in kinds_of(conditions(f).model, conditions(f).mechanism))
+    fault, robot = _fault(file, kind), conditions(file).mechanism
+    if fault.outside:
+        assert fault.truth == f"{PREFIX}:{kind}" and fault.effect == kind and not fault.numbers(robot)
+    elif KINDS[kind].law is None:
+        assert fault.truth == NONE and not fault.effect
+        own = short("own", file, (fault,))
+        gap = np.linalg.norm(foreign.residual(foreign.noise_free(own, conditions(file)), conditions(file)), axis=1)
+        assert gap.max() < 0.1 * conditions(file).noise_mm
+    else:
+        law, values = fault.values(robot)
+        assert fault.truth == fault.effect == law.name == KINDS[kind].answer
+        assert fault.numbers(robot) == ({} if "load_kg" in fault.more else {law.name: values})
+
+
+def test_one_place_means_that_place_alone():
+    alone = Counter()
+    for seed in range(40):
+        fault = _fault("hexapod_file", "play", seed)
+        assert min(fault.sizes) >= 0.0
+        alone[bool(fault.leg)] += 1
+        assert not fault.leg or np.flatnonzero(fault.sizes).tolist() == [fault.leg - 1]
+    # a third of 40: fewer than 5 or more than 24 come once in a thousand such draws
+    assert 5 <= alone[True] <= 24
+
+
+def test_a_robot_is_its_seed_as_strong_as_it_says_and_survives_as_text():
+    known = conditions("hexapod_file")
+    member = Member("own", "hexapod_file", 2)
+    robot, measurements = foreign.draw(member, known)
+    again, same = foreign.draw(member, known)
+    assert robot == again and measurements.equals(same)
+    assert robot.cause == "soft_servo" and robot.truth == "drive_compliance"
+    (fault,) = robot.acting
+    # the last step towards it is along a law that is linear
+    assert 0.9 * foreign.WEAKEST < fault.strength < 1.1 * foreign.STRONGEST
+    twice = foreign.as_driven(replace(robot, acting=(fault.scaled(2.0),)), known)[0].acting[0]
+    np.testing.assert_allclose(twice.strength, 2.0 * fault.strength, rtol=0.02)
+    told = robot.answer(known)
+    assert robot_of(told["drawn"]) == robot and json.loads(told["drawn"])["plant"] == "own"
+    # what it leaves in the noise-free residual is what the oracle finds in the noisy one
+    count = len(measurements) * 3 * fault.strength**2
+    np.testing.assert_allclose(robot.oracle_chi2, count, rtol=0.2)
+    listed = parts(robot, "drive_compliance", _budget(), known.noise_rms_mm)
+    assert listed.set_index("part").loc["drive_compliance", "strength"] == fault.strength
+
+
+def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
+    known = conditions("rrru3_file")
+    robot, measurements = foreign.draw(Member("own", "rrru3_file", 1), known)
+    assert robot.cause == NONE and not robot.acting and len(measurements) <= 220
+    assert set(measurements["speed_mm_s"]) == {40.0, 120.0} and set(measurements["payload_kg"]) == {0.0, 3.0}
+    assert set(rows.direction(measurements)) == {-1, 1}
+    elsewhere = foreign.fresh(robot, known).plan(known).targets()
+    assert np.abs(elsewhere - robot.plan(known).targets()).max() > 5.0
+    assert np.linalg.norm(foreign.residual(measurements, known), axis=1).mean() < 2.0 * known.noise_rms_mm
+
+
+def _budget():
+    """A budget without parts."""
+    import pandas as pd
+
+    return pd.DataFrame(columns=["part", "kind", "rms_mm", "probability"])

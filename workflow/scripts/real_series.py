@@ -1,0 +1,39 @@
+"""One series of a real arm: calibrated, diagnosed and judged on rows that no fit has seen; why, where it is refused."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from rrru.errors import RrruError
+from rrru.gap.settings import GapSettings
+from rrru.store import tables
+from rrru.store.job import run, tell
+from rrru.studies.real import arm_tables, arms
+from rrru.studies.real.carry import told
+from rrru.studies.real.refusals import refused
+from rrru.studies.real.schemas import SERIES_TABLES
+from rrru.studies.real.series import found
+
+
+def main(settings, inputs, outputs):
+    """Write the tables of a series, its measurements, and in `model` what of it carries to others."""
+    series = next(one for one in found(settings["real"], settings["set"]) if one.name == settings["series"])
+    chosen = GapSettings.from_config(settings["gap"] | settings["real"]["gap"], settings["seed"])
+    try:
+        studied = arms.study(series, settings["robots"], chosen, Path(outputs["model"]).with_name("sheet.parquet"))
+        frames, measurements, model = arm_tables.tables(studied), studied.measurements, told(studied)
+    except RrruError as error:
+        tell(f"{series.name}: left out: {error}")
+        frames, measurements, model = refused(series, error), pd.DataFrame(), None
+    frames = {one.name: frames.get(one.name, pd.DataFrame()) for one in SERIES_TABLES}
+    frames = {
+        one.name: frames[one.name].assign(campaign=series.name).reindex(columns=one.names) for one in SERIES_TABLES
+    }
+    tables.write_all(SERIES_TABLES, frames, outputs)
+    measurements.to_parquet(outputs["measurements"], index=False)
+    Path(outputs["model"]).write_text(json.dumps(model))
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
