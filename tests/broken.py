@@ -2,6 +2,7 @@
 
 import copy
 import os
+import re
 from xml.etree import ElementTree
 
 from hypothesis import HealthCheck, settings
@@ -22,6 +23,17 @@ def many(count=COUNT):
     """Settings of a property test of so many examples, the same in every run."""
     quiet = list(HealthCheck)
     return settings(max_examples=count, deadline=None, suppress_health_check=quiet, derandomize=True, database=None)
+
+
+def counted(counts, refusal, call, *arguments, **options):
+    """Call, and count what is taken and what is refused by an error of that kind, which says something."""
+    try:
+        call(*arguments, **options)
+        counts["taken"] += 1
+    except refusal as error:
+        # a place, and what is wrong there
+        assert re.match(r".+: .+", str(error)), error
+        counts["refused"] += 1
 
 
 def edited(tree, edits):
@@ -55,7 +67,9 @@ def edited_xml(text, edits):
     """An XML text with attributes and elements replaced, exchanged, doubled, dropped or renamed."""
     root = ElementTree.fromstring(text)
     for kind, place, value in edits:
-        element, holder = _at([(child, parent) for parent in root.iter() for child in parent] or [(root, [root])], place)
+        element, holder = _at(
+            [(child, parent) for parent in root.iter() for child in parent] or [(root, [root])], place
+        )
         # in braces ElementTree takes it for a namespace
         word = str(value).replace("{", "")
         if element.attrib and place % 3:
@@ -81,6 +95,23 @@ def edited_xml(text, edits):
         else:
             element.tag = word
     return ElementTree.tostring(root, encoding="unicode")
+
+
+def edited_lines(text, edits):
+    """A text with words of its lines replaced, and lines exchanged, doubled, dropped or renamed."""
+    lines = text.splitlines()
+    for kind, place, value in edits:
+        if not lines:
+            break
+        at = place * len(lines) // 1_000_000
+        words = re.split(r"([\s:=,]+)", lines[at])
+        if kind in ("value", "number"):
+            words[place % len(words)] = str(value if kind == "value" else _NUMBERS[place % len(_NUMBERS)])
+        elif kind == "rename":
+            words[0] = str(value)
+        new = {"drop": [], "twice": [lines[at]] * 2, "other": [_at(lines, place * 7919 % 1_000_000)]}
+        lines[at : at + 1] = new.get(kind, ["".join(words)])
+    return "\n".join(lines)
 
 
 def spliced(data, splices):

@@ -20,7 +20,17 @@ _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
 # two joints are on one line within this, in m and rad
 _SAME = 1e-9
 _MOST = 1e9  # m, kg: more is a slip, and what is reckoned from it may overflow
-_RECKONED = ("body_pos", "body_quat", "body_ipos", "body_mass", "jnt_pos", "jnt_axis", "jnt_range", "site_pos", "eq_data")
+_RECKONED = (
+    "body_pos",
+    "body_quat",
+    "body_ipos",
+    "body_mass",
+    "jnt_pos",
+    "jnt_axis",
+    "jnt_range",
+    "site_pos",
+    "eq_data",
+)
 
 
 def plays_of(model):
