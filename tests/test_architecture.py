@@ -1,6 +1,7 @@
 """Imports point one way, and only the named files know the named libraries."""
 
 import ast
+import re
 
 import pytest
 
@@ -78,3 +79,16 @@ def test_nobody_uses_global_random_state():
                 assert node.attr in ("default_rng", "SeedSequence", "Generator"), f"{path}: np.random.{node.attr}"
             if isinstance(node, ast.Import):
                 assert "random" not in [alias.name for alias in node.names], path
+
+
+def test_nothing_runs_code_that_a_file_holds():
+    """Modules by the user's names come in at one place; no text is evaluated, unpickled or handed to a shell."""
+    forbidden = {"eval", "exec", "__import__", "pickle", "marshal", "subprocess", "system", "popen", "UnsafeLoader"}
+    for path in [*_FILES, *sorted((_ROOT / "workflow/scripts").glob("*.py"))]:
+        tree = ast.parse(path.read_text())
+        used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+        used |= {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        used |= {name.split(".")[0] for name in _imports(path)}
+        assert not used & forbidden, f"{path} uses {used & forbidden}"
+    rules = [_ROOT / "Snakefile", *sorted((_ROOT / "workflow/rules").rglob("*.smk"))]
+    assert not [path for path in rules if re.search(r"^\s+(shell|run):", path.read_text(), re.MULTILINE)]

@@ -66,10 +66,11 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
     [
         ("motion: {dwell_s: .nan}", "motion.dwell_s: nan is not of type 'number'; allowed: a finite number"),
         ("motion: {dwell_s: .inf}", "motion.dwell_s: inf is not of type 'number'; allowed: a finite number"),
+        ("results_dir: a{b}", "results_dir: 'a{b}' does not match"),
         ("seed: 5.0", "seed: 5.0 is not of type 'integer'; allowed: a whole number, without a point"),
         ("campaigns: {1: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
         ("campaigns: {no: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
-        ("real: {sets: {ur10: {files: /data/*.csv}}}", "real.sets.ur10.files is '/data/*.csv': "),
+        ("real: {sets: {ur10: {files: /data/*.csv}}}", "real.sets.ur10.files: got '/data/*.csv'; allowed: a path"),
     ],
 )
 def test_what_yaml_has_and_json_has_not_is_refused(overlay, message, monkeypatch):

@@ -24,7 +24,7 @@ from tests.workflow.folder import dry_run, run
         ("virtual_robots: {twin: {mujoco: {}}}", "virtual robot: mujoco drives rrru3, which has no mjcf"),
         ("virtual_robots: {twin: {mujoco: {cause: {}}}}", "'cause' was unexpected"),
         ("campaigns: {paper: {unit: inch}}", "unit"),
-        ("sweep: {values: [0.1, 0.2]}", "0.1 is not of type 'string'"),
+        ("sweep: {values: [0.1, 0.2]}", "sweep.values.1: 0.2 is not of type 'string'"),
         ('sweep: {values: ["0.5", "0.50"]}', "sweep.values holds a number twice"),
         ("sweep: {populations: {islands: [30]}}", "sweep.populations.islands is [30]"),
         ("reproduce: {campaign: nosuch}", "reproduce.campaign is 'nosuch'"),
@@ -32,6 +32,7 @@ from tests.workflow.folder import dry_run, run
         ("genetic: {generations: 0}", "0 is less than the minimum of 1"),
         ("gap: {effects: [backlash, wind]}", "unknown effect 'wind'"),
         ('gap: {own_effects: ["nowhere:Law"]}', "cannot import 'nowhere'"),
+        ('gap: {own_effects: ["os.system(1):x"]}', "'os.system(1):x' is no module:object"),
         ("gap: {known: {transmission_error: {teeth: 7}}}", "no known 'teeth'"),
         ("gap: {tolerence: 0.2}", "tolerence"),
         ("withheld: {effects: [wind]}", "withheld.effects has 'wind'"),
@@ -54,3 +55,22 @@ def test_a_command_that_is_refused_ends_so_and_leaves_nothing(tmp_path):
     (tmp_path / "wrong.yaml").write_text("gap: {effects: [wind]}\nresults_dir: build\n")
     code, output = run(tmp_path, overlays=("wrong.yaml",))
     assert code != 0 and "unknown effect 'wind'" in output and not (tmp_path / "build").exists()
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "!!python/object/apply:os.mkdir [ran]",
+        "!!python/object/new:os.mkdir [ran]",
+        "!!python/name:os.mkdir",
+        "!!python/module:this",
+        '\'__import__("os").mkdir("ran")\'',
+        '{\'?__import__("os").mkdir("ran")\': 1}',
+        "?__import__('os').mkdir('ran')",
+    ],
+)
+def test_a_configuration_runs_no_code(tmp_path, value):
+    """But that of modules which own_effects, effects and module name, and where its top says __use_yte__: see docs."""
+    (tmp_path / "code.yaml").write_text(f"seed: {value}\nresults_dir: build\n")
+    code, _ = dry_run(tmp_path, overlays=("code.yaml",))
+    assert code != 0 and not (tmp_path / "ran").exists()
