@@ -11,7 +11,7 @@ from tests.workflow.folder import run
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with 150 rows of the UR10, a file of it without a joint, nothing of other sets; and what its run said."""
+    """A folder with 150 rows of the UR10, a file of it without a joint, nothing of other sets; what its run said."""
     place = tmp_path_factory.mktemp("real")
     whole = pd.read_csv(ROOT / "data/real/ur10/series_D.csv")
     (place / "measured/ur10").mkdir(parents=True)

@@ -208,7 +208,7 @@ def _table(
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    more = ("temperature_c", *TURNS["command"], *TURNS["measured"], "target", *TARGET, "target_on")
-    extra = [name for name in more if name in frame]
+    known = ("temperature_c", *TURNS["command"], *TURNS["measured"], "target", *TARGET, "target_on")
+    extra = [name for name in known if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes
