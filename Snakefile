@@ -2,12 +2,16 @@ from pathlib import Path
 
 from snakemake.utils import min_version, validate
 
+from rrru.studies.checks import check_once, check_schema
+
 min_version("9.0")
 
 
 configfile: "config.yaml"
 
 
+check_schema(config, Path(workflow.basedir, "workflow/schemas/config.schema.yaml"))
+# it sets what is absent to the defaults
 validate(config, "workflow/schemas/config.schema.yaml")
 
 

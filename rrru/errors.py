@@ -43,6 +43,10 @@ class TableError(RrruError):
     """A result table does not fit its schema."""
 
 
+class WriteError(RrruError):
+    """A file of results cannot be written."""
+
+
 def _problem_text(problem: dict) -> str:
     """One line: file, row, column, value, allowed."""
     where = [str(problem["file"])]

@@ -6,7 +6,6 @@ and in marker.
 
 from contextlib import contextmanager
 from functools import wraps
-from pathlib import Path
 from textwrap import fill
 
 import numpy as np
@@ -18,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from rrru.figures.fonts import leave_out_layout
+from rrru.store.whole import whole
 
 leave_out_layout()
 
@@ -175,22 +175,14 @@ def save(figure, paths, caption=""):
     paths: by kind, of `KINDS`. The same tables give the same bytes under the same versions of Matplotlib and its font
     library.
     """
-    partial = {kind: Path(path).parent / f".{Path(path).name}.partial" for kind, path in paths.items()}
-    try:
-        with print_style():
-            _arrange(figure)
-            for kind, path in partial.items():
-                path.parent.mkdir(parents=True, exist_ok=True)
-                # straight to the canvas: savefig would draw everything a second time to arrange it
-                figure.set_dpi(_DPI)
-                canvas, undated, described = KINDS[kind]
-                write = getattr(canvas(figure), f"print_{kind}")
-                write(path, metadata={undated: None, described: caption})
-        for kind, path in paths.items():
-            partial[kind].replace(path)
-    finally:
-        for path in partial.values():
-            path.unlink(missing_ok=True)
+    with whole(*paths.values()) as partial, print_style():
+        _arrange(figure)
+        for kind, path in zip(paths, partial, strict=True):
+            # straight to the canvas: savefig would draw everything a second time to arrange it
+            figure.set_dpi(_DPI)
+            canvas, undated, described = KINDS[kind]
+            write = getattr(canvas(figure), f"print_{kind}")
+            write(path, metadata={undated: None, described: caption})
 
 
 def _arrange(figure):

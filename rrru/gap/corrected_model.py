@@ -18,6 +18,7 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.robots.file_changes import placement_of
 from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.walk import Poses
+from rrru.store.whole import write_text
 
 # a simulation takes about a tenth of a second a point: no more of them are driven, from the first on
 _MOST_DRIVEN = 300
@@ -38,8 +39,7 @@ def write_corrected(diagnosis, section, masses, file):
     except ConfigError as error:
         tag = "mujoco" if "mjcf" in section else "robot"
         written = Corrected(f"<{tag}><!-- not corrected: {error} --></{tag}>\n", (str(error),), None)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(written.text)
+    write_text(written.text, file)
     if written.found:
         more, why = gap_rows(attribution, written, section, file, shrink)
         shrink = pd.concat([shrink, more], ignore_index=True)

@@ -20,7 +20,8 @@ DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 def _zero_offset(edit, site, size):
     """A drive's zero is off: rad or mm."""
-    edit.offsets[_drive(edit, site)] = size * edit.units(site)[0]
+    drive = _drive(edit, site)
+    edit.offsets[drive] = size * edit.units(drive)[0]
 
 
 def _placement(edit, site, size):

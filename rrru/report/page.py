@@ -11,6 +11,7 @@ import jinja2
 from rrru.report import cards, cells, contents, svg
 from rrru.report.trust import trust
 from rrru.store import facts, tables
+from rrru.store.whole import write_text
 from rrru.studies import glossary
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -150,9 +151,7 @@ def render(template, **values):
 
 def save(text, path):
     """Write a page as a whole or not at all."""
-    partial = Path(f"{path}.partial")
-    partial.write_text(text)
-    partial.replace(path)
+    write_text(text, path)
 
 
 def _part(results, section):

@@ -40,6 +40,11 @@ def _chain(rows, convention, name, options):
         unit = "mm" if row.get("sliding") else "deg"
         if f"range_{unit}" not in row:
             raise ConfigError(f"robot {name}: row {number} has no range_{unit}; allowed: lowest and highest value")
+        low, high = row[f"range_{unit}"]
+        if not low < high:
+            raise ConfigError(
+                f"robot {name}: row {number} has range_{unit} {low:g} to {high:g}; allowed: low, then high"
+            )
         scale = 1.0 if unit == "mm" else np.pi / 180.0
         ranges.append(scale * np.asarray(row[f"range_{unit}"], dtype=float))
         homes.append(scale * row.get(f"home_{unit}", float(np.mean(row[f"range_{unit}"]))))

@@ -103,10 +103,14 @@ def mjcf_parts(path, platform):
 
 
 def _existing(path):
-    """The Path of a file that exists."""
+    """The Path of a file that exists and is text."""
     file = Path(path)
     if not file.is_file():
         raise ConfigError(f"{file}: there is no such file; allowed: a file")
+    try:
+        file.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file}: {error}; allowed: a file that can be read, in UTF-8") from None
     return file
 
 

@@ -6,17 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from rrru.store.whole import write_text
+
 
 def write(facts: dict[str, Any], path: str | Path) -> None:
     """Write facts as JSON, as a whole or not at all; numbers of NumPy as plain ones, what is not finite as null."""
-    path = Path(path)
-    partial = path.parent / f".{path.name}.partial"
-    try:
-        text = json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-        partial.write_text(f"{text}\n")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    text = json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    write_text(f"{text}\n", path)
 
 
 def read(path: str | Path) -> dict[str, Any]:

@@ -15,8 +15,11 @@ def run(main: Callable[[dict, dict, dict], None], snakemake: Any) -> None:
     It logs to the job's file; an RrruError ends the process with its message instead of a traceback.
     """
     log = Path(snakemake.log[0])
-    log.parent.mkdir(parents=True, exist_ok=True)
-    logging.basicConfig(filename=log, filemode="w", level=logging.INFO, format="%(message)s", force=True)
+    try:
+        log.parent.mkdir(parents=True, exist_ok=True)
+        logging.basicConfig(filename=log, filemode="w", level=logging.INFO, format="%(message)s", force=True)
+    except OSError as error:
+        sys.exit(f"{log}: cannot be written ({error}); allowed: results_dir in a folder that may be written to")
     logging.captureWarnings(True)
     # what fonts are made of is of no use to anybody
     logging.getLogger("fontTools").setLevel(logging.WARNING)

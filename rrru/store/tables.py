@@ -9,6 +9,7 @@ import pyarrow.parquet as parquet
 
 from rrru.errors import TableError
 from rrru.store.schema import Column, Table
+from rrru.store.whole import whole
 
 _ARROW = {"int64": arrow.int64(), "float64": arrow.float64(), "str": arrow.string(), "bool": arrow.bool_()}
 
@@ -76,11 +77,5 @@ def gather(paths: Iterable[str | Path], path: str | Path) -> None:
 
 def _write(data: arrow.Table, path: str | Path) -> None:
     """Write an Arrow table so that the file is there as a whole or not at all."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = path.parent / f".{path.name}.partial"
-    try:
+    with whole(path) as (partial,):
         parquet.write_table(data, partial, compression="zstd")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

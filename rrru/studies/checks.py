@@ -5,7 +5,55 @@ import importlib
 import json
 from pathlib import Path
 
+import yaml
+
+from rrru.errors import ConfigError
 from rrru.store.digest import code_digest
+
+# a larger number is a slip, and what is reckoned from it may overflow
+_MOST = 1e15
+
+
+def check_schema(config, file):
+    """Raise ConfigError with place and value where a configuration does not fit the JSON schema of a file.
+
+    By stricter types than JSON has, as YAML has more: numbers are finite, 3.0 is no count, 1 and `no` are no names.
+    """
+    # Snakemake brings it along
+    from jsonschema import Draft202012Validator as Usual
+    from jsonschema import exceptions, validators
+
+    kinds = {name: lambda _, value, fits=fits: fits(value) for name, (fits, _) in _STRICT.items()}
+    strict = validators.extend(Usual, type_checker=Usual.TYPE_CHECKER.redefine_many(kinds))
+    rules = yaml.load(Path(file).read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    error = exceptions.best_match(strict(rules).iter_errors(config))
+    if error:
+        kind = error.validator_value if error.validator == "type" else None
+        allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
+        raise ConfigError(f"{'.'.join(map(str, error.absolute_path)) or 'configuration'}: {error.message}{allowed}")
+
+
+def _is_number(value):
+    """Whether a value is a number that can be reckoned with."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _MOST
+
+
+def _is_whole(value):
+    """Whether a value is a whole number, written as one."""
+    return _is_number(value) and isinstance(value, int)
+
+
+def _is_mapping(value):
+    """Whether a value is a mapping whose keys are text."""
+    return isinstance(value, dict) and all(isinstance(key, str) for key in value)
+
+
+# by JSON's name of a type what counts as one, in code and in words
+_STRICT = {
+    "number": (_is_number, f"a finite number of at most {_MOST:g}"),
+    "integer": (_is_whole, "a whole number, without a point"),
+    "object": (_is_mapping, "a mapping whose keys are text"),
+}
 
 
 def check_once(config, checks, files, memory):

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from rrru.errors import ConfigError, RrruError
+from rrru.errors import ConfigError, RrruError, WriteError
 from rrru.figures import choose, style
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
@@ -175,7 +175,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         return whole(canvas, path, **options)
 
     monkeypatch.setattr(FigureCanvasAgg, "print_png", fail)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(WriteError, match=r"a.png: cannot be written \(disk full\)"):
         style.save(figure, {"pdf": pdf, "png": png})
     assert (pdf.read_text(), png.read_text()) == ("old", "old")
     assert sorted(tmp_path.iterdir()) == [pdf, png]

@@ -7,7 +7,7 @@ import pandas as pd
 import pyarrow.parquet as parquet
 import pytest
 
-from rrru.errors import TableError
+from rrru.errors import TableError, WriteError
 from rrru.store import tables
 from rrru.studies import glossary
 from tests.places import ROOT
@@ -67,7 +67,7 @@ def test_a_failed_write_leaves_the_old_table_and_nothing_else(tmp_path, monkeypa
         raise OSError("disk full")
 
     monkeypatch.setattr(parquet, "write_table", broken)
-    with pytest.raises(OSError, match="disk full"):
+    with pytest.raises(WriteError, match=r"t.parquet: cannot be written \(disk full\)"):
         tables.write(TABLES["correlations"], _ROWS.assign(correlation=0.1), path)
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from rrru.store import tables
 from rrru.store.job import run
+from rrru.store.whole import whole
 from rrru.studies.delta import views
 from rrru.studies.delta.schemas import TABLES
 from rrru.studies.delta.virtual_delta import twin
@@ -14,7 +15,9 @@ def main(settings, inputs, outputs):
     view, truth = views.scene(settings), views.true_poses(settings)
     by_hand, mounted = (twin(settings).generator(f"{kind} images") for kind in ("tilted", "pose"))
     tilted = view.images(view.tilted_places(by_hand), by_hand)
-    np.savez(outputs["images"], tilted=tilted, poses=view.images(view.pose_places(truth), mounted))
+    poses = view.images(view.pose_places(truth), mounted)
+    with whole(outputs["images"]) as (partial,), partial.open("wb") as file:
+        np.savez(file, tilted=tilted, poses=poses)
     tables.write_all(TABLES, {"delta_truth": truth}, outputs)
 
 

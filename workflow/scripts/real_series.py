@@ -9,6 +9,7 @@ from rrru.errors import RrruError
 from rrru.gap.settings import GapSettings
 from rrru.store import tables
 from rrru.store.job import run, tell
+from rrru.store.whole import whole
 from rrru.studies.real import arm_tables, arms
 from rrru.studies.real.carry import told
 from rrru.studies.real.refusals import refused
@@ -31,8 +32,9 @@ def main(settings, inputs, outputs):
         one.name: frames[one.name].assign(campaign=series.name).reindex(columns=one.names) for one in SERIES_TABLES
     }
     tables.write_all(SERIES_TABLES, frames, outputs)
-    measurements.to_parquet(outputs["measurements"], index=False)
-    Path(outputs["model"]).write_text(json.dumps(model))
+    with whole(outputs["measurements"], outputs["model"]) as (table, text):
+        measurements.to_parquet(table, index=False)
+        text.write_text(json.dumps(model))
 
 
 if __name__ == "__main__":

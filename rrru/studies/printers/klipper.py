@@ -155,14 +155,22 @@ def _lines(path, seen):
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
-        value, allowed = error.strerror or str(error), "a file that can be read"
-        problem = {"file": str(path), "row": None, "column": None, "value": value, "allowed": allowed}
-        raise IngestError([problem]) from None
+        raise _unread(path, None, error.strerror or str(error), "a file that can be read") from None
     seen.add(path.resolve())
     for line in text.splitlines():
         if not line.startswith("[include "):
             yield line
             continue
-        for other in sorted(path.parent.glob(line[len("[include ") :].split("]")[0].strip().lstrip("/"))):
+        pattern = line[len("[include ") :].split("]")[0].strip().lstrip("/")
+        try:
+            others = sorted(path.parent.glob(pattern))
+        except (ValueError, OSError) as error:
+            raise _unread(path, line, f"{pattern!r} ({error})", "the name of a file, or a pattern of names") from None
+        for other in others:
             if other.is_file() and other.resolve() not in seen:
                 yield from _lines(other, seen)
+
+
+def _unread(path, column, value, allowed):
+    """The IngestError of a file, or of a line in it, that leads nowhere."""
+    return IngestError([{"file": str(path), "row": None, "column": column, "value": value, "allowed": allowed}])

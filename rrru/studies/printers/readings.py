@@ -40,6 +40,7 @@ _NOT_READ = ("program_height_rms_mm", "program_distance_rms_mm", "refit_max_diff
 _TEETH = r"\s*[1-9]\d*(\.\d+)?\s*:\s*[1-9]\d*(\.\d+)?\s*"
 _GEARS = re.compile(f"{_TEETH}(,{_TEETH})*")
 # numbers of the calibration: radius, two angles, three endstops; with distances also three arms
+_MOST = 1e15  # a larger number is a slip, and what is reckoned from it may overflow
 _NUMBERS = {"heights": 6, "distances": 9}
 
 
@@ -53,7 +54,7 @@ def read(path):
         content = json.loads(Path(path).read_text())
     except OSError as error:
         problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         problems.refuse_now(value=f"no JSON ({error})", allowed="JSON, a list of printers")
     if not (isinstance(content, list) and content and all(isinstance(entry, dict) for entry in content)):
         problems.refuse_now(value="something else", allowed="a list of at least one printer, each a mapping")
@@ -160,7 +161,7 @@ class _Reader:
         if value is None:
             return np.nan
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and np.isfinite(value) and (value > 0.0 or not positive):
+        if number and abs(value) <= _MOST and (value > 0.0 or not positive):
             return float(value)
         self._refuse(field, repr(value), "a positive number" if positive else "a finite number")
         return np.nan

@@ -100,7 +100,7 @@ def broken(name, path, edits, splices, out):
         edited_book(path, edits, out)
         data = bytearray(out.read_bytes())
     elif name == "parquet":
-        frame = edited_frame(pd.read_csv(path).head(80), edits)
+        frame = edited_frame(pd.read_csv(path).query("run <= 3"), edits)
         data = bytearray(frame.to_parquet(None))
     else:
         encoding = "cp1252" if name == "leica" else "utf-8"

@@ -5,7 +5,6 @@ import rrru.report
 from rrru.objects import module_file
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
-from rrru.studies.checks import check_once
 
 RESULTS = config["results_dir"].rstrip("/")
 CAMPAIGNS = sorted(config["campaigns"])

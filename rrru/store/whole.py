@@ -1,0 +1,38 @@
+"""A file of results is there as a whole or not at all, whatever stops the writing."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rrru.errors import WriteError
+
+
+@contextmanager
+def whole(*paths: str | Path) -> Iterator[list[Path]]:
+    """Temporary paths beside the files at `paths`, to be written; at the end they take these files' places.
+
+    None is replaced before all are written, and a reader of the old ones goes on reading them. Raises WriteError where
+    the system refuses: the disk is full, the folder may not be written to.
+    """
+    files = [Path(path) for path in paths]
+    partial = [file.parent / f".{file.name}.partial" for file in files]
+    try:
+        for file in files:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+        for new, file in zip(partial, files, strict=True):
+            new.replace(file)
+    except OSError as error:
+        allowed = "allowed: a folder that may be written to, on a disk with room. What was there before is as it was"
+        raise WriteError(f"{', '.join(map(str, paths))}: cannot be written ({error}); {allowed}") from error
+    finally:
+        for new in partial:
+            # on a file system that has become read-only
+            with suppress(OSError):
+                new.unlink(missing_ok=True)
+
+
+def write_text(text: str, path: str | Path) -> None:
+    """Write a text file, see `whole`."""
+    with whole(path) as (partial,):
+        partial.write_text(text, encoding="utf-8")

@@ -1,0 +1,80 @@
+"""A broken configuration is taken or refused with place and value, never with anything else.
+
+By what the Snakefile asks of it before anything runs; RRRU_BROKEN_FILES is the number of configurations.
+"""
+
+import copy
+import importlib
+import re
+from collections import Counter
+
+import pytest
+import yaml
+from hypothesis import given
+from snakemake.utils import update_config, validate
+
+from rrru.errors import ConfigError
+from rrru.studies import config as parts
+from rrru.studies.checks import check_schema
+from rrru.studies.ptt3 import parts as ptt
+from rrru.studies.rrru3 import settings as paper_a
+from tests.broken import COUNT, EDITS, counted, edited, many
+from tests.places import ROOT
+
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+RULES = "".join(file.read_text() for file in sorted((ROOT / "workflow/rules").rglob("*.smk")))
+CHECKS = [name for line in RULES.splitlines() if "CHECKS" in line for name in re.findall(r'"(rrru[.\w]+:\w+)"', line)]
+
+
+def _base():
+    """The configuration with small numbers."""
+    config, small = (yaml.safe_load((ROOT / name).read_text()) for name in ("config.yaml", "tests/minimal.yaml"))
+    update_config(config, small)
+    return config
+
+
+def _asked(config):
+    """What the Snakefile asks."""
+    check_schema(config, SCHEMA)
+    # sets the defaults; whatever it refuses, the stricter one has refused
+    validate(config, str(SCHEMA))
+    for check in (parts.check_files, ptt.check, paper_a.check):
+        check(config)
+    for name in CHECKS:
+        module, _, function = name.partition(":")
+        getattr(importlib.import_module(module), function)(config)
+
+
+def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    base, counts = _base(), Counter()
+    _asked(copy.deepcopy(base))
+    assert len(CHECKS) >= 5
+
+    @many(COUNT)
+    @given(edits=EDITS)
+    def one(edits):
+        counted(counts, ConfigError, _asked, edited(base, edits))
+
+    one()
+    print("configurations", dict(counts))
+    assert counts["refused"] and counts["taken"]
+
+
+@pytest.mark.parametrize(
+    ("overlay", "message"),
+    [
+        ("motion: {dwell_s: .nan}", "motion.dwell_s: nan is not of type 'number'; allowed: a finite number"),
+        ("motion: {dwell_s: .inf}", "motion.dwell_s: inf is not of type 'number'; allowed: a finite number"),
+        ("seed: 5.0", "seed: 5.0 is not of type 'integer'; allowed: a whole number, without a point"),
+        ("campaigns: {1: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
+        ("campaigns: {no: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
+        ("real: {sets: {ur10: {files: /data/*.csv}}}", "real.sets.ur10.files is '/data/*.csv': "),
+    ],
+)
+def test_what_yaml_has_and_json_has_not_is_refused(overlay, message, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    config = _base()
+    update_config(config, yaml.safe_load(overlay))
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        _asked(config)
