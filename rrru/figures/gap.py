@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from rrru.errors import ConfigError
-from rrru.figures import choose, gap_budget, gap_map, style
+from rrru.figures import choose, gap_arrows, gap_budget, style
 
 _BEFORE = {"color": "#777777", "marker": "o", "markerfacecolor": "white"}
 _AFTER = {"color": style.BLUE, "marker": "s"}
@@ -56,7 +56,7 @@ def gap(tables, options):
 
 
 @style.printed
-def where(tables, options):
+def gap_map(tables, options):
     """Where the robot misses: measured minus calibrated sim at the points, from above and from the side. An arrow
     points to where the robot really was, magnified as stated; dark is far. The ring is the worst spot.
     """
@@ -64,10 +64,10 @@ def where(tables, options):
     verdict = choose.of_campaign(tables, "gap_verdicts", campaign, "gap_map").iloc[0]
     points = _sized(tables["gap_points"], campaign)
     used = points[points["used"]]
-    heights = [_MAP_MM * gap_map.height_ratio(used, name) for name in gap_map.VIEWS]
+    heights = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
     figure = style.new(style.SINGLE_MM, sum(heights) + 36.0)
     axes = figure.subplots(2, 1, height_ratios=heights)
-    panels = dict(zip(gap_map.VIEWS, axes, strict=True))
+    panels = dict(zip(gap_arrows.VIEWS, axes, strict=True))
     axes[0].sharex(axes[1])
     _map(figure, panels, used, verdict, options["z_down"])
     return figure
@@ -76,7 +76,7 @@ def where(tables, options):
 def _map(figure, panels, used, verdict, z_down, mark=""):
     """Both views of the gap with the scale of their arrows."""
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
-    arrows, beyond, factor = gap_map.draw(panels, used, worst, z_down)
+    arrows, beyond, factor = gap_arrows.draw(panels, used, worst, z_down)
     panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst spot")
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
     bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
@@ -96,14 +96,14 @@ def _sized(points, campaign):
 def _page(lines, causes, trajectories, used):
     """A figure that is as high as its panels need, and these by name, empty."""
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
-    views = [_MAP_MM * gap_map.height_ratio(used, name) for name in gap_map.VIEWS]
+    views = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
     # what stands around the panels takes part in the figure's height, not in their ratios
     heights = [_LINE_MM * lines, _BUDGET_MM, max(sum(rows) + 30.0, sum(views) + 36.0), 46.0]
     figure = style.new(style.DOUBLE_MM, min(sum(heights) + 4.0, _MOST_MM))
     outer = figure.add_gridspec(4, 1, height_ratios=heights)
     middle = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
     left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(middle, (views, rows), strict=True))
-    names = ("headline", "budget", *gap_map.VIEWS, "causes", "shrink", "along")
+    names = ("headline", "budget", *gap_arrows.VIEWS, "causes", "shrink", "along")
     places = (outer[0], outer[1], *left, *right, outer[3])
     panels = {name: figure.add_subplot(place) for name, place in zip(names, places, strict=True)}
     panels["top view"].sharex(panels["side view"])

@@ -183,7 +183,7 @@ class _Looks:
         self._source = None
 
     def at(self, case, state, terms=()):
-        """Case with its laws and noise, its linearisation at a state with a hypothesis' terms, and the noise's source."""
+        """Case with its laws and noise, its linearisation at a state with a hypothesis' terms, the noise's source."""
         linear = case.linearise(state)
         case, orders = with_orders(case, linear, terms)
         case, waves = with_spectra(case, linear, terms)

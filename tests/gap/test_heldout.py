@@ -94,6 +94,14 @@ def test_predictions_equal_a_refit_without_the_fold(passes, level):
     np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
 
 
+@pytest.mark.parametrize("level", [0, 3])
+def test_what_an_effect_gains_is_what_its_prediction_alone_loses(full, level):
+    whole = full.predict(TERMS, STRENGTHS, level).log_score.sum()
+    without = [full.predict(TERMS[1 - k : 2 - k], STRENGTHS[1 - k : 2 - k], level).log_score.sum() for k in range(2)]
+    np.testing.assert_allclose(full.gains(TERMS, STRENGTHS, level), whole - np.array(without), rtol=1e-5, atol=1e-5)
+    assert full.gains((), [], level) == []
+
+
 def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(full):
     assert [len(np.unique(full.case.run[full.fold == k])) for k in np.unique(full.fold)] == [1] * 16
     once = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))

@@ -13,7 +13,7 @@ GAP_TABLES = [
 ]
 GAP_FIGURES = {
     "gap": ("rrru.figures.gap:gap", ["gap_verdicts", "gap_budget", "gap_attribute", "gap_shrink", "gap_points"]),
-    "gap_map": ("rrru.figures.gap:where", ["gap_verdicts", "gap_points"]),
+    "gap_map": ("rrru.figures.gap:gap_map", ["gap_verdicts", "gap_points"]),
 }
 
 
