@@ -26,6 +26,10 @@ from rrru.robots.legs import Drive, Parts, unit_twist
 _RANGE = {"rad": 1.0, "mm": 100.0}
 _UNITS = {"R": "rad", "P": "mm"}
 _TRN = mujoco.mjtTrn
+# a model's numbers in m, kg and rad that a robot is made of; more is a slip, and what is reckoned from it overflows
+_RECKONED = ("body_pos", "body_quat", "body_ipos", "body_mass", "jnt_pos", "jnt_axis", "jnt_range")
+_RECKONED += ("site_pos", "eq_data")
+_MOST = 1e9
 
 
 def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **options):
@@ -63,7 +67,7 @@ def urdf_parts(path, base=None, tip=None, home=None):
     for name, (driver, factor, offset) in urdf.mimics.items():
         if driver in known:
             qpos[address[known[name]]] = factor * qpos[address[known[driver]]] + offset
-    assembly = Assembly(model, file, first, last, qpos)
+    assembly = _assembly(model, file, first, last, qpos)
     for move in assembly.moves.values():
         link = model.body(model.jnt_bodyid[move.joint]).name
         if link in urdf.odd:
@@ -97,7 +101,7 @@ def mjcf_parts(path, platform):
     if platform not in names:
         raise ConfigError(f"{file}: platform is {platform!r}; allowed: {', '.join(name for name in names if name)}")
     home = model.key_qpos[0] if model.nkey else model.qpos0
-    assembly = Assembly(model, file, 0, model.body(platform).id, home)
+    assembly = _assembly(model, file, 0, model.body(platform).id, home)
     servos = _servos(assembly)
     return assembly, servos, of_equalities(assembly, servos)
 
@@ -112,6 +116,14 @@ def _existing(path):
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{file}: {error}; allowed: a file that can be read, in UTF-8") from None
     return file
+
+
+def _assembly(model, file, base, platform, home):
+    """The Assembly of a model whose numbers can be reckoned with; MuJoCo only warns of others."""
+    for what, values in ({name: getattr(model, name) for name in _RECKONED} | {"the home pose": home}).items():
+        if len(odd := values[~(np.abs(values) <= _MOST)]):
+            raise ConfigError(f"{file}: {what} has the value {odd[0]:g}; allowed: numbers of at most {_MOST:g}")
+    return Assembly(model, file, base, platform, home)
 
 
 def _servos(assembly):

@@ -19,18 +19,6 @@ MM = 1000.0
 _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
 # two joints are on one line within this, in m and rad
 _SAME = 1e-9
-_MOST = 1e9  # m, kg: more is a slip, and what is reckoned from it may overflow
-_RECKONED = (
-    "body_pos",
-    "body_quat",
-    "body_ipos",
-    "body_mass",
-    "jnt_pos",
-    "jnt_axis",
-    "jnt_range",
-    "site_pos",
-    "eq_data",
-)
 
 
 def plays_of(model):
@@ -81,7 +69,6 @@ class Assembly:
         self.model, self.file, self.base, self.platform = model, file, base, platform
         self.data = mujoco.MjData(model)
         self.data.qpos[:] = qpos
-        self._check_size()
         mujoco.mj_kinematics(model, self.data)
         kinds = {k: int(model.eq_type[k]) for k in range(model.neq) if model.eq_active0[k]}
         self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
@@ -98,13 +85,6 @@ class Assembly:
     def error(self, text):
         """The ConfigError of a text about the file."""
         return ConfigError(f"{self.file}: {text}")
-
-    def _check_size(self):
-        """Refuse numbers that nothing can be reckoned from, of which MuJoCo only warns."""
-        values = {what: getattr(self.model, what) for what in _RECKONED} | {"the home pose": self.data.qpos}
-        for what, of in values.items():
-            if len(odd := of[~(np.abs(of) <= _MOST)]):
-                raise self.error(f"{what} has the value {odd[0]:g}; allowed: numbers of at most {_MOST:g}")
 
     def body_name(self, body):
         """Name of a body."""

@@ -32,7 +32,7 @@ from tests.workflow.folder import dry_run, run
         ("genetic: {generations: 0}", "0 is less than the minimum of 1"),
         ("gap: {effects: [backlash, wind]}", "unknown effect 'wind'"),
         ('gap: {own_effects: ["nowhere:Law"]}', "cannot import 'nowhere'"),
-        ('gap: {own_effects: ["os.system(1):x"]}', "'os.system(1):x' is no module:object"),
+        ('gap: {own_effects: ["os.system(1):x"]}', "gap.own_effects.0: 'os.system(1):x' does not match"),
         ("gap: {known: {transmission_error: {teeth: 7}}}", "no known 'teeth'"),
         ("gap: {tolerence: 0.2}", "tolerence"),
         ("withheld: {effects: [wind]}", "withheld.effects has 'wind'"),
