@@ -35,6 +35,7 @@ _KINDS = {
 _LEAST_MM = 0.003
 _PROBABILITY_EDGES = np.array([0.0, 0.5, 0.7, 0.8, 0.9, 0.97, 1.0])
 _STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
+_NO_GAP = 0.01
 # shares closed below this are drawn on the edge
 _LOWEST_CLOSED = -0.2
 _EVEN = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2)), "zorder": 1}
@@ -157,7 +158,8 @@ def _reliability(axes, scores, checks):
 
 def _strength(axes, scores, checks):
     """How often the diagnosis is right, and whether the effect could be seen at all, against the gap over the noise."""
-    scores = scores[scores["strength"] > 0.0]
+    # what a calibration takes up leaves no gap
+    scores = scores[scores["strength"] > _NO_GAP]
     for name in checks:
         _shares(axes, scores[scores["check"] == name], ("strength", "right"), _STRENGTH_EDGES, *_CHECKS[name])
     if checks[0] != "field":
