@@ -123,6 +123,11 @@ def _assembly(model, file, base, platform, home):
     for what, values in ({name: getattr(model, name) for name in _RECKONED} | {"the home pose": home}).items():
         if len(odd := values[~(np.abs(values) <= _MOST)]):
             raise ConfigError(f"{file}: {what} has the value {odd[0]:g}; allowed: numbers of at most {_MOST:g}")
+    for what in ("jnt_axis", "body_quat"):
+        # MuJoCo brings them to unit length, but for those whose length overflows
+        values = getattr(model, what)
+        if len(odd := values[np.abs(np.linalg.norm(values, axis=1) - 1.0) > 1e-6]):
+            raise ConfigError(f"{file}: {what} has the value {odd[0]}; allowed: a direction with a length")
     return Assembly(model, file, base, platform, home)
 
 
