@@ -32,7 +32,7 @@ _LIBRARIES = {
     "matplotlib": _DRAWING,
     "cv2": {"rrru/plant/camera.py", "rrru/studies/delta/vision.py"},
     "sklearn": {"rrru/studies/withheld/rivals.py"},
-    "jinja2": {"rrru/report/page.py"},
+    "jinja2": {"rrru/report/page.py", "rrru/studies/printers/command.py"},
     "snakemake": set(),
 }
 _FILES = sorted((_ROOT / "rrru").rglob("*.py"))
