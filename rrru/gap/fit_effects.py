@@ -16,6 +16,8 @@ from rrru.gap.state import State
 _STEPS, _STILL = 12, 1e-6
 # shares of the largest singular value below which a combination of numbers is not seen
 _SEEN = 1e-9
+# rows that are taken at a time where their number is large
+_AT_ONCE = 4000
 # ASSUME an effect's numbers are rarely more than this many times their typical size
 _TIMES_TYPICAL = 20.0
 
@@ -68,5 +70,8 @@ def fit_effects(case, names, times_typical=_TIMES_TYPICAL, calibrated=None):
 
 def identified(columns):
     """How many combinations of numbers the columns (m, k) that these make tell, each number by how far it moves."""
-    unit = columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-    return int(np.linalg.matrix_rank(np.linalg.qr(unit, mode="r"), rtol=_SEEN))
+    size = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), 1e-300)
+    triangle = np.zeros((0, len(size)))
+    for some in np.array_split(columns, len(columns) // _AT_ONCE + 1):
+        triangle = np.linalg.qr(np.concatenate([triangle, some / size]), mode="r")
+    return int(np.linalg.matrix_rank(triangle, rtol=_SEEN))

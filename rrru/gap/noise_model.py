@@ -37,6 +37,8 @@ _NO_OFFSET, _INTERVAL = 0.05, (0.025, 0.975)
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
 # of more columns than this the squares tell the rank, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
+# rows of these that are taken at a time
+_AT_ONCE = 4000
 # of longer runs the spectrum is that of endless ones
 _LONG = 400
 
@@ -155,10 +157,12 @@ def _left(data, columns):
     if columns.shape[1] > _MANY:
         value, turned = np.linalg.eigh(unit.T @ unit)
         kept = value > _RANK_OF_SQUARES * value[-1]
-        basis = unit @ (turned[:, kept] / np.sqrt(value[kept]))
-    else:
-        basis, triangle, _ = qr(unit, mode="economic", pivoting=True)
-        basis = basis[:, np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])]
+        root = turned[:, kept] / np.sqrt(value[kept])
+        parts = np.array_split(unit, len(unit) // _AT_ONCE + 1)
+        taken = np.concatenate([((part @ root) ** 2).sum(axis=1) for part in parts])
+        return data - unit @ (root @ (root.T @ (unit.T @ data))), np.clip(1.0 - taken, 0.0, 1.0)
+    basis, triangle, _ = qr(unit, mode="economic", pivoting=True)
+    basis = basis[:, np.abs(np.diag(triangle)) > _RANK * np.abs(triangle[0, 0])]
     return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
 
 

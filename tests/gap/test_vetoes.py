@@ -91,9 +91,9 @@ def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypa
     """Gains made up: one effect spoils what is predicted wherever it is named."""
     asked, gains = [], diagnose._gains
 
-    def spoilt(fitted, names):
-        asked.append(frozenset(names))
-        return gains(fitted, names) | {name: -50.0 for name in names if name == "servo_lag"}
+    def spoilt(fitted):
+        asked.append(fitted.hypothesis.effects)
+        return gains(fitted) | {name: -50.0 for name in asked[-1] if name == "servo_lag"}
 
     assert set(diagnose._decide(attribution, PRIOR)[0].effects) == {"servo_lag", "leg_asymmetry"}
     monkeypatch.setattr(diagnose, "_gains", spoilt)
@@ -105,7 +105,7 @@ def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypa
 
 
 def test_where_every_effect_is_vetoed_nothing_of_the_library_is_named(attribution, monkeypatch):
-    monkeypatch.setattr(diagnose, "_gains", lambda _, names: dict.fromkeys(names, -50.0))
+    monkeypatch.setattr(diagnose, "_gains", lambda fitted: dict.fromkeys(fitted.hypothesis.effects, -50.0))
     verdict, fitted, _ = diagnose._decide(attribution, PRIOR)
     assert verdict.effects == () and verdict.label in ("none", "unexplained")
     assert fitted.hypothesis.effects == frozenset()
