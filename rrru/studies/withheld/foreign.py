@@ -33,7 +33,7 @@ _DRAWS, _STEPS = 5, 2
 # MuJoCo's robots rest where they are read unless their servos are slow: inertia is to be a hundredth of weight at most
 _MOTION = {"speed_mm_s": 40.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
-# some 170 points: there and back, faster, loaded
+# some 190 points: there and back, faster, loaded
 _PASSES = (
     _PLAIN,
     _PLAIN | {"reverse": True},
