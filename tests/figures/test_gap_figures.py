@@ -11,7 +11,7 @@ from rrru.errors import ConfigError
 from rrru.figures import style
 from rrru.store import tables
 from rrru.studies.withheld import figures as withheld
-from rrru.studies.withheld.chunks import PLANTS
+from rrru.studies.withheld.verdicts import PLANTS
 from tests.figures import synthetic_gap as made_up
 from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES

@@ -9,9 +9,8 @@ from rrru.errors import ConfigError
 from rrru.studies import config as parts
 from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.noise import NOISES
+from rrru.studies.withheld.verdicts import PLANTS
 
-# checks on robots of files, each the name of the plant that drives them
-PLANTS = ("mujoco", "own")
 # so many kinds of causes further on every next file begins
 _APART = 4
 

@@ -7,9 +7,8 @@ from matplotlib.ticker import LogLocator, MultipleLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import style
-from rrru.studies.withheld.chunks import PLANTS
 from rrru.studies.withheld.summary import wilson
-from rrru.studies.withheld.verdicts import PREFIX, UNEXPLAINED, is_outside
+from rrru.studies.withheld.verdicts import PLANTS, PREFIX, UNEXPLAINED, is_outside
 
 NONE, OUTSIDE, SEVERAL = "none", "outside the library", "two or more"
 _CHECKS = {
@@ -44,7 +43,7 @@ _ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "lin
 
 
 @style.printed
-def plants(tables, options):
+def withheld_plants(tables, options):
     """Robots of files with the same causes, driven by MuJoCo and by our own plant, whose laws are those of the
     diagnosis; as the figure of the other checks: confusion tables, then the share of right verdicts against the stated
     probability and against the gap over the noise, and the share of the gap closed as predicted and in truth. Last the

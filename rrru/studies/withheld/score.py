@@ -9,13 +9,12 @@ import pandas as pd
 from rrru.effects.library import HOLDS
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
-from rrru.studies.withheld.chunks import PLANTS
 from rrru.studies.withheld.members import fresh_runs, robot_of
 from rrru.studies.withheld.numbers import held
 from rrru.studies.withheld.oracle import Limits, limits, of_displacement, with_truth
 from rrru.studies.withheld.parts import is_enough, parts
 from rrru.studies.withheld.states import state_of
-from rrru.studies.withheld.verdicts import is_right, scores
+from rrru.studies.withheld.verdicts import PLANTS, is_right, scores
 
 _LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
 # checks of one or two causes under the stated noise, whose limits are computed

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.withheld.chunks import PLANTS, noise_of
-from rrru.studies.withheld.verdicts import CAUSES, in_order, is_outside
+from rrru.studies.withheld.chunks import noise_of
+from rrru.studies.withheld.verdicts import CAUSES, PLANTS, in_order, is_outside
 
 # of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
 _BINS, _PER_BIN = 10, 20

@@ -2,6 +2,8 @@
 
 PREFIX = "outside"
 UNEXPLAINED, NONE = "unexplained", "none"
+# checks on robots of files, each the name of the plant that drives them
+PLANTS = ("mujoco", "own")
 # kinds of parts of a gap that a verdict names and that may not be there
 CAUSES = ("effect", "background")
 # what acts in every robot of the check on a background, asked for or not

@@ -14,12 +14,13 @@ from rrru.gap.make_case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
 from rrru.studies.withheld import draw
-from rrru.studies.withheld.chunks import PLANTS, Member, check, chunks, noise_of
+from rrru.studies.withheld.chunks import Member, check, chunks, noise_of
 from rrru.studies.withheld.members import robot_of
 from rrru.studies.withheld.noise import NOISES
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import noise_free, true_gap_mm
+from rrru.studies.withheld.verdicts import PLANTS
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
 _MECHANISM = CONDITIONS.mechanism

@@ -15,7 +15,7 @@ WITHHELD_FIGURES = {
 }
 PLANTS_FIGURES = {
     "withheld_plants": (
-        "rrru.studies.withheld.figures:plants",
+        "rrru.studies.withheld.figures:withheld_plants",
         ["withheld_scores", "withheld_confusion", "withheld_parts"],
     )
 }
