@@ -89,6 +89,10 @@ class AsRead(Robot):
         """The robot's own."""
         return self.robot.own_load(*args)
 
+    def own_member_forces(self, *args):
+        """The robot's own."""
+        return self.robot.own_member_forces(*args)
+
     def own_moments(self, *args):
         """The robot's own."""
         return self.robot.own_moments(*args)

@@ -96,8 +96,9 @@ def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s
     at = robot.map_at(actuators, position_mm)
     force = _platform_load(robot, masses, acceleration_mm_s2, payload_kg)
     member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
-    held = _held(robot, at, force) if robot.parts.held_from else member
     motion = np.asarray(actuators, dtype=float), *drive_motion
+    member = member + robot.own_member_forces(motion, at.poses)
+    held = _held(robot, at, force) if robot.parts.held_from else member
     own = robot.own_load(masses, motion, at.poses)
     driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force) + own
     numbers = {joint.name: joint.drive for joint in robot.legs.joints}

@@ -18,7 +18,7 @@ from rrru.robots.drive_step import bar_lengths, drives_at, end_of
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
-from rrru.robots.lumps import base_moment, driven_loads, moments
+from rrru.robots.lumps import base_moment, driven_loads, member_forces, moments
 from rrru.robots.robot import Robot
 
 SETS = ("frame", "zero", "full")
@@ -204,6 +204,10 @@ class GeneralRobot(Robot):
     def own_load(self, _masses, motion, poses):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
         return driven_loads(self, motion, poses, gravity(self)) if self.lumps else 0.0
+
+    def own_member_forces(self, motion, poses):
+        """Forces (n, members) in N of the robot's point masses on its members, compression positive."""
+        return member_forces(self, motion, poses, gravity(self)) if self.lumps else 0.0
 
     def own_moments(self, motion, poses, at_mm):
         """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""

@@ -1,4 +1,4 @@
-"""Loads on the drives by a robot's own masses, given as point masses in its moving frames (virtual work).
+"""Loads on drives, members and base by a robot's own masses, given as point masses in its moving frames (virtual work).
 
 Every point mass m at x loads the driven value k with
 
@@ -33,10 +33,13 @@ class Lump:
     at_mm: np.ndarray
 
 
-def places(robot, actuators, poses):
-    """Places (n, lumps, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them."""
-    none = Twists(robot.legs)
-    ways = dict(zip(robot.legs.legs, robot.model.walks(actuators, poses.passive, none), strict=True))
+def places(robot, actuators, poses, twists=None):
+    """Places (n, lumps, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them.
+
+    twists: finite ones (1, sites, 6) at the sites.
+    """
+    there = Twists(robot.legs, twists)
+    ways = dict(zip(robot.legs.legs, robot.model.walks(actuators, poses.passive, there), strict=True))
     holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
     result = []
     for lump in robot.lumps:
@@ -45,7 +48,7 @@ def places(robot, actuators, poses):
             continue
         leg = holders[lump.joint]
         frame = _along_bar if lump.joint in leg.bar_sites else _behind_joint
-        result.append(frame(robot.legs, leg, ways[leg], lump, (poses, actuators, none)))
+        result.append(frame(robot.legs, leg, ways[leg], lump, (poses, actuators, there)))
     return np.stack(result, axis=1)
 
 
@@ -64,8 +67,7 @@ def _behind_joint(legs, leg, way, lump, state):
 
 def _along_bar(legs, leg, way, lump, state):
     """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
-    poses, actuators, none = state
-    near, far, _ = bar_ends(legs, leg, way, poses, actuators, none)
+    near, far, _ = bar_ends(legs, leg, way, *state)
     line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
     return (near if lump.joint == leg.bar_sites[0] else far) + lump.at_mm[0] * line
 
@@ -82,6 +84,23 @@ def driven_loads(robot, motion, poses, gravity_mm_s2):
         step = _STEP[kind] * np.eye(actuators.shape[1])[k]
         slope = (_moved(robot, actuators + step, poses) - _moved(robot, actuators - step, poses)) / (2.0 * _STEP[kind])
         result[:, k] = np.einsum("nla,nla->n", slope, force)
+    return result
+
+
+def member_forces(robot, motion, poses, gravity_mm_s2):
+    """Forces (n, members) in N that a robot's masses put on its members, compression positive.
+
+    A member that grows by s does the work f s on them: f = -sum m (g - x'') . dx/ds. motion, poses as in
+    `driven_loads`.
+    """
+    robot, motion = _uncoupled(robot, motion)
+    force, numbers = _forces(robot, motion, poses, gravity_mm_s2), robot.legs.site_numbers
+    result = np.zeros((len(motion[0]), len(robot.parts.members)))
+    for k, site in ((k, site) for k, group in enumerate(robot.parts.members) for site in group):
+        growth = np.zeros((1, len(numbers), 6))
+        growth[0, numbers[site], 0] = _STEP["P"]
+        longer, shorter = (_moved(robot, motion[0], poses, sign * growth) for sign in (1.0, -1.0))
+        result[:, k] -= np.einsum("nla,nla->n", (longer - shorter) / (2.0 * _STEP["P"]), force)
     return result
 
 
@@ -124,9 +143,9 @@ def _uncoupled(robot, motion):
     return robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled), motion
 
 
-def _moved(robot, actuators, poses):
-    """Places (n, lumps, 3) at other driven values (n, D), from Poses nearby."""
-    return places(robot, actuators, robot.model.solve(actuators, poses))
+def _moved(robot, actuators, poses, twists=None):
+    """Places (n, lumps, 3) at other driven values (n, D) or under twists (1, sites, 6), from Poses nearby."""
+    return places(robot, actuators, robot.model.solve(actuators, poses, twists), twists)
 
 
 def _forces(robot, motion, poses, gravity_mm_s2):

@@ -203,6 +203,10 @@ class Robot(ABC):
         """
         return 0.0
 
+    def own_member_forces(self, motion, poses):
+        """Forces (n, members) in N on the members, compression positive, by all but the platform's load; none here."""
+        return 0.0
+
     def own_moments(self, motion, poses, at_mm):
         """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
         return 0.0

@@ -5,6 +5,8 @@ import pytest
 
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, gravity, loads
+from rrru.robots.hexapod import hexapod
+from rrru.robots.lumps import Lump
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 
@@ -164,3 +166,26 @@ def test_legs_without_an_inner_joint_are_held_as_they_are(robot):
     position, nothing = robot.forward(actuators), np.zeros((1, 3))
     load = loads(robot, _MASSES, position, actuators, (nothing, nothing), nothing, np.full(1, _PAYLOAD_KG))
     np.testing.assert_array_equal(load.held_n, load.member_n)
+
+
+def test_bars_carry_a_hexapods_own_masses():
+    """The bars' forces balance the weight of masses of platform and bars' ends, six equations of statics."""
+    angles = np.radians([[-10, 10, 110, 130, 230, 250], [-50, 50, 70, 170, 190, 290]])
+    base, plate = (
+        radius * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+        for radius, turns in zip((300.0, 150.0), angles, strict=True)
+    )
+    own = [Lump("platform", 4.0, np.array([20.0, -10.0, 30.0]))]
+    own += [Lump(f"leg {k} end", 0.5, np.zeros(3)) for k in range(1, 7)]
+    robot = hexapod(base, plate, 400.0, lumps=tuple(own))
+    points = np.add([0.0, 0.0, 400.0], np.random.default_rng(8).uniform(-60.0, 60.0, (20, 3)))
+    legs, still = robot.inverse(points), np.zeros((20, 6))
+    load = loads(robot, Masses(0.0, 0.0, 0.0), points, legs, (still, still), np.zeros((20, 3)), np.zeros(20))
+    for point, found in zip(points, load.member_n, strict=True):
+        ends = plate + point
+        lines = (ends - base) / np.linalg.norm(ends - base, axis=1, keepdims=True)
+        wrenches = np.concatenate([lines, np.cross(ends, lines)], axis=1).T
+        weight = np.array([0.0, 0.0, -GRAVITY_MM_S2 / 1000.0])
+        places, masses = np.vstack([own[0].at_mm + point, ends]), np.array([4.0, *[0.5] * 6])
+        total = np.concatenate([masses.sum() * weight, (masses[:, None] * np.cross(places, weight)).sum(axis=0)])
+        np.testing.assert_allclose(found, np.linalg.solve(wrenches, -total), rtol=1e-5, atol=1e-4)
