@@ -44,7 +44,8 @@ def _papers(rule):
 
 def test_a_rule_is_handed_what_its_jobs_read_and_nothing_else(records):
     for rule, jobs in records.items():
-        handed = {tuple(path) for row in jobs for path in row["handed"]}
+        # the digest of a robot's file is handed for its change alone
+        handed = {tuple(path) for row in jobs for path in row["handed"] if path[-1] != "digest"}
         read = {tuple(path) for row in jobs for path in row["read"]}
         assert handed <= read, (rule, sorted(handed - read, key=str))
 

@@ -42,6 +42,7 @@ def _readers_folder(folder, results):
     table.to_csv(folder / "my_file.csv", index=False)
     names = {"trajectory": "path", "measured_x_mm": "X", "measured_y_mm": "Y", "measured_z_mm": "Z"}
     table.rename(columns=names).to_csv(folder / "tracker.csv", index=False)
+    (folder / "mine.yaml").write_text("campaigns:\n  mine: {robot: rrru3, ingest: my_file.csv}\n")
     (folder / "printer.cfg").write_text(config(ENTRIES["printer_22"]))
 
 

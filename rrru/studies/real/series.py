@@ -179,3 +179,13 @@ def part(config: Mapping[str, Any], name: str) -> dict[str, Any]:
     section, real = config["real"]["sets"][name], {key: config["real"][key] for key in ("folder", "gap")}
     robots = {section["robot"]: config["robots"][section["robot"]]} if "robot" in section else {}
     return {"set": name, "real": real | {"sets": {name: section}}, "robots": robots}
+
+
+def of_each(place, series):
+    """Input function of a rule: a file of every series of a set, from its path with both names as wildcards.
+
+    series: names of the series by that of their set.
+    """
+    return lambda wildcards: [
+        place.replace("{set}", wildcards.set).replace("{series}", name) for name in series[wildcards.set]
+    ]

@@ -68,16 +68,17 @@ def _of_file(plant, files, k):
     return Member(plant, files[which], turn + _APART * which)
 
 
-def described(config, members):
-    """What is known of the robots of files among Members, by the file's entry: robot and masses."""
-    names = dict.fromkeys(member.file for member in members if member.file)
-    return {name: {"robot": _robot(config, name), "masses": parts.masses(config, {"robot": name})} for name in names}
+def described(config, members, as_measured=False):
+    """What is known of the robots of files among Members, by the file's entry: robot and masses.
 
-
-def _robot(config, name):
-    """A robot of a file with all its numbers, and the reflectors whose places are known."""
-    targets = MODELS[Path(config["robots"][name]["mjcf"]).stem].targets
-    return parts.robot(config, {"robot": name, "errors": "full"} | ({"targets": targets} if targets else {}))
+    as_measured: also the reflectors whose places are known.
+    """
+    result = {}
+    for name in dict.fromkeys(member.file for member in members if member.file):
+        targets = MODELS[Path(config["robots"][name]["mjcf"]).stem].targets if as_measured else {}
+        section = {"robot": name, "errors": "full"} | ({"targets": targets} if targets else {})
+        result[name] = {"robot": parts.robot(config, section), "masses": parts.masses(config, {"robot": name})}
+    return result
 
 
 def rivalled(section):

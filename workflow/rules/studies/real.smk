@@ -20,13 +20,6 @@ REAL_SERIES = {name: [one.name for one in real_series.found(config["real"], name
 ONE_SERIES = under("real/{set}/{series}")
 
 
-def of_series(place):
-    """Input function: a file of every series of a set, from its path with their names as wildcards."""
-    return lambda wildcards: [
-        place.replace("{set}", wildcards.set).replace("{series}", series) for series in REAL_SERIES[wildcards.set]
-    ]
-
-
 rule study_series:
     input:
         files=lambda wildcards: real_series.files(config, wildcards.set, wildcards.series),
@@ -52,9 +45,9 @@ rule study_series:
 
 rule study_arm:
     input:
-        **{one.name: of_series(ONE_SERIES(one.name)) for one in SERIES_SCHEMAS},
-        measurements=of_series(rules.study_series.output.measurements),
-        model=of_series(rules.study_series.output.model),
+        **{one.name: real_series.of_each(ONE_SERIES(one.name), REAL_SERIES) for one in SERIES_SCHEMAS},
+        measurements=real_series.of_each(rules.study_series.output.measurements, REAL_SERIES),
+        model=real_series.of_each(rules.study_series.output.model, REAL_SERIES),
     output:
         **named(REAL_TABLES, under("real/{set}")),
         **drawn(ARM_FIGURES, "figures/real/{set}"),

@@ -32,9 +32,11 @@ WITHHELD_ROBOT = {
 }
 
 
-def withheld_known(wildcards):
-    """What is known of the robots of a chunk, those of files by the file's entry."""
-    return {"files": described(config, WITHHELD[wildcards.chunk]), **WITHHELD_ROBOT}
+# and of those of a chunk, with the robots of files by the file's entry; and with what a diagnosis is told of these
+WITHHELD_KNOWN, WITHHELD_TOLD = (
+    {chunk: {"files": described(config, members, as_measured), **WITHHELD_ROBOT} for chunk, members in WITHHELD.items()}
+    for as_measured in (False, True)
+)
 
 
 wildcard_constraints:
@@ -49,7 +51,7 @@ rule withheld_robots:
     params:
         settings=lambda wildcards: {
             "members": WITHHELD[wildcards.chunk],
-            **withheld_known(wildcards),
+            **WITHHELD_KNOWN[wildcards.chunk],
             **reads("motion"),
         },
         code=code("withheld_robots"),
@@ -68,7 +70,7 @@ rule withheld_diagnose:
     params:
         settings=lambda wildcards: {
             "robots": {one.name: (one.check, one.taken_out, one.file) for one in WITHHELD[wildcards.chunk]},
-            **withheld_known(wildcards),
+            **WITHHELD_TOLD[wildcards.chunk],
             **reads("gap"),
         },
         own_effects=own_effects_digests(),
@@ -88,7 +90,7 @@ rule withheld_score:
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
-        settings=lambda wildcards: {**withheld_known(wildcards), **reads("motion", "gap")},
+        settings=lambda wildcards: {**WITHHELD_KNOWN[wildcards.chunk], **reads("motion", "gap")},
         own_effects=own_effects_digests(),
         code=code("withheld_score"),
     script:
