@@ -17,6 +17,7 @@ DeWitt, Fundamentals of Heat and Mass Transfer, table A.1.
 import numpy as np
 
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.thermal_growth import lengths
 from rrru.parameters import Parameter, ParameterSet
 
 # a law of campaigns that state a temperature: it is tested where a configuration names it
@@ -35,4 +36,4 @@ def for_robot(_robot):
 def _grown(motion, values):
     """Shifts of every link's end by its growth under a coefficient (1,); none where no temperature is known."""
     share = values[0] * np.nan_to_num(motion.temperature_c - _DRAWN_C)
-    return Contribution(np.multiply.outer(share, motion.robot.legs.growth))
+    return Contribution(np.multiply.outer(share, lengths(motion.robot.legs)))
