@@ -36,13 +36,11 @@ def with_spectra(case, linear, terms):
     linear: about the state that the terms of a hypothesis, fitted beside them, have led to.
     """
     library, held = dict(case.library), {term.effect for term in terms}
-    # a rough function of the drives' values holds all waves
-    broad = any(library[term.effect].coordinates.broad for term in terms)
-    waiting = [e for e in library.values() if e.coordinates.spectra or (_waits(e) and not broad)]
-    open_ones = [e for e in waiting if e.name not in held]
+    open_ones = [e for e in library.values() if (e.coordinates.spectra or _waits(e)) and e.name not in held]
     if not open_ones:
         return case, []
-    known = [term for term in terms if term.effect not in UNKNOWN]
+    # a rough function of the drives' values holds all waves: beside it none would be left to stand for it
+    known = [term for term in terms if term.effect not in UNKNOWN and not library[term.effect].coordinates.broad]
     beside = np.concatenate([linear.base, *signatures(library, linear, known)], axis=-1)
     basis, _ = np.linalg.qr(beside.reshape(linear.data.size, -1))
     data = _without(linear.data.reshape(-1, 1), basis)[:, 0]

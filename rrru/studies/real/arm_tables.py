@@ -9,7 +9,9 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.effects.drive_error_function import ORDERS
+from rrru.gap.evidence import STRENGTHS, averaged
 from rrru.gap.spectra import amplitudes
+from rrru.gap.terms import Term
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.refusals import named
 from rrru.studies.real.sheets import PLACE
@@ -82,21 +84,30 @@ def _found(studied: Studied) -> Mapping[str, Any]:
 
 
 def _waves(studied: Studied) -> str:
-    """Whether a few sharp waves of single drives do, or a rough function of their angles, in words; "" if neither."""
-    if studied.diagnosis is None:
+    """Whether a few sharp waves of single drives do, or a rough function of their angles, in words; "" if neither.
+
+    Each beside the other causes of the verdict, at the strengths that these have.
+    """
+    library, named = studied.case.library, (_FUNCTION[0], _WAVES[0])
+    if studied.diagnosis is None or not all(name in library for name in named):
         return ""
     attribution = studied.diagnosis.attribution
-    best = {}
-    for hypothesis in attribution.posterior.hypotheses:
-        if len(hypothesis.terms) == 1 and hypothesis.terms[0].effect in (_FUNCTION[0], _WAVES[0]):
-            best[hypothesis.terms[0].effect] = float(hypothesis.evidence.max())
-    if len(best) < 2 or best[_FUNCTION[0]] < attribution.evidence.none.max():
+    hypothesis, level = attribution.hypothesis, attribution.level
+    rest = tuple(term for term in hypothesis.terms if term.effect not in named)
+    fixed = [[strength] for strength in hypothesis.strengths_of(rest, level)]
+
+    def told(*names: str) -> float:
+        """Log evidence of laws beside the rest."""
+        terms, grids = (*rest, *map(Term, names)), (*fixed, *(STRENGTHS for _ in names))
+        return float(averaged(attribution.evidence.over_strengths(terms, grids, [level])[0], len(names))[0])
+
+    neither, function, waves = told() if rest else attribution.evidence.none[level], *map(told, named)
+    if function < neither:
         return ""
-    count = len(studied.case.library[_WAVES[0]].coordinates) // 2
-    ahead = best[_FUNCTION[0]] - best[_WAVES[0]]
+    count = len(library[_WAVES[0]].coordinates) // 2
     said = f"a rough function of every drive's angle and {count} sharp waves of single drives both explain errors"
-    likelier = "the function" if ahead > 0.0 else "the waves"
-    return f"{said}; {likelier} by {abs(ahead):.0f} nats of evidence"
+    likelier = "the function" if function > waves else "the waves"
+    return f"{said}; {likelier} by {abs(function - waves):.0f} nats of evidence"
 
 
 def _by_model(studied: Studied, reference: Mapping[str, Any]) -> dict[str, float]:
