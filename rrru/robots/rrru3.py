@@ -136,7 +136,7 @@ class Rrru3(ThreeLegs):
         """Positions (n, 3) in mm of drive angles (n, 3); NaN where Newton does not converge (eq. 8).
 
         `guess_mm` (n, 3) selects the assembly; without it Newton starts from the lower intersection of three spheres,
-        see `first_guess`.
+        see `guess`.
         """
         return self.forward_batch(theta_rad, None if deviations is None else np.asarray(deviations)[None], guess_mm)[0]
 
@@ -145,7 +145,7 @@ class Rrru3(ThreeLegs):
         legs = self.numbers(deviations) if deviations is not None else self.numbers()[None]
         return self.forward_of_legs(theta_rad, legs, guess_mm)
 
-    def first_guess(self, theta_rad):
+    def guess(self, theta_rad, _targets=None):
         """Positions (n, 3) in mm of the nominal robot if joints 2 and 3 stood at one point: where three spheres meet.
 
         With rho = L2 + L3 on every leg each closure is a sphere about the elbow, shifted by r - R. Where the spheres do
@@ -169,7 +169,7 @@ class Rrru3(ThreeLegs):
     def forward_of_legs(self, theta_rad, legs, guess_mm=None):
         """Positions (m, n, 3) in mm of drive angles (n, 3) under m sets of leg numbers (m, 3, 5)."""
         theta = points(theta_rad)
-        start = self.first_guess(theta) if guess_mm is None else points(guess_mm)
+        start = self.guess(theta) if guess_mm is None else points(guess_mm)
         solved = kernels.forward(
             np.ascontiguousarray(legs, dtype=float),
             self.azimuth_cos_sin,

@@ -65,7 +65,8 @@ def check_file(file, config, robot=None, commands=None):
     section, result, refused = _fitting(section, mechanism)
     lines = [_content(section, cells), *_used(section, cells, mechanism)]
     if result is None:
-        lines += [f"cost: {one}" for one in without_times(config, mechanism) if "time_s" in lines[-1]]
+        if lines[-1].startswith("missing:") and "time_s" in lines[-1]:
+            lines += [f"cost: {one}" for one in without_times(config, mechanism)]
     else:
         lines += [f"note: {note}" for note in result.notes]
         lines += [f"cost: {one}" for one in costs(result.measurements, config, section)]

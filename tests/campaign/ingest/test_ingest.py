@@ -56,6 +56,14 @@ def test_a_campaign_is_taken_as_it_stands(name, rows, runs):
         assert np.array_equal(table[column].to_numpy(), file[column].to_numpy()), column
 
 
+def test_drive_angles_alone_do_over_a_whole_campaign(tmp_path):
+    """Angles with six decimals tell the commanded positions to a micrometre, far from home as well."""
+    table = pd.read_csv(DATA / "field_09.csv")
+    path = written(table.drop(columns=COMMAND), tmp_path / "angles.csv")
+    found = ingest(IngestSpec(str(path)), ROBOT)
+    np.testing.assert_allclose(found.measurements[COMMAND], table[COMMAND], atol=2e-3)
+
+
 def test_parquet_gives_the_same_table_as_csv(field, expected, tmp_path):
     same(ingest(IngestSpec(written(field, tmp_path / "f.parquet")), ROBOT).measurements, expected)
 
