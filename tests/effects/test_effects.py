@@ -38,9 +38,8 @@ _NAMES = (
     "thermal_growth",
     "servo_lag",
     "joint_axis_error",
-    "friction_windup",
 )
-_LAWS = EFFECTS | {name: find(name, ROBOT) for name in ("encoder_ovality", "tracker_scale")}
+_LAWS = EFFECTS | {name: find(name, ROBOT) for name in ("encoder_ovality", "friction_windup", "tracker_scale")}
 _PERIODS = {"encoder_eccentricity": 1.0, "encoder_ovality": 2.0, "transmission_error": 50.0}
 _MOTION = VirtualRobot().motion(plan_of(FORWARD, REVERSE, LOADED, trajectories=(LINE, SPIRAL)), Rrru3().inverse)
 _SITES = len(ROBOT.legs.sites)
