@@ -19,21 +19,11 @@ Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 201
 assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
 """
 
-from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Effect
-from rrru.parameters import ParameterSet
+from rrru.effects.harmonic import of_encoders
 
 _SOURCE = "eccentricity over grating radius; up to some arc minutes, assumed"
 
 
 def for_robot(robot):
     """The law for robots whose drives all turn, None for others."""
-    if "mm" in robot.parts.units:
-        return None
-    parameters = ParameterSet(harmonic_parameters(len(robot.parts.drives), _SOURCE))
-    return Effect("encoder_eccentricity", parameters, harmonic_coordinates(parameters, 3e-4), _once_per_turn)
-
-
-def _once_per_turn(motion, values):
-    """Changes of the drive angles under amplitudes (K,) and phases (K,) in rad."""
-    return motion.at_drives(harmonic(motion.drive, 1.0, values))
+    return of_encoders(robot, "encoder_eccentricity", 1.0, _SOURCE, 3e-4)

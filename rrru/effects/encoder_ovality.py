@@ -21,9 +21,7 @@ encoders, CIRP Annals 59, 2010, on harmonics of encoders. The size is assumed: a
 30 um makes 2e-4 rad, a disc that is tilted by 30 mrad as much.
 """
 
-from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
-from rrru.effects.protocol import Effect
-from rrru.parameters import ParameterSet
+from rrru.effects.harmonic import of_encoders
 
 # over half a turn or less it is taken for an eccentric encoder and that for it: tested where a configuration names it
 BY_NAME_ONLY = True
@@ -33,12 +31,4 @@ _SOURCE = "difference of diameters over four of them, or tilt squared over four,
 
 def for_robot(robot):
     """The law for robots whose drives all turn, None for others."""
-    if "mm" in robot.parts.units:
-        return None
-    parameters = ParameterSet(harmonic_parameters(len(robot.parts.drives), _SOURCE))
-    return Effect("encoder_ovality", parameters, harmonic_coordinates(parameters, 2e-4), _twice_per_turn)
-
-
-def _twice_per_turn(motion, values):
-    """Changes of the drive angles under amplitudes (K,) and phases (K,) in rad."""
-    return motion.at_drives(harmonic(motion.drive, 2.0, values))
+    return of_encoders(robot, "encoder_ovality", 2.0, _SOURCE, 2e-4)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from rrru.effects.protocol import Coordinates, leg_parameters
+from rrru.effects.protocol import Coordinates, Effect, leg_parameters
+from rrru.parameters import ParameterSet
 
 
 def harmonic_parameters(count, source, unit="rad", highest=0.01):
@@ -38,6 +39,18 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
         shapes=tuple(shapes),
         most=np.full(len(names), parameters[names[0]].high),
     )
+
+
+def of_encoders(robot, name, periods, source, typical_rad):
+    """The Effect of errors with so many periods a turn of every drive, None for robots whose drives do not all turn."""
+    if "mm" in robot.parts.units:
+        return None
+    parameters = ParameterSet(harmonic_parameters(len(robot.parts.drives), source))
+
+    def law(motion, values):
+        return motion.at_drives(harmonic(motion.drive, periods, values))
+
+    return Effect(name, parameters, harmonic_coordinates(parameters, typical_rad), law)
 
 
 def waves(angle, orders):
