@@ -162,21 +162,16 @@ def leg_parameters(source: str, *kinds: tuple[str, str, float, float], count: in
 def drive_parameters(drives: Iterable[Any], source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
     """Parameters of each Drive; kinds: (name, {drive's unit: (unit, low, high)}), source by drive's unit."""
     return tuple(
-        Parameter(f"{name}{number}", *_bounds(by_unit[drive.unit]), source[drive.unit], number)
+        Parameter(f"{name}{number}", unit, 0.0, low, high, source[drive.unit], number)
         for number, drive in enumerate(drives, 1)
         for name, by_unit in kinds
+        for unit, low, high in (by_unit[drive.unit],)
     )
 
 
 def of_drives(drives: Iterable[Any], by_unit: Mapping[str, float]) -> np.ndarray:
     """One number (K,) of each Drive by the drive's unit."""
     return np.array([by_unit[drive.unit] for drive in drives])
-
-
-def _bounds(allowed: tuple[str, float, float]) -> tuple[str, float, float, float]:
-    """Unit, nominal value and bounds of a parameter that is nominally zero."""
-    unit, low, high = allowed
-    return unit, 0.0, low, high
 
 
 def plain_coordinates(
