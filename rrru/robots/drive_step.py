@@ -5,8 +5,9 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
-# an inverse has at most so many steps, and the longest is so large a share of the drives' ranges
-_STEPS, _REACHED_MM, _LONGEST_STEP = 60, 1e-9, 0.3
+# an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
+# less: longer ones end in other assemblies, or nowhere
+_STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
 
 
 def drives_at(robot, place, start, twists, nearest=True):
@@ -18,7 +19,8 @@ def drives_at(robot, place, start, twists, nearest=True):
     """
     (position, wanted), (actuators, near) = place, start
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
-    low, high = np.asarray(robot.drive_range, dtype=float).T
+    turn = [2.0 * np.pi if unit == "rad" else np.inf for unit in robot.parts.units]
+    widths = np.minimum(np.ptp(robot.drive_range, axis=1), turn)
     for _ in range(_STEPS):
         rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
         if not len(rows):
@@ -32,7 +34,7 @@ def drives_at(robot, place, start, twists, nearest=True):
             # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
             lack = (at.drive_response @ step[:, :, None])[:, :, 0]
         left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
-        longest = (np.abs(step) / (high - low)).max(axis=1, keepdims=True)
+        longest = (np.abs(step) / widths).max(axis=1, keepdims=True)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
         actuators[rows] += step
         poses = robot.model.solve(actuators, poses, twists)

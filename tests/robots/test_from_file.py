@@ -18,6 +18,7 @@ from tests.robots.mjcf import (
     FOUR_BAR,
     GEOM,
     HEXAPOD,
+    ROOT,
     RRRU3_HOME,
     TREE,
     delta_mjcf,
@@ -246,6 +247,13 @@ def test_a_3_rrru_of_a_file_stands_where_the_closed_form_does(tmp_path):
     np.testing.assert_allclose(robot.legs.home_drives, theta[0], atol=1e-12)
     np.testing.assert_allclose(robot.legs.home_mm, known.forward(theta, guess_mm=[RRRU3_HOME])[0], atol=1e-9)
     assert 1e-5 < np.abs(robot.legs.home_mm - RRRU3_HOME).max() < 1e-2
+
+
+def test_an_inverse_far_from_home_stays_in_the_assembly_of_home():
+    """The closed form's, over a box of a metre by 0.4 m."""
+    closed_form, robot = Rrru3(), from_mjcf(ROOT / "data/models/rrru3.xml", "plate")
+    position = np.random.default_rng(5).uniform((-500.0, -500.0, 500.0), (500.0, 500.0, 900.0), (100, 3))
+    np.testing.assert_allclose(robot.inverse(position), closed_form.inverse(position), rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("rods", ["ball", "plate", "loose"])
