@@ -13,6 +13,7 @@ _FLOORS = {
     "seeds": 1,
     "parameters": 2,
     "objects": 2,
+    "kept": 1,
     "robots": 3,
     "effects": 4,
     "campaign": 4,

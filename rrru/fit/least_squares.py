@@ -1,12 +1,9 @@
 """Least squares on the residuals of a calibration, with everything that says how far to trust the answer."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
@@ -28,20 +25,6 @@ _DERIVATIVES = {
     "cauchy": lambda z: (1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2),
 }
 LOSSES = tuple(_DERIVATIVES)
-
-
-def last_kept(method: Callable) -> Callable:
-    """A method of deviations (p,) that keeps its last answer: a search wants slopes where it just wanted residuals."""
-    name = f"_last_{method.__name__}"
-
-    @wraps(method)
-    def kept(self: Any, deviations: npt.ArrayLike) -> Any:
-        asked = np.asarray(deviations, dtype=float).tobytes()
-        if self.__dict__.get(name, (None,))[0] != asked:
-            self.__dict__[name] = asked, method(self, deviations)
-        return self.__dict__[name][1]
-
-    return kept
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.fit.least_squares import last_kept
+from rrru.kept import last_kept
 from rrru.robots.readings import Readings, lacking
 from rrru.robots.robot import Robot
 from rrru.robots.walk import Poses

@@ -3,11 +3,21 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rrru.kept import last_kept
 from rrru.robots.walk import Poses, Twists, bar_ends, walk
 
 # an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
 # less: longer ones end in other assemblies, or nowhere
 _STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
+# a pose followed from home counts if it is so much closer than home to where it should be
+_CLOSE = 0.1
+
+
+def drives_from_home(robot, place, twists, nearest):
+    """`drives_at` near the home pose."""
+    count, legs = len(place[0]), robot.legs
+    start = np.tile(legs.home_drives, (count, 1)).astype(float), np.tile(legs.home_mm, (count, 1))
+    return drives_at(robot, place, start, twists, nearest)
 
 
 def drives_at(robot, place, start, twists, nearest=True):
@@ -19,8 +29,7 @@ def drives_at(robot, place, start, twists, nearest=True):
     """
     (position, wanted), (actuators, near) = place, start
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
-    turn = [2.0 * np.pi if unit == "rad" else np.inf for unit in robot.parts.units]
-    widths = np.minimum(np.ptp(robot.drive_range, axis=1), turn)
+    widths = _widths(robot)
     for _ in range(_STEPS):
         rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
         if not len(rows):
@@ -39,6 +48,42 @@ def drives_at(robot, place, start, twists, nearest=True):
         actuators[rows] += step
         poses = robot.model.solve(actuators, poses, twists)
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+
+
+@last_kept
+def followed(robot, actuators):
+    """Poses (n) at actuator values (n, K), followed in short steps of the drives from the home pose; NaN where lost."""
+    legs, n = robot.legs, len(actuators)
+    turn, passive = np.broadcast_to(legs.home_turn, (n, 3, 3)), np.tile(legs.home_passive, (n, 1))
+    poses = Poses(np.tile(legs.home_mm, (n, 1)), turn, passive, None, None)
+    for share in np.linspace(0.0, 1.0, _steps_from_home(robot, actuators) + 1)[1:]:
+        poses = robot.model.solve(legs.home_drives + share * (actuators - legs.home_drives), poses)
+    return poses
+
+
+def near_or_followed(robot, actuators, near):
+    """Poses `near` (n) which to look at actuator values (n, K), or those followed from home if these are close by.
+
+    Passive joints far from home are not known from the platform's place alone.
+    """
+    if not len(robot.legs.passive_joints) or _steps_from_home(robot, actuators) < 2:
+        return near
+    poses = followed(robot, actuators)
+    off = np.linalg.norm(poses.position_mm - near.position_mm, axis=1)
+    close = off < _CLOSE * np.linalg.norm(robot.legs.home_mm - near.position_mm, axis=1)
+    return poses.where(close, near)
+
+
+def _steps_from_home(robot, actuators):
+    """Number of the steps in which drives may go from home to actuator values (n, K), at least one."""
+    away = np.abs(actuators - robot.legs.home_drives) / _widths(robot)
+    return max(1, int(np.ceil(np.nanmax(away, initial=0.0) / _LONGEST_STEP)))
+
+
+def _widths(robot):
+    """How far (K,) each drive goes, a turning one no further than a turn."""
+    turn = [2.0 * np.pi if unit == "rad" else np.inf for unit in robot.parts.units]
+    return np.minimum(np.ptp(robot.drive_range, axis=1), turn)
 
 
 def drive_step(at, ranks, lack_mm, turning_rad):

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import geometric_numbers
-from rrru.robots.drive_step import bar_lengths, drives_at, end_of
+from rrru.robots.drive_step import bar_lengths, drives_from_home, end_of, followed, near_or_followed
 from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
@@ -24,8 +24,7 @@ from rrru.robots.robot import Robot
 SETS = ("frame", "zero", "full")
 # poses over which a number has to be told from the others, their tilt, and the share of it that must be left
 _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
-# singular values below this share are none
-_SEEN = 1e-6
+_SEEN = 1e-6  # share of the largest singular value that others need to count
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,9 +196,7 @@ class GeneralRobot(Robot):
         if self._bars_only:
             place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
             return bar_lengths(self.legs, self.drive_range, place, twists)
-        count = len(position)
-        start = np.tile(self.legs.home_drives, (count, 1)).astype(float), np.tile(self.legs.home_mm, (count, 1))
-        return drives_at(self, (position, wanted), start, twists, deviations is not None)
+        return drives_from_home(self, (position, wanted), twists, deviations is not None)
 
     def own_load(self, _masses, motion, poses):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
@@ -240,8 +237,14 @@ class GeneralRobot(Robot):
         return int(position_rank), int(both - position_rank)
 
     def near(self, position_mm, actuators):
-        """Poses near which the legs close: of a leg whose joints are all driven its own end, else upright ones."""
+        """Poses near which the legs close: of a leg that is all driven its own end, else upright or followed."""
+        actuators = np.asarray(actuators, dtype=float)
         for leg in self.legs.legs:
             if not leg.bar and not any(joint.passive for joint in leg.joints):
-                return end_of(self.legs, leg, np.asarray(actuators, dtype=float))
-        return super().near(position_mm, actuators)
+                return end_of(self.legs, leg, actuators)
+        return near_or_followed(self, actuators, super().near(position_mm, actuators))
+
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) of the tool at actuator values (n, K), followed from home; the home position's if lost."""
+        position = followed(self, actuators).point(self.tool_mm)
+        return np.where(np.isfinite(position), position, self.legs.home_mm)

@@ -42,6 +42,12 @@ class Poses:
         """The poses of some rows."""
         return type(self)(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
 
+    def where(self, rows, other):
+        """Place, orientation and passive values of the poses where rows (n,) are true, else of others."""
+        names = ("position_mm", "turn", "passive")
+        own = ((getattr(self, name), getattr(other, name)) for name in names)
+        return type(self)(*(np.where(rows.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in own), None, None)
+
 
 @dataclass(frozen=True)
 class Walk:

@@ -8,9 +8,10 @@ from scipy.optimize import minimize
 
 from rrru.errors import FitError
 from rrru.fit.identifiability import analyse
-from rrru.fit.least_squares import last_kept, least_squares
+from rrru.fit.least_squares import least_squares
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.fit.residuals import Residuals
+from rrru.kept import last_kept
 from rrru.robots.rrru3 import Rrru3
 
 _TRUTH = np.array([0.0012, -0.0008, 0.0021, 0.31, 0.24, -0.18, 1.4])

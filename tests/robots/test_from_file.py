@@ -249,11 +249,15 @@ def test_a_3_rrru_of_a_file_stands_where_the_closed_form_does(tmp_path):
     assert 1e-5 < np.abs(robot.legs.home_mm - RRRU3_HOME).max() < 1e-2
 
 
-def test_an_inverse_far_from_home_stays_in_the_assembly_of_home():
-    """The closed form's, over a box of a metre by 0.4 m."""
+def test_far_from_home_a_robot_stays_in_the_assembly_of_home():
+    """The closed form's, over a box of a metre by 0.4 m: from positions, from drive values near them or alone."""
     closed_form, robot = Rrru3(), from_mjcf(ROOT / "data/models/rrru3.xml", "plate")
     position = np.random.default_rng(5).uniform((-500.0, -500.0, 500.0), (500.0, 500.0, 900.0), (100, 3))
-    np.testing.assert_allclose(robot.inverse(position), closed_form.inverse(position), rtol=0.0, atol=1e-9)
+    actuators = closed_form.inverse(position)
+    near = {"rtol": 0.0, "atol": 1e-8}
+    np.testing.assert_allclose(robot.inverse(position), actuators, **near)
+    np.testing.assert_allclose(robot.forward(actuators, guess_mm=position + 1.0), position, **near)
+    np.testing.assert_allclose(robot.forward(actuators), position, **near)
 
 
 @pytest.mark.parametrize("rods", ["ball", "plate", "loose"])

@@ -18,8 +18,9 @@ from scipy import linalg
 from scipy.spatial.transform import Rotation
 
 from rrru.fit.identifiability import analyse
-from rrru.fit.least_squares import last_kept, make_fit
+from rrru.fit.least_squares import make_fit
 from rrru.fit.residuals import Residuals
+from rrru.kept import last_kept
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.fit.least_squares import last_kept
+from rrru.kept import last_kept
 
 
 @dataclass(frozen=True)
