@@ -30,6 +30,8 @@ from rrru.studies.withheld.verdicts import NONE, UNEXPLAINED
 WEAKEST, STRONGEST = 0.7, 10.0
 _OFFSET_SD = {"rad": 0.002, "mm": 0.5}
 _DRAWS, _STEPS = 5, 2
+# a gap over the noise that is rounding
+_NOTHING = 1e-6
 # MuJoCo's robots rest where they are read unless their servos are slow: inertia is to be a hundredth of weight at most
 _MOTION = {"speed_mm_s": 40.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
@@ -197,6 +199,8 @@ def sized(robot, fault, strength, conditions):
         if measurements is None:
             raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} loses a pose")
         gap = _rms(residual(measurements, conditions) - still) / conditions.noise_rms_mm
+        if not gap > _NOTHING:
+            raise UnreachableError(f"{robot.name}: a calibration takes up {fault.kind} of {fault.sizes}")
         fault = fault.scaled(strength / gap)
     return fault
 

@@ -61,7 +61,7 @@ def _delta():
 
 
 def _hexapod():
-    """Its legs stand on universal joints, so that no axis can tilt."""
+    """Its legs stand on universal joints, so that no axis can tilt, and always push: clearance never changes side."""
     feet = ((252.3, -62.9), (252.3, 62.9), (-71.7, 249.9), (-180.6, 187.0), (-180.6, -187.0), (-71.7, -249.9))
     ends = ((115.1, -111.1), (115.1, 111.1), (38.7, 155.2), (-153.8, 44.1), (-153.8, -44.1), (38.7, -155.2))
     growth = {f"cylinder{k}": (*foot, 50.0) for k, foot in enumerate(feet, 1)}
@@ -71,7 +71,6 @@ def _hexapod():
     return Model(
         45.0,
         links=tuple((f"piston{k}.z",) for k in legs),
-        clearances=tuple(f"ball{k}" for k in legs),
         lengths=tuple(((f"cylinder{k}.x", f"leg_{k}_ball_x"),) for k in legs),
         growth_mm=growth,
         targets=_TARGETS,

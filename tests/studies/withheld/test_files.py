@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.errors import UnreachableError
 from rrru.studies.withheld import foreign
 from rrru.studies.withheld.chunks import Member
-from rrru.studies.withheld.faults import KINDS, draw_fault, kinds_of
+from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.withheld.members import robot_of
 from rrru.studies.withheld.parts import parts
 from rrru.studies.withheld.plants import mujoco
@@ -119,6 +120,13 @@ def test_a_campaign_has_what_tells_causes_apart_and_fresh_runs_go_elsewhere():
     elsewhere = foreign.fresh(robot, known).plan(known).targets()
     assert np.abs(elsewhere - robot.plan(known).targets()).max() > 5.0
     assert np.linalg.norm(foreign.residual(measurements, known), axis=1).mean() < 2.0 * known.noise_rms_mm
+
+
+def test_a_fault_that_the_calibration_takes_up_cannot_be_sized():
+    """Legs that always push never change sides of their clearance: it is a length."""
+    fault = Fault("clearance", (0.1,) * 6, {})
+    with pytest.raises(UnreachableError, match="a calibration takes up clearance"):
+        foreign.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
 
 
 def _budget():
