@@ -107,10 +107,10 @@ def _effect(name, tables, budget):
 
 
 def _missed(facts):
-    """How far off the calibrated robot is."""
+    """How far off the calibrated robot is at points that its calibration has not seen."""
     gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
     if facts["effects"] or facts["unexplained"]:
-        return f"After calibration the robot still misses by {gap} mm."
+        return f"After calibration the robot still misses by {gap} mm at points left out of it (noise taken out)."
     sure = probability(facts["probability"])
     return (
         f"After calibration nothing systematic is left that these data could show (probability {sure}): "

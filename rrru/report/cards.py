@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from rrru.gap.answer import percent, probability, readable, rounded
+from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
 _EFFECTS = ("blue", "sky", "green", "pink", "yellow")
@@ -55,11 +56,11 @@ class Card:
     steps: list
 
 
-def card(facts, source="", before_mm=None):
-    """The Card of facts; source: where the campaign came from; before_mm: rms error before any calibration."""
+def card(facts, source="", found=None):
+    """The Card of facts; source: where the campaign came from; found: the Worth of its calibration, or None."""
     lead, *others, following = facts["sentences"]
-    if before_mm is not None:
-        others = [f"Before any calibration the error was {rounded(before_mm)} mm.", *others]
+    if found is not None:
+        others = [*worth.sentences(found, facts["gap_rms_mm"]), *others]
     return Card(
         facts["campaign"],
         source,
@@ -105,8 +106,8 @@ def _parts(budget):
 
 
 def _steps(facts):
-    """The gap before and after the effects are added, beside the noise."""
-    rows = [("after calibration", facts["gap_rms_mm"], "before")]
+    """The gap at left-out points before and after the effects are added, beside the noise."""
+    rows = [("calibrated", facts["gap_rms_mm"], "before")]
     if facts["effects"]:
         rows.append(("with the effects too", facts["gap_after_rms_mm"], "after"))
     rows.append(("measuring noise", facts["noise_rms_mm"], "noise"))

@@ -10,6 +10,7 @@ import jinja2
 
 from rrru.report import cards, cells, contents, svg
 from rrru.report.trust import trust
+from rrru.report.worth import worth
 from rrru.store import facts, tables
 from rrru.store.whole import write_text
 from rrru.studies import glossary
@@ -88,13 +89,14 @@ class Results:
         frame = self.frame("campaigns")
         return {} if frame is None else dict(zip(frame["campaign"], frame["source"], strict=True))
 
-    def before_mm(self):
-        """Root mean square error before any calibration by campaign."""
-        frame = self.frame("error_summary")
-        if frame is None:
-            return {}
-        rows = frame.query("mode == 'before' and trajectory == 'all'")
-        return dict(zip(rows["campaign"], rows["rms_mm"], strict=True))
+    def worth(self, name, noise_rms_mm):
+        """The Worth of a campaign's calibration, None where the tables of it were not made."""
+        errors, told = self.frame("errors"), self.frame("campaigns")
+        place = self.folder / "campaigns" / name / "gap_points.parquet"
+        if errors is None or told is None or not place.is_file():
+            return None
+        registered = told.set_index("campaign")["registration_rms_mm"].notna().get(name, False)
+        return worth(errors[errors["campaign"] == name], tables.read(place), noise_rms_mm, bool(registered))
 
     def picture(self, name, title):
         """A figure of a path below figures/ without its ending, None where it was not drawn."""
@@ -129,12 +131,13 @@ def write(folder, path, reproduced, campaign=None):
     """Write the page of a folder of results, or of one of its campaigns, as a whole or not at all; see Results."""
     results = Results(Path(folder), reproduced, campaign)
     names = results.campaigns()
-    sources, before = results.sources(), results.before_mm()
+    sources = results.sources()
     answers = []
     for name in names:
         answer = facts.read(results.folder / "campaigns" / name / "verdict.json")
         drawn = results.picture(f"{name}/gap_map", f"{name}: where it misses")
-        answers.append((cards.card(answer, sources.get(name, "virtual robot of a study"), before.get(name)), drawn))
+        found = results.worth(name, answer["noise_rms_mm"])
+        answers.append((cards.card(answer, sources.get(name, "virtual robot of a study"), found), drawn))
     chosen = [s for s in contents.SECTIONS if campaign is None or s.key in contents.OF_A_CAMPAIGN]
     parts = [part for part in (_part(results, section) for section in chosen) if part]
     values = {"answers": answers, "parts": parts, "campaign": campaign, "glyphs": results.glyphs}

@@ -15,6 +15,7 @@ from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_shee
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration
+from rrru.campaign.ingest.sent import sent_to
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, Sheet
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
@@ -83,37 +84,12 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         problems.refuse()
     if not set(COMMAND) <= set(frame):
         problems.refuse()
-        frame = frame.assign(**vector_columns("command", _sent_to(frame, mechanism, problems)))
+        frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
     frame, more = number_runs(frame)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
-
-
-def _sent_to(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> np.ndarray:
-    """Positions (n, 3) of the nominal robot at the file's actuator values, NaN where one is noted."""
-    drives = mechanism.parts.columns
-    values = frame[[*drives]].to_numpy(dtype=float)
-    _check_hands(frame, mechanism, problems)
-    position = mechanism.forward(values, guess_mm=mechanism.guess(values, frame.get("target")))
-    for i in np.flatnonzero(np.isnan(position).any(axis=1)):
-        value = ", ".join(f"{one:.6g}" for one in frame[[*drives]].iloc[i])
-        allowed = "values at which the nominal robot closes near its home pose, or commanded positions beside them"
-        problems.add("no pose", row=frame.index[i], column=", ".join(drives), value=value, allowed=allowed)
-    return position
-
-
-def _check_hands(frame: pd.DataFrame, mechanism: Robot, problems: Problems) -> None:
-    """Refuse rows that do not say which of several hands they are of."""
-    carried = [target for hand in mechanism.legs.hands for target in hand]
-    if carried and "target" not in frame:
-        problems.add("missing column", column="target", value="no such column", allowed=", ".join(carried))
-    if carried and "target" in frame:
-        for i in np.flatnonzero(~frame["target"].isin(carried)):
-            value, allowed = frame["target"].iloc[i], f"what a hand carries: {', '.join(carried)}"
-            problems.add("reflectors", row=frame.index[i], column="target", value=value, allowed=allowed)
-    problems.refuse()
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

@@ -61,8 +61,8 @@ def _joined(spec, measured, commanded, problems):
 
 def _column(spec, cells, ours):
     """The file's name of a column of ours, None where it has none."""
-    name = spec.columns.get(ours, ours)
-    return name if name in cells.cells else cells.means.get(ours)
+    declared = (name for name in (spec.columns.get(ours), ours) if name in cells.cells)
+    return next(declared, cells.means.get(ours))
 
 
 def _keys(spec, measured, commanded):

@@ -35,7 +35,8 @@ def check_commands(sheet):
         allowed = f"a position that every leg reaches; leg {legs} does not"
         sheet.note("reach", COMMAND, position_text(command[i]), allowed, known.index[i])
     flipped = _upside_down(command[reached], drive[reached], sheet)
-    if set(sheet.drives) <= set(known) and not flipped:
+    # positions that were computed from the drive values tell nothing of these
+    if set(COMMAND) <= set(sheet.found) and set(sheet.drives) <= set(known) and not flipped:
         _check_drives(known[reached], drive[reached], sheet)
     return True
 
@@ -67,6 +68,9 @@ def check_sizes(sheet, offset_mm=0.0):
     if command == 0.0 or 0.5 <= measured / command <= 2.0:
         return True
     ratio, seems = measured / command, ""
+    if not set(COMMAND) <= set(sheet.found):
+        # what was computed is in mm
+        seems = next((f"; unit: {u} fits" for u, f in MM.items() if 0.9 < ratio * f / MM[sheet.spec.unit] < 1.1), "")
     for (one, size), (other, its_size) in product(MM.items(), repeat=2):
         if one != other and not seems and abs(ratio - size / its_size) < 0.1 * ratio:
             seems = f", not the measured ones in {other} and the commanded ones in {one}, as it seems"
@@ -167,7 +171,7 @@ def _check_drives(known, drive, sheet):
     bad = off > limits
     unit, limit = units[0], limits[0]
     allowed = f"within {limit:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
-    if bad.any(axis=1).mean() > _MANY and (advice := _drive_advice(given, drive, command, sheet)):
+    if bad.any() and bad.any(axis=1).mean() > _MANY and (advice := _drive_advice(given, drive, command, sheet)):
         read = f" when read in {sheet.spec.angle_unit}" if unit == "rad" else ""
         value = f"{sheet.drive_name} up to {np.nanmax(np.abs(given)):.6g} {unit}{read}"
         value += f", up to {np.nanmax(off):.6g} {unit} from those that the commanded positions need"

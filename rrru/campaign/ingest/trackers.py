@@ -13,22 +13,22 @@ from dataclasses import replace
 from rrru.campaign.ingest.cells import decode, fields, separator_of, table
 from rrru.campaign.ingest.sheet import MEASURED, NOISE
 
-_LENGTHS = {
+LENGTHS = {
     **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres"), 1.0),
     **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), 1000.0),
     **dict.fromkeys(("in", "inch", "inches"), 25.4),
     **dict.fromkeys(("um", "µm", "μm", "micron", "microns"), 1e-3),
 }
-_DEGREES = ("c", "°c", "degc", "deg c")
+_CELSIUS = ("c", "°c", "degc", "deg c")
 _BRACKET = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _COVERAGE = 2.0
 # our names by those of the lists' columns, in small letters and without units
 _MEANS = {
     **{axis: ours for axis, ours in zip("xyz", MEASURED, strict=True)},
     **{f"u(95) {axis}": ours for axis, ours in zip("xyz", NOISE, strict=True)},
-    **dict.fromkeys(("name", "point", "point name", "point id", "target name"), "name"),
+    **dict.fromkeys(("name", "point", "point name", "point id", "target name", "punkt", "punktname"), "name"),
     **dict.fromkeys(("group", "group name", "point group"), "trajectory"),
-    **dict.fromkeys(("time", "timestamp", "time stamp", "date time", "date/time", "local time"), "time_s"),
+    **dict.fromkeys(("time", "timestamp", "time stamp", "date time", "date/time", "local time", "zeit"), "time_s"),
     "temperature": "temperature_c",
 }
 _UNUSED = ("collection", "collection name", "pressure", "humidity")
@@ -38,14 +38,14 @@ _UNIT_TEXT = re.compile(
     r"(?:units?\s*[:=]\s*|[\[(]\s*)([a-zµμ]+)|\b(millimet(?:er|re)s?|met(?:er|re)s|inch(?:es)?)\b", re.IGNORECASE
 )
 _LIST = "a point list: // comments, and rows of a point's name, X, Y and Z"
-_HEADER_LINES = 50
+HEADER_LINES = 50
 
 
 def leica_cells(data, problems, separator=None, decimal="."):
     """Cells of a Leica-style CSV's bytes: from the line that names X, Y and Z on; see the module."""
     text = decode(data, problems, "comma-separated text with columns X [mm], Y [mm], Z [mm]", ("utf-16", "cp1252"))
     rows = fields(text, separator or ",", problems)
-    at = next((i for i, row in enumerate(rows[:_HEADER_LINES]) if _names_axes(row)), None)
+    at = next((i for i, row in enumerate(rows[:HEADER_LINES]) if names_axes(row)), None)
     if at is None:
         first = ", ".join(rows[0][:8])
         found = separator_of(text.strip().splitlines()[:1], decimal)
@@ -86,8 +86,8 @@ def _split(line, separator):
 def _named(comments, rows, separator, problems):
     """Names of a list's columns, its rows and a note: by its header, or by how many fields it has."""
     headers = [_split(line, one) for line in comments for one in (separator, ",", " ")]
-    headers = [names for names in headers if _names_axes(names)]
-    if _names_axes(rows[0]):
+    headers = [names for names in headers if names_axes(names)]
+    if names_axes(rows[0]):
         names, rows, notes = rows[0], rows[1:], ()
     elif headers:
         names, notes = headers[-1], ()
@@ -101,7 +101,7 @@ def _named(comments, rows, separator, problems):
     return names, [row + [""] * (len(names) - len(row)) if row else row for row in rows], notes
 
 
-def _names_axes(names):
+def names_axes(names):
     """Whether x, y and z are among names of columns."""
     return {"x", "y", "z"} <= {_key(name) for name in names}
 
@@ -109,7 +109,7 @@ def _names_axes(names):
 def _stated_unit(comments, problems):
     """Factor to mm by axis, of the unit that a list's comments state; empty where they state none."""
     words = [word.lower() for line in comments for pair in _UNIT_TEXT.findall(line) for word in pair if word]
-    found = {_LENGTHS[word]: word for word in words if word in _LENGTHS}
+    found = {LENGTHS[word]: word for word in words if word in LENGTHS}
     if len(found) > 1:
         problems.refuse_now(value=f"comments with {' and '.join(found.values())}", allowed="one unit of length")
     return {axis: factor for factor in found for axis in "xyz"}
@@ -119,11 +119,11 @@ def _known(cells, problems, units, notes):
     """The cells with what their names mean; units: factor to mm by axis where no name says one."""
     means, factors, spreads = {}, {}, {}
     for name in cells.names:
-        key, unit = _key(name), _unit(name)
+        key, unit = _key(name), unit_of(name)
         ours = _MEANS.get(key)
         if ours is None or ours in means:
             continue
-        if ours == "temperature_c" and unit not in (*_DEGREES, None):
+        if ours == "temperature_c" and unit not in (*_CELSIUS, None):
             continue
         means[ours] = name
         if ours in NOISE:
@@ -138,18 +138,18 @@ def _known(cells, problems, units, notes):
 
 def _length(name, unit, problems):
     """Factor to mm of a unit; an unknown one is noted."""
-    if unit not in _LENGTHS:
+    if unit not in LENGTHS:
         problems.add("unit", column=name, value=f"the unit {unit}", allowed="mm, m, in or µm")
-    return _LENGTHS.get(unit, 1.0)
+    return LENGTHS.get(unit, 1.0)
 
 
 def _key(name):
     """A column's name in small letters, without unit and double spaces."""
-    bare = _BRACKET.match(name) if _unit(name) else None
+    bare = _BRACKET.match(name) if unit_of(name) else None
     return " ".join((bare[1] if bare else name).lower().split())
 
 
-def _unit(name):
+def unit_of(name):
     """The unit in brackets at the end of a column's name, in small letters, or None."""
     found = _BRACKET.match(name)
     return found[2].lower() if found and not re.fullmatch(r"\d*", found[2]) else None

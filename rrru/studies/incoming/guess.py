@@ -7,11 +7,17 @@ from difflib import SequenceMatcher
 from rrru.campaign.ingest.cells import decode, separator_of
 from rrru.campaign.ingest.clock import tells_clock
 from rrru.campaign.ingest.columns import known_columns
+from rrru.campaign.ingest.sheet import COMMAND, MEASURED
+from rrru.campaign.ingest.spec import MM
+from rrru.campaign.ingest.trackers import HEADER_LINES, LENGTHS, names_axes, unit_of
 
 _LEAST_ALIKE = 0.8
 # words that other programs use, by what our names have; {} is the axis
 _WORDS = {
-    "measured_{}_mm": ("measured {}", "measurement {}", "meas {}", "actual {}", "{} measured", "{} actual", "{}"),
+    "measured_{}_mm": (
+        *("measured {}", "measurement {}", "meas {}", "actual {}", "{} measured", "{} actual", "{}"),
+        *("ist {}", "{} ist", "gemessen {}", "messwert {}"),
+    ),
     "command_{}_mm": (
         "command {}",
         "cmd {}",
@@ -21,25 +27,31 @@ _WORDS = {
         "nom {}",
         "set {}",
         "{} nominal",
+        "soll {}",
+        "{} soll",
     ),
     "noise_{}_mm": ("noise {}", "measurement std {}", "std {}", "sigma {}", "{} std"),
 }
 _NAMED = {
-    "trajectory": ("trajectory", "path", "line", "program", "group"),
-    "run": ("run", "pass", "cycle"),
-    "point": ("point", "index", "number"),
-    "name": ("name", "point name", "point id"),
-    "time_s": ("time", "timestamp", "time stamp", "date time", "t"),
-    "speed_mm_s": ("speed", "velocity", "feed"),
-    "payload_kg": ("payload", "load"),
-    "temperature_c": ("temperature", "temp", "measurement temperature"),
-    "target": ("target", "reflector", "marker"),
+    "trajectory": ("trajectory", "path", "line", "program", "group", "bahn", "gruppe", "programm"),
+    "run": ("run", "pass", "cycle", "lauf", "durchgang"),
+    "point": ("point", "index", "number", "punkt", "nummer", "nr"),
+    "name": ("name", "point", "point name", "point id", "punkt", "punktname"),
+    "time_s": ("time", "timestamp", "time stamp", "date time", "t", "zeit", "zeitstempel", "uhrzeit"),
+    "speed_mm_s": ("speed", "velocity", "feed", "geschwindigkeit", "vorschub"),
+    "payload_kg": ("payload", "load", "last", "nutzlast"),
+    "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
+    "target": ("target", "reflector", "marker", "reflektor"),
 }
+# what counts, beside what may be a text
+_COUNTS = ("run", "point")
 _CLOCKS = (
     *("%d.%m.%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S", "%d/%m/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%Y/%m/%d %H:%M:%S"),
     *("%d.%m.%Y %H:%M", "%H:%M:%S"),
 )
-_AXIS = re.compile(r"x\b.*\[|\[.*mm|u\(95\)", re.IGNORECASE)
+_LENGTH_UNITS = {factor: unit for unit, factor in MM.items()}
+_ANGLE_UNITS = {"rad": "rad", "deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg"}
+_LAST = re.compile(r"[_ ]([a-z°]+)$")
 
 
 def guess_format(path, problems):
@@ -50,16 +62,50 @@ def guess_format(path, problems):
     lines = [line for line in text.splitlines() if line.strip()]
     if any(line.startswith("//") for line in lines):
         return "spatial_analyzer"
-    head = lines[0]
-    separator = separator_of([head]) if ";" in head or "\t" in head else separator_of([head.replace("|", "")])
+    at = next((i for i, line in enumerate(lines[:HEADER_LINES]) if names_axes(_fields(line))), 0)
+    head = lines[at]
+    separator = _separator(head)
     stated = {"separator": separator} if separator != "," else {}
-    if stated and re.search(r"\d,\d", "".join(lines[1:20])):
+    if stated and re.search(r"\d,\d", "".join(lines[at + 1 : at + 20])):
         stated["decimal"] = ","
-    leica = sum(bool(_AXIS.search(name)) for name in head.split(separator)) >= 3
+    # lines above, or units beside, the names of the axes
+    names = _fields(head)
+    leica = names_axes(names) and (at > 0 or any(unit_of(name) for name in names))
     kind = "leica" if leica else "csv"
     if kind == "csv" and not stated:
         return None if path.suffix.lower() == ".csv" else kind
     return {"kind": kind, **stated} if stated else kind
+
+
+def guess_units(cells, found, mechanism):
+    """{unit: .., angle_unit: ..} as the names of a file's columns say, {our name: the file's}; without what none says.
+
+    Columns whose unit the format knows, and units of which there are several, are left out.
+    """
+    told = {"unit": set(), "angle_unit": set()}
+    for ours, theirs in found.items():
+        if ours in (*COMMAND, *MEASURED) and theirs not in cells.factors:
+            told["unit"].add(_LENGTH_UNITS.get(LENGTHS.get(_stated(theirs))))
+        elif ours in mechanism.parts.columns:
+            told["angle_unit"].add(_ANGLE_UNITS.get(_stated(theirs)))
+    known = {key: units - {None} for key, units in told.items()}
+    return {key: units.pop() for key, units in known.items() if len(units) == 1}
+
+
+def _stated(name):
+    """The unit that a column's name ends in, in brackets or after a space or underscore, None where it has none."""
+    last = _LAST.search(name.lower())
+    return unit_of(name) or (last[1] if last else None)
+
+
+def _separator(line):
+    """What stands between the fields of a line; bars stand in names, too."""
+    return separator_of([line]) if ";" in line or "\t" in line else separator_of([line.replace("|", "")])
+
+
+def _fields(line):
+    """Fields of a line."""
+    return [field.strip().strip('"') for field in line.split(_separator(line))]
 
 
 def guess_columns(cells, mechanism, given):
@@ -69,11 +115,17 @@ def guess_columns(cells, mechanism, given):
     free = [name for name in cells.names if name and name not in taken]
     open_names = [name for name in ours if name not in cells.names and name not in cells.means]
     pairs = [(_alike(one, theirs), one, theirs) for one in open_names for theirs in free]
+    pairs = [pair for pair in pairs if pair[1] not in _COUNTS or _is_count(cells.cells[pair[2]][0])]
     found = {}
     for likeness, one, theirs in sorted(pairs, key=lambda pair: -pair[0]):
         if likeness >= _LEAST_ALIKE and one not in found and theirs not in found.values():
             found[one] = theirs
     return found
+
+
+def _is_count(cell):
+    """Whether a cell holds a whole number."""
+    return isinstance(cell, (int, float)) or str(cell).strip().isdigit()
 
 
 def guess_clock(cells, theirs):

@@ -44,6 +44,12 @@ def test_names_join_whatever_the_order_of_the_commands(seed, tmp_path):
     assert result.notes[0].endswith("joined by the points' names; 2 of its points were not measured")
 
 
+def test_a_name_of_the_measured_file_s_own_joins_as_well(tmp_path):
+    measured = NAMED[["name", "trajectory", *MEASURED]].rename(columns={"name": "Punkt"})
+    result = joined(tmp_path, measured, NAMED[["name", *COMMAND]].iloc[::-1], columns={"name": "Punkt"})
+    assert np.array_equal(result.measurements[COMMAND], FIELD[COMMAND])
+
+
 def test_a_point_measured_twice_has_its_command_twice(tmp_path):
     again = NAMED.assign(run=NAMED["run"] + 2, time_s=NAMED["time_s"] + 900.0)
     again[MEASURED] += 0.01

@@ -1,5 +1,7 @@
 """Tracker files of robots of one's own: a six-axis arm whose orientation changes along the path."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -10,6 +12,7 @@ from rrru.errors import IngestError
 from rrru.robots.catalogue import make_mechanism
 from tests.places import ROOT
 
+MEASURED = [f"measured_{axis}_mm" for axis in "xyz"]
 ARM = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
 
 
@@ -46,6 +49,20 @@ def test_degrees_of_an_arm_are_converted_when_declared_and_refused_when_not(tmp_
     assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-9
     with pytest.raises(IngestError, match=r"bring the nominal robot .* mm from there"):
         _ingested(degrees, tmp_path)
+
+
+@pytest.mark.parametrize(("factor", "stated", "right"), [(180.0 / np.pi, "rad", "deg"), (1.0, "deg", "rad")])
+@pytest.mark.parametrize("length", [1.0, 1e-3])
+def test_angles_alone_in_another_unit_than_stated_are_one_problem(factor, stated, right, length, tmp_path):
+    """Whatever the unit of the measured positions is; what was computed from the angles is not held against them."""
+    frame = _file().drop(columns=[f"command_{axis}_mm" for axis in "xyz"])
+    frame[ARM.parts.columns] *= factor
+    frame[MEASURED] *= length
+    with pytest.raises(IngestError, match=f"angle_unit: {right} does") as refused:
+        _ingested(frame, tmp_path, angle_unit=stated)
+    assert len(refused.value.problems) == 1
+    with pytest.raises(IngestError, match="unit: m fits") if length < 1.0 else nullcontext():
+        _ingested(frame, tmp_path, angle_unit=right)
 
 
 def test_a_column_of_another_robot_is_refused_with_the_names_of_this_one(tmp_path):

@@ -71,6 +71,78 @@ def test_units_frame_and_names_are_proposed(unit, factor, turned, tmp_path):
     assert np.allclose(table[LENGTHS[:3]], FIELD[LENGTHS[:3]], rtol=0.0, atol=1e-6)
 
 
+def test_units_in_the_header_stay_whatever_else_is_wrong(tmp_path):
+    """A cell that is no number hides from ingest whether the rest fits; the frame stays the robot's."""
+    frame = FIELD.copy()
+    frame[LENGTHS] /= 25.4
+    degrees = [f"theta{k}_rad" for k in (1, 2, 3)]
+    frame[degrees] = np.degrees(frame[degrees])
+    names = {name: f"{name.split('_')[0]} {name.split('_')[1]} [in]" for name in LENGTHS}
+    names |= {name: f"{name.removesuffix('_rad')} [deg]" for name in degrees}
+    frame = frame.astype({"measured_x_mm": object}).rename(columns=names)
+    frame.loc[5, "measured x [in]"] = "n/a"
+    found = checked(frame, tmp_path)
+    chosen = proposed(found)
+    assert (chosen["unit"], chosen["angle_unit"], "frame" in chosen) == ("inch", "deg", False)
+    assert chosen["columns"] == names and [problem["row"] for problem in found.refused] == [6]
+
+
+def test_a_tracker_s_list_below_lines_of_other_things_is_known(tmp_path):
+    own = section("leica")
+    path = tmp_path / "above.csv"
+    path.write_bytes(b"Job: 4711\nOperator: me, second shift\n\n" + Path(own["ingest"]).read_bytes())
+    found = check_file(path, CONFIG, "rrru3", own["commands"])
+    assert found.refused == () and proposed(found)["format"] == "leica"
+    table = ingest(IngestSpec.from_config(proposed(found)), ROBOT).measurements
+    pd.testing.assert_frame_equal(table, ingest(IngestSpec.from_config(own), ROBOT).measurements)
+
+
+def test_german_headers_are_read(tmp_path):
+    names = {"trajectory": "Bahn", "time_s": "Zeit", "point": "Nr", "speed_mm_s": "Geschwindigkeit"}
+    names |= {f"command_{axis}_mm": f"Soll {axis.upper()}" for axis in "xyz"}
+    names |= {f"measured_{axis}_mm": f"Ist {axis.upper()}" for axis in "xyz"}
+    frame = FIELD[list(names)].rename(columns=names)
+    frame.to_csv(tmp_path / "a.csv", index=False, sep=";", decimal=",")
+    found = check_file(tmp_path / "a.csv", CONFIG, "rrru3")
+    assert found.refused == () and proposed(found)["columns"] == names
+    frame["Punkt"] = [f"P{k}" for k in range(len(frame))]
+    frame.drop(columns="Nr").to_csv(tmp_path / "a.csv", index=False, sep=";", decimal=",")
+    found = check_file(tmp_path / "a.csv", CONFIG, "rrru3")
+    assert found.refused == () and proposed(found)["columns"]["name"] == "Punkt"
+
+
+@pytest.mark.parametrize(
+    ("named", "left_out"),
+    [
+        ("delta", ()),
+        ("ptt3", LENGTHS[:3]),
+        ("arm6_file", ()),
+        ("delta", ("theta1_rad", "theta2_rad", "theta3_rad")),
+    ],
+)
+def test_a_file_of_another_robot_names_that_robot(named, left_out, tmp_path):
+    """By what drives it to where it was sent, by the names of the drives, by what is within reach."""
+    robots = {name: CONFIG["robots"][name] for name in ("rrru3", "ptt3", "delta", "arm6_file")}
+    found = checked(FIELD.head(60).drop(columns=[*left_out]), tmp_path, named, robots=robots)
+    hints = [line for line in found.lines if line.startswith("wrong robot?")]
+    assert found.refused and len(hints) == 1 and "rrru3" in hints[0] and "arm6_file would" not in hints[0]
+
+
+def test_a_bad_cell_does_not_make_the_robot_wrong(tmp_path):
+    frame = FIELD.copy()
+    frame.loc[5, "measured_x_mm"] = 1e5
+    found = checked(frame, tmp_path)
+    assert found.refused and not any("wrong robot" in line for line in found.lines)
+
+
+def test_what_is_refused_is_not_offered_for_pasting(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    FIELD.drop(columns="measured_x_mm").to_csv(tmp_path / "a.csv", index=False)
+    assert main([str(tmp_path / "a.csv"), "--robot", "rrru3"]) == 1
+    text = capsys.readouterr().out
+    assert "NOT ACCEPTED YET" in text and "to paste" not in text
+
+
 def test_a_file_that_holds_everything_costs_nothing(tmp_path):
     found = checked(
         FIELD, tmp_path, campaigns={"a": {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "noise_mm": 0.02}}
@@ -127,7 +199,8 @@ def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
     [
         (["nothere.csv", "--robot", "rrru3"], "no such file"),
         (["data", "--robot", "rrru3"], "a directory"),
-        (["data/field_02.csv"], "robot is None; allowed: rrru3"),
+        (["data/field_12.csv"], "say which robot: ROBOT=.. (--robot ..); allowed: rrru3"),
+        (["data/field_12.csv"], "this file fits rrru3"),
         (["data/field_01.csv", "--robot", "rrru9"], "robot is 'rrru9'"),
         (["data/field_01.csv", "--robot", "rrru3", "--configfile", "nothere.yaml"], "nothere.yaml"),
         (["data/field_01.csv", "--robot", "rrru3", "--configfile", "Makefile"], "allowed: a YAML file"),

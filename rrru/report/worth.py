@@ -1,0 +1,46 @@
+"""What a campaign's calibration is worth on the points of its diagnosis: sizes in mm, measuring noise taken out."""
+
+from dataclasses import dataclass
+
+from rrru.gap.answer import rounded
+from rrru.gap.shrink import gap_rms
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Worth:
+    """Root mean square distances at the same points, noise taken out: before any calibration, with one that has seen
+    these points. registered: the instrument's frame had been fitted to the commanded points before.
+    """
+
+    points: int
+    before_mm: float
+    seen_mm: float
+    registered: bool
+
+
+def worth(errors, points, noise_rms_mm, registered):
+    """The Worth of a campaign, None where none of its points has an error before calibration.
+
+    errors: rows of `errors` of the campaign; points: `gap_points`; noise_rms_mm: 3-D.
+    """
+    before = errors.loc[errors["mode"] == "before", ["run", "point", "error_mm"]]
+    both = points[points["used"]].merge(before, on=["run", "point"]).dropna(subset=["error_mm"])
+    if both.empty:
+        return None
+    seen = (both[[f"before_{axis}_mm" for axis in _AXES]] ** 2).sum(axis=1)
+    sizes = (gap_rms(squares - noise_rms_mm**2) for squares in (both["error_mm"] ** 2, seen))
+    return Worth(len(both), *sizes, registered)
+
+
+def sentences(found, left_out_mm):
+    """What a Worth says beside the size at points that were left out of the calibration."""
+    first = "before any calibration" + (", once the instrument's frame was fitted" if found.registered else "")
+    said = [f"At these {found.points} points, noise taken out alike, it was {rounded(found.before_mm)} mm {first}."]
+    if left_out_mm >= found.before_mm:
+        said.append(
+            f"Where the calibration has seen the points, {rounded(found.seen_mm)} mm is left: it has taken up a part "
+            "of the cause, and its numbers do not carry over to points that were left out."
+        )
+    return said
