@@ -19,6 +19,7 @@ from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
 from tests.places import ROOT
 from tests.schemas import TABLES
+from tests.studies.circle import synthetic_circle
 from tests.studies.delta import synthetic_delta
 from tests.studies.methods import synthetic_methods
 from tests.studies.printers import synthetic_printers
@@ -79,6 +80,7 @@ def frames():
         | {"printers": synthetic_printers.printers()}
         | synthetic_delta.delta_tables()
         | synthetic_methods.method_tables()
+        | synthetic_circle.circle_tables()
         | synthetic_ptt.ptt_tables()
         | synthetic_real.real_tables()
     )
@@ -193,7 +195,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         *(
             (name, {"campaign": "nowhere"}, "'nowhere'")
             for name in FIGURES
-            if name not in ("fig06", "fig07", "withheld", "withheld_plants", "printers", "methods", *DELTA, *PTT, *REAL)
+            if name not in ("fig06", "fig07", "withheld", "withheld_plants", "printers", "methods", "circle", *DELTA, *PTT, *REAL)
         ),
         ("fig07", {"sweep_campaign": "nowhere"}, "'nowhere'"),
     ],
