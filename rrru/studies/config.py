@@ -9,6 +9,9 @@ from pathlib import Path
 from rrru.errors import ConfigError
 from rrru.objects import module_file
 
+# what of a campaign's section only drives it
+_DRIVEN = ("trajectories", "passes", "advised_by")
+
 
 def part(config, *keys):
     """The values under dotted keys such as "robots.rrru3", nested as in the configuration; absent ones are left out."""
@@ -62,7 +65,7 @@ def nominal(config, name):
 
 def source(config, name):
     """A campaign's section without what only drives it."""
-    return {key: value for key, value in config["campaigns"][name].items() if key not in ("trajectories", "passes", "advised_by")}
+    return {key: value for key, value in config["campaigns"][name].items() if key not in _DRIVEN}
 
 
 def truth(config, name):

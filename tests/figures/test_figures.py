@@ -65,6 +65,7 @@ WITHOUT_UNIT = (
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign
+STUDIES = ("withheld", "withheld_plants", "printers", "methods", "circle")
 DELTA = ("delta_images", "delta_errors", "delta_observability")
 PTT = tuple(name for name in FIGURES if name.startswith("ptt_"))
 REAL = ("steps", "spectrum", "lengths")
@@ -195,7 +196,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         *(
             (name, {"campaign": "nowhere"}, "'nowhere'")
             for name in FIGURES
-            if name not in ("fig06", "fig07", "withheld", "withheld_plants", "printers", "methods", "circle", *DELTA, *PTT, *REAL)
+            if name not in ("fig06", "fig07", *STUDIES, *DELTA, *PTT, *REAL)
         ),
         ("fig07", {"sweep_campaign": "nowhere"}, "'nowhere'"),
     ],

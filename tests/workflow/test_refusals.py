@@ -21,7 +21,7 @@ from tests.workflow.folder import dry_run, run
             "campaigns.crooked.passes: no trajectory 'nosuch'",
         ),
         ("campaigns: {crooked: {virtual: nosuch}}", "campaigns.crooked: virtual_robots has no 'nosuch'"),
-        ("campaigns: {crooked: {advised_by: paper}}", "campaigns.crooked.advised_by: 'paper'; allowed: another campaign"),
+        ("campaigns: {crooked: {advised_by: paper}}", "campaigns.crooked.advised_by: 'paper'; allowed: another"),
         ("campaigns: {crooked: {advised_by: nosuch}}", "campaigns.crooked.advised_by: campaigns has no 'nosuch'"),
         ("circle: {diagnosed: paper, fresh: nosuch}", "circle.fresh: campaigns has no 'nosuch'"),
         ("virtual_robots: {twin: {mujoco: {}}}", "virtual robot: mujoco drives rrru3, which has no mjcf"),

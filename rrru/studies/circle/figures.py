@@ -31,7 +31,7 @@ def circle(tables, options):
         axes.grid(True, axis="y")
     along.set(xlabel="point", ylabel="error (mm)", title="(a) point by point", yscale="log")
     style.plain_log(along.yaxis)
-    sums.set(ylabel="error, rms (mm)", title="(b) all points")
+    sums.set(xlabel="model", ylabel="error, rms (mm)", title="(b) all points")
     sums.margins(y=0.12)
     sums.set_xticks(range(len(_MODELS)), [label for label, _ in _MODELS.values()])
     style.legend_above(figure, [along], columns=4)

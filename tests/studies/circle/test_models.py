@@ -13,6 +13,7 @@ from tests.plant.simulated import file_of
 from tests.schemas import check as checked
 
 _SECTION = {"mjcf": str(file_of("hexapod")), "platform": "plate"}
+_LINE = {"start_mm": [-20, 0, 500], "end_mm": [20, 0, 510], "offsets_y_mm": [0], "points": 6}
 _NOMINAL = {"name": "hexapod", "dimensions": _SECTION, "parameter_set": "zero"}
 
 
@@ -23,7 +24,7 @@ def fresh():
         "name": "fresh",
         "seed": 1,
         "robot": {"mujoco": {}},
-        "trajectories": {"lines": {"start_mm": [-20, 0, 500], "end_mm": [20, 0, 510], "offsets_y_mm": [0], "points": 6}},
+        "trajectories": {"lines": _LINE},
         "passes": [{"reverse": False, "payload_kg": 0.0}],
         "motion": {"speed_mm_s": 50.0, "acceleration_mm_s2": 50.0, "dwell_s": 1.0},
         "noise_mm": 0.0,
