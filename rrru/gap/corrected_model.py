@@ -66,7 +66,7 @@ def gap_rows(attribution, corrected, section, file, shrink):
         if key == "urdf":
             raise ConfigError("a URDF has no actuators")
         poses = [
-            _simulated(attribution.case, robot, Path(one), section["platform"])
+            simulated(attribution.case.motion, robot, Path(one), section["platform"])
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
@@ -87,9 +87,12 @@ def _robot(case, section):
     return robot.reading(case.mechanism.reads)
 
 
-def _simulated(case, robot, file, platform):
-    """Poses (n) of an MJCF that MuJoCo drives along the campaign, NaN beyond what is driven, and no twists."""
-    motion, count = case.motion, min(len(case.motion), _MOST_DRIVEN)
+def simulated(motion, robot, file, platform):
+    """Poses (n) of an MJCF that MuJoCo drives along a Motion, NaN beyond what is driven, and no twists.
+
+    robot: of the file. Raises ConfigError, SimulationError or UnreachableError where it cannot be driven.
+    """
+    count = min(len(motion), _MOST_DRIVEN)
     first = replace(
         motion,
         **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WHOLE},

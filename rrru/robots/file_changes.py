@@ -21,6 +21,8 @@ from rrru.robots.legs import TOOL, WORLD
 
 _BALL = mujoco.mjtJoint.mjJNT_BALL
 _NOTHING, _STAYS = np.zeros(6), (np.eye(4), "")
+# the name of the measured point in a file, where it has moved
+MEASURED_TOOL = "measured_tool"
 # smaller changes, in mm and rad, are rounding
 SAME = 1e-10
 
@@ -103,7 +105,7 @@ def _frames(found, twists):
     twist, tool_mm, frames = twists.get(TOOL, _NOTHING), np.asarray(found.tool_mm), {}
     tool = placement_of(twist)
     if np.any(twist):
-        frames["measured_tool"] = placed(tool_mm) @ tool
+        frames[MEASURED_TOOL] = placed(tool_mm) @ tool
     for name, place in found.reflectors.items():
         at = placed(tool_mm) @ tool @ placed(place - tool_mm)
         frames[name] = placed(twists.get(name, _NOTHING)[:3]) @ at

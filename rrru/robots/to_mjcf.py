@@ -7,7 +7,7 @@ comment. Lengths in mm and angles in rad, m in the file.
 import mujoco
 import numpy as np
 
-from rrru.robots.file_changes import SAME, changes_of, difference, scatter
+from rrru.robots.file_changes import MEASURED_TOOL, SAME, changes_of, difference, scatter
 from rrru.robots.from_file import mjcf_parts
 from rrru.robots.from_mjcf import MM, ends_of
 from rrru.robots.from_structure import structure_of
@@ -47,6 +47,12 @@ def to_mjcf(path, platform, found, folder):
     close_keys(document, model, [move.origin for move in structure.driven], document.compiled())
     document.move_to(folder)
     return document.text, tuple(lost)
+
+
+def measured_tool_mm(path):
+    """Where a file written by `to_mjcf` has the measured point on its platform (3,), None where that was not found."""
+    site = mujoco.MjSpec.from_file(str(path)).site(MEASURED_TOOL)
+    return None if site is None else MM * np.array(site.pos)
 
 
 def _numbers(structure, found, twists):

@@ -68,6 +68,11 @@ def unmatched_sets(sets, measurements):
     return (f"not calibrated on {', '.join(unmatched)}: these sets match none of the trajectories {present}",)
 
 
+def unadvised(advice):
+    """A note where a campaign was to follow advice, tables with the runs first, and none was given."""
+    return ("no further run was advised, and none was added",) if advice and not len(advice[0]) else ()
+
+
 def _around_reachable(robot, points, step_mm):
     """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth or a step.
 

@@ -9,6 +9,9 @@ from pathlib import Path
 from rrru.errors import ConfigError
 from rrru.objects import module_file
 
+# what of a campaign's section only drives it
+_DRIVEN = ("trajectories", "passes", "advised_by")
+
 
 def part(config, *keys):
     """The values under dotted keys such as "robots.rrru3", nested as in the configuration; absent ones are left out."""
@@ -62,7 +65,7 @@ def nominal(config, name):
 
 def source(config, name):
     """A campaign's section without what only drives it."""
-    return {key: value for key, value in config["campaigns"][name].items() if key not in ("trajectories", "passes")}
+    return {key: value for key, value in config["campaigns"][name].items() if key not in _DRIVEN}
 
 
 def truth(config, name):
@@ -142,6 +145,11 @@ def _check_virtual(config, name, section):
 
         setup.real_robot(nominal(config, name), real)
     known = trajectory_names(entry(config, "trajectories", section["trajectories"], f"campaigns.{name}"))
+    if "advised_by" in section:
+        before = entry(config, "campaigns", section["advised_by"], f"campaigns.{name}.advised_by")
+        if section["advised_by"] == name or before.get("trajectories") != section["trajectories"]:
+            allowed = "another campaign with the same trajectories"
+            raise ConfigError(f"campaigns.{name}.advised_by: {section['advised_by']!r}; allowed: {allowed}")
     for one in section.get("passes", []):
         for wanted in one.get("trajectories", []):
             if wanted not in known:

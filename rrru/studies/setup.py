@@ -1,6 +1,6 @@
 """The only builder: from parts of the configuration, which `rrru.studies.config` makes, to robots and campaigns."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
@@ -92,8 +92,11 @@ def real_robot(nominal, section):
     return mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)
 
 
-def virtual_campaign(nominal, virtual):
-    """The virtual campaign of its parts; raises ConfigError where a number or a name of the robot is not allowed."""
+def virtual_campaign(nominal, virtual, advice=None):
+    """The virtual campaign of its parts; raises ConfigError where a number or a name of the robot is not allowed.
+
+    advice: tables `gap_next_runs` and `gap_next_poses`, whose first run is driven after the passes, if there is any.
+    """
     motion = virtual["motion"]
     plan = make_plan(
         trajectories.from_config(virtual["trajectories"]),
@@ -102,6 +105,12 @@ def virtual_campaign(nominal, virtual):
         motion["acceleration_mm_s2"],
         motion["dwell_s"],
     )
+    if advice is not None and len(advice[0]):
+        # a diagnosis is not small, and campaigns that follow none do not need it
+        from rrru.studies.advised import advised_runs
+
+        more = advised_runs(advice[0].iloc[0].to_dict(), advice[1], virtual["trajectories"], motion)
+        plan = replace(plan, runs=(*plan.runs, *more))
     real = real_robot(nominal, virtual["robot"])
     origin = virtual.get("origin", "campaign")
     sees = Sees(virtual.get("targets", {}), virtual.get("noise_rad"))

@@ -19,6 +19,7 @@ from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
 from tests.places import ROOT
 from tests.schemas import TABLES
+from tests.studies.circle import synthetic_circle
 from tests.studies.delta import synthetic_delta
 from tests.studies.methods import synthetic_methods
 from tests.studies.printers import synthetic_printers
@@ -64,6 +65,7 @@ WITHOUT_UNIT = (
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign
+STUDIES = ("withheld", "withheld_plants", "printers", "methods", "circle")
 DELTA = ("delta_images", "delta_errors", "delta_observability")
 PTT = tuple(name for name in FIGURES if name.startswith("ptt_"))
 REAL = ("steps", "spectrum", "lengths")
@@ -79,6 +81,7 @@ def frames():
         | {"printers": synthetic_printers.printers()}
         | synthetic_delta.delta_tables()
         | synthetic_methods.method_tables()
+        | synthetic_circle.circle_tables()
         | synthetic_ptt.ptt_tables()
         | synthetic_real.real_tables()
     )
@@ -193,7 +196,7 @@ def test_a_failed_save_leaves_the_old_files_and_nothing_else(frames, tmp_path, m
         *(
             (name, {"campaign": "nowhere"}, "'nowhere'")
             for name in FIGURES
-            if name not in ("fig06", "fig07", "withheld", "withheld_plants", "printers", "methods", *DELTA, *PTT, *REAL)
+            if name not in ("fig06", "fig07", *STUDIES, *DELTA, *PTT, *REAL)
         ),
         ("fig07", {"sweep_campaign": "nowhere"}, "'nowhere'"),
     ],

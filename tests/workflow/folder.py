@@ -18,7 +18,7 @@ MINIMAL = "tests/minimal.yaml"
 
 def link(folder):
     """Link what a run needs into a folder, once."""
-    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "data", "tests"):
+    for name in ("Snakefile", "config.yaml", "profiles", "workflow", "data", "examples", "tests"):
         place = folder / name
         if not place.exists():
             place.symlink_to(ROOT / name)

@@ -15,9 +15,13 @@ from tests.workflow.folder import MINIMAL, SNAKEMAKE, dry_run
 
 @pytest.fixture(scope="module")
 def records(shared):
-    """Records of the shared run's jobs by rule."""
+    return recorded(shared / "record")
+
+
+def recorded(folder):
+    """Records of a run's jobs by rule."""
     result = {}
-    for file in sorted((shared / "record").glob("*.json")):
+    for file in sorted(folder.glob("*.json")):
         row = json.loads(file.read_text())
         result.setdefault(row["rule"], []).append(row)
     return result
@@ -26,12 +30,17 @@ def records(shared):
 def test_every_module_that_a_job_has_loaded_is_in_its_digest(records):
     assert len(records) >= 25
     for rule, jobs in records.items():
-        for row in jobs:
-            covered = {str(file) for file in digest.closure(f"workflow/scripts/{row['script']}")}
-            loaded = {importlib.import_module(name).__file__ for name in row["modules"]}
-            # a script that draws loads the functions that its settings name
-            drawn = {str(file) for name in row["modules"] if "figures" in name for file in digest.closure(name)}
-            assert loaded <= covered | drawn | _papers(rule), (rule, loaded - covered - drawn)
+        covered_by_its_digest(rule, jobs)
+
+
+def covered_by_its_digest(rule, jobs):
+    """Whether the digest of a rule covers all that its recorded jobs have loaded."""
+    for row in jobs:
+        covered = {str(file) for file in digest.closure(f"workflow/scripts/{row['script']}")}
+        loaded = {importlib.import_module(name).__file__ for name in row["modules"]}
+        # a script that draws loads the functions that its settings name
+        drawn = {str(file) for name in row["modules"] if "figures" in name for file in digest.closure(name)}
+        assert loaded <= covered | drawn | _papers(rule), (rule, loaded - covered - drawn)
 
 
 def _papers(rule):

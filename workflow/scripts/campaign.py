@@ -14,8 +14,9 @@ def main(settings, inputs, outputs):
     name, section, nominal = settings["campaign"], settings["section"], settings["nominal"]
     robot = setup.mechanism(nominal)
     if settings["virtual"]:
-        measurements, truth = setup.virtual_campaign(nominal, settings["virtual"]).run()
-        notes, registration = (), None
+        advice = [tables.read(inputs[key]) for key in ("next_runs", "next_poses") if inputs.get(key)]
+        measurements, truth = setup.virtual_campaign(nominal, settings["virtual"], advice or None).run()
+        notes, registration = campaigns.unadvised(advice), None
     else:
         # what reads files is not small, and virtual campaigns do not need it
         from rrru.campaign.ingest.campaign_file import ingest

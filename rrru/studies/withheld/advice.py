@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from rrru.campaign import measurements as rows
-from rrru.campaign.plan import Plan, make_plan
-from rrru.campaign.trajectories import Line, from_config
+from rrru.campaign.plan import Plan
 from rrru.gap.advise import candidates
 from rrru.gap.diagnose import Diagnosis, diagnose
-from rrru.gap.poses import LENGTH_MM, POINTS
 from rrru.seeds import stream
+from rrru.studies.advised import advised_runs
 from rrru.studies.withheld.noise import NoiseLaw, with_noise
 from rrru.studies.withheld.summary import wilson
 from rrru.studies.withheld.verdicts import is_right
@@ -110,25 +108,14 @@ def random_run(arm, points, generator):
 def drive(robot, arm, run, conditions, generator):
     """Measurements of an Arm with a row of `gap_next_runs` driven by its Robot besides, and all runs added so far."""
     campaign = robot.campaign(conditions)
-    done, new = (*campaign.plan.runs, *arm.runs), _runs(robot, run, arm.found.tables["gap_next_poses"], conditions)
+    done, poses = (*campaign.plan.runs, *arm.runs), arm.found.tables["gap_next_poses"]
+    new = advised_runs(run, poses, robot.trajectories, conditions.motion)
     plan = Plan((*done, *new), campaign.plan.dwell_s)
     table, _ = replace(campaign, plan=plan, noise_mm=0.0).run()
     extra = table[table["run"] > len(done)].reset_index(drop=True)
     numbered = extra.assign(run=extra["run"] - len(done))
     noisy = with_noise(numbered, NoiseLaw(**robot.noise), conditions.noise_mm, generator).assign(run=extra["run"])
     return pd.concat([arm.measurements, noisy], ignore_index=True), (*arm.runs, *new)
-
-
-def _runs(robot, run, poses, conditions):
-    """Runs of a plan: a pass with the campaign's profile, faster in proportion, or short passes of the poses."""
-    motion, speed = conditions.motion, run["speed_mm_s"]
-    entry = {key: run[key] for key in ("reverse", "speed_mm_s", "payload_kg")}
-    if run["kind"] == "poses":
-        ends = zip(rows.vectors(poses, "from").tolist(), rows.vectors(poses, "to").tolist(), strict=True)
-        lines = [Line(f"pose_{k}", *pair, POINTS) for k, pair in enumerate(ends, start=1)]
-        return make_plan(lines, [entry | {"acceleration_mm_s2": speed**2 / LENGTH_MM}], **motion).runs
-    entry["acceleration_mm_s2"] = motion["acceleration_mm_s2"] * (speed / motion["speed_mm_s"]) ** 2
-    return make_plan(from_config(robot.trajectories), [entry | {"trajectories": [run["trajectory"]]}], **motion).runs
 
 
 def advice_summary(followed):

@@ -4,6 +4,8 @@ parts.check_files(config)
 rule campaign:
     input:
         file=campaign_file,
+        next_runs=lambda wildcards: campaign_advice(wildcards, "gap_next_runs"),
+        next_poses=lambda wildcards: campaign_advice(wildcards, "gap_next_poses"),
     output:
         **named(["measurements", "truth", "singularity", "campaigns", "workspace"], part),
     log:

@@ -79,6 +79,12 @@ def campaign_file(wildcards):
     return parts.ingested_files(config["campaigns"][wildcards.campaign])
 
 
+def campaign_advice(wildcards, name):
+    """A table of the diagnosis whose advice a virtual campaign follows, nothing where it follows none."""
+    followed = config["campaigns"][wildcards.campaign].get("advised_by")
+    return part(name, followed) if followed else []
+
+
 def campaign_settings(wildcards):
     """What one campaign is made from."""
     name, calibration = wildcards.campaign, config["calibration"]

@@ -1,0 +1,34 @@
+# what a corrected file is worth on a campaign that nobody has seen; without its section there is nothing to make
+CHECKS.append("rrru.studies.circle.models:check")
+CIRCLE = config.get("circle", {})
+CIRCLE_TABLES = ["circle", "circle_points"]
+CIRCLE_FIGURES = {"circle": ("rrru.studies.circle.figures:circle", CIRCLE_TABLES)}
+
+if CIRCLE:
+    FIGURES["circle"] = CIRCLE_FIGURES
+    _DIAGNOSED = CIRCLE["diagnosed"]
+
+    rule try_corrected:
+        input:
+            **{name: part(name, _DIAGNOSED) for name in ("measurements", "parameters", "gap_verdicts")},
+            corrected=f"{RESULTS}/campaigns/{_DIAGNOSED}/corrected.xml",
+            fresh=part("measurements", CIRCLE["fresh"]),
+            campaigns=part("campaigns", CIRCLE["fresh"]),
+        output:
+            **named(CIRCLE_TABLES),
+        log:
+            f"{RESULTS}/logs/circle.log",
+        params:
+            settings={
+                "nominal": parts.nominal(config, _DIAGNOSED),
+                "masses": parts.masses(config, config["campaigns"][_DIAGNOSED]),
+                **reads("circle"),
+            },
+            code=code("circle"),
+        script:
+            "../../scripts/circle.py"
+
+    rule circle:
+        input:
+            named(CIRCLE_TABLES).values(),
+            drawn(CIRCLE_FIGURES).values(),

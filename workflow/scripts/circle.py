@@ -1,0 +1,26 @@
+"""A robot's file, its calibration and its corrected file on a campaign that none of them has seen."""
+
+from rrru.fit.campaign_fit import deviation_vector
+from rrru.robots.dynamics import Masses
+from rrru.store import tables
+from rrru.store.job import run
+from rrru.studies import setup
+from rrru.studies.circle.models import errors, sizes
+from rrru.studies.circle.schemas import TABLES
+
+
+def main(settings, inputs, outputs):
+    """Write what each model leaves of the fresh campaign."""
+    section, nominal = settings["circle"], settings["nominal"]
+    robot = setup.measured_robot(nominal, tables.read(inputs["measurements"]))
+    deviations = deviation_vector(tables.read(inputs["parameters"]), section["calibration"], "least_squares", robot)
+    verdict, info = (tables.read(inputs[name]).iloc[0] for name in ("gap_verdicts", "campaigns"))
+    masses = Masses(**settings["masses"])
+    points = errors(tables.read(inputs["fresh"]), nominal, masses, (robot, deviations), inputs["corrected"])
+    whole = sizes(points, verdict["effects"], info["noise_mm"])
+    frames = {"circle_points": points, "circle": whole.assign(diagnosed=section["diagnosed"], fresh=section["fresh"])}
+    tables.write_all(TABLES, frames, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
