@@ -19,17 +19,18 @@ _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the libr
 _LISTED, _WORTH, _SURE = 3, 0.05, 0.9
 
 
-def answer(campaign, verdict, tables):
+def answer(campaign, verdict, tables, drives=()):
     """The facts of one campaign as a mapping, which `rrru.store.facts` writes.
 
-    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name.
+    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
+    drives: names of an arm's drives, see `arm_drives`.
     """
     budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
     names = [name for name in verdict["effects"].split("+") if name not in _APART]
     facts = {
         "schema": SCHEMA,
         "campaign": campaign,
-        "effects": [_effect(name, tables, budget) for name in names],
+        "effects": [_effect(name, tables, budget, drives) for name in names],
         "unexplained": "unexplained" in verdict["effects"].split("+"),
         "probability": verdict["probability"],
         "leg": verdict["leg"] or None,
@@ -43,6 +44,11 @@ def answer(campaign, verdict, tables):
         "notes": [note for note in verdict["notes"].split("; ") if note],
     }
     return facts | {"sentences": sentences(facts)}
+
+
+def arm_drives(robot):
+    """Names of the drives of an arm, whose effects act drive by drive; none for robots that have them leg by leg."""
+    return tuple(drive.site for drive in robot.parts.drives) if robot.legs.arm_joints else ()
 
 
 def sentences(facts):
@@ -91,19 +97,28 @@ def _row(values, names):
     return {name: values[name] for name in names}
 
 
-def _effect(name, tables, budget):
+def _effect(name, tables, budget, drives):
     """Facts of one effect of the verdict."""
     share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
     cause = tables["gap_attribute"].set_index("effect").loc[name]
+    legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
     return {
         "name": name,
         "meaning": summary(name),
         "probability": cause["probability"],
-        "legs": cause["legs"] if isinstance(cause["legs"], str) else "",
+        "legs": legs,
+        "place": _place(int(legs), drives) if legs.isdigit() else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
     }
+
+
+def _place(number, drives):
+    """Where an effect of one leg or drive, by number from 1 on, acts, in words."""
+    if not drives:
+        return f"in leg {number}"
+    return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
 
 
 def _missed(facts):
@@ -139,11 +154,11 @@ def _causes(facts):
 def _cause(effect, follow):
     """One effect: its share, name, leg, sizes and meaning."""
     share = f"{percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
-    leg = f" in leg {effect['legs']}" if effect["legs"].isdigit() else ""
+    place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    return f"{share} {readable(effect['name'])}{leg}{size}{meaning}."
+    return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
 
 
 def _sizes(parameters):
