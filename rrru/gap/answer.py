@@ -55,10 +55,7 @@ def sentences(facts):
     """What the facts say, in sentences for somebody who knows the robot and no statistics."""
     said = [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
-    if facts["confusable_with"]:
-        others = ", ".join(_OUTSIDE.get(name, readable(name)) for name in facts["confusable_with"])
-        said.append(f"{'Parts of it could be' if facts['unexplained'] else 'These data cannot rule out'}: {others}.")
-    return [*said, _next(facts)]
+    return [*said, *_open(facts), _next(facts)]
 
 
 def readable(name):
@@ -186,6 +183,21 @@ def _left(facts):
     return [f"Add {what} to the simulator and {after} mm is left on runs it has not seen; the noise is {noise} mm."]
 
 
+def _open(facts):
+    """What else it could be: the rivals that are named, and what the runs that are advised would decide."""
+    named = [effect["name"] for effect in facts["effects"]]
+    contests = [_apart(run["separates"]) for run in facts["next"]]
+    asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
+    others = dict.fromkeys([*facts["confusable_with"], *(name for name in asked if name not in named)])
+    listed = [_OUTSIDE.get(name, readable(name)) for name in others]
+    doubted = {name for sides in contests if not all(sides) for name in set().union(*sides)}
+    listed += [f"that {readable(name)} does not act" for name in named if name in doubted]
+    if not listed:
+        return []
+    first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
+    return [f"{first}: {', '.join(listed)}."]
+
+
 def _next(facts):
     """What to measure next."""
     if facts["next"]:
@@ -201,6 +213,11 @@ def _next(facts):
 
 def _contest(separates):
     """In what two answers "a+b / a+c" differ, in words."""
-    first, second = (set(side.split("+")) for side in separates.split(" / "))
-    sides = [" + ".join(map(readable, sorted(one - other))) for one, other in ((first, second), (second, first))]
+    sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
+
+
+def _apart(separates):
+    """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
+    first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
+    return first - second, second - first

@@ -74,10 +74,24 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "10 % does not repeat",
         "Add them to the simulator and 0.020 mm is left",
         "the noise is 0.035 mm",
-        "cannot rule out: drive compliance",
+        "cannot rule out: drive compliance, servo lag.",
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",
     ):
         assert words in said
+
+
+@pytest.mark.parametrize(
+    ("separates", "left_open", "decided"),
+    [
+        ("link_flexure+backlash / backlash", "that link flexure does not act", "whether link flexure acts"),
+        ("none / servo_lag", "servo lag", "whether servo lag acts"),
+        ("backlash+tool_offset / backlash+servo_lag", "servo lag, tool offset", "between tool offset and servo lag"),
+    ],
+)
+def test_what_the_advised_run_decides_is_said_to_be_open(separates, left_open, decided):
+    """Also where no rival alone is probable enough to be named."""
+    said = answered(runs=[(*RUN[:-2], separates, 3.0)], confusable_with="")["sentences"]
+    assert f"These data cannot rule out: {left_open}." in said and said[-1].endswith(f"That decides {decided}.")
 
 
 def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():
