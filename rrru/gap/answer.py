@@ -19,17 +19,18 @@ _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the libr
 _LISTED, _WORTH, _SURE = 3, 0.05, 0.9
 
 
-def answer(campaign, verdict, tables):
+def answer(campaign, verdict, tables, drives=()):
     """The facts of one campaign as a mapping, which `rrru.store.facts` writes.
 
-    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name.
+    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
+    drives: names of an arm's drives, see `arm_drives`.
     """
     budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
     names = [name for name in verdict["effects"].split("+") if name not in _APART]
     facts = {
         "schema": SCHEMA,
         "campaign": campaign,
-        "effects": [_effect(name, tables, budget) for name in names],
+        "effects": [_effect(name, tables, budget, drives) for name in names],
         "unexplained": "unexplained" in verdict["effects"].split("+"),
         "probability": verdict["probability"],
         "leg": verdict["leg"] or None,
@@ -45,14 +46,16 @@ def answer(campaign, verdict, tables):
     return facts | {"sentences": sentences(facts)}
 
 
+def arm_drives(robot):
+    """Names of the drives of an arm, whose effects act drive by drive; none for robots that have them leg by leg."""
+    return tuple(drive.site for drive in robot.parts.drives) if robot.legs.arm_joints else ()
+
+
 def sentences(facts):
     """What the facts say, in sentences for somebody who knows the robot and no statistics."""
     said = [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
-    if facts["confusable_with"]:
-        others = ", ".join(_OUTSIDE.get(name, readable(name)) for name in facts["confusable_with"])
-        said.append(f"{'Parts of it could be' if facts['unexplained'] else 'These data cannot rule out'}: {others}.")
-    return [*said, _next(facts)]
+    return [*said, *_open(facts), _next(facts)]
 
 
 def readable(name):
@@ -91,19 +94,28 @@ def _row(values, names):
     return {name: values[name] for name in names}
 
 
-def _effect(name, tables, budget):
+def _effect(name, tables, budget, drives):
     """Facts of one effect of the verdict."""
     share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
     cause = tables["gap_attribute"].set_index("effect").loc[name]
+    legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
     return {
         "name": name,
         "meaning": summary(name),
         "probability": cause["probability"],
-        "legs": cause["legs"] if isinstance(cause["legs"], str) else "",
+        "legs": legs,
+        "place": _place(int(legs), drives) if legs.isdigit() else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
     }
+
+
+def _place(number, drives):
+    """Where an effect of one leg or drive, by number from 1 on, acts, in words."""
+    if not drives:
+        return f"in leg {number}"
+    return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
 
 
 def _missed(facts):
@@ -139,11 +151,11 @@ def _causes(facts):
 def _cause(effect, follow):
     """One effect: its share, name, leg, sizes and meaning."""
     share = f"{percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
-    leg = f" in leg {effect['legs']}" if effect["legs"].isdigit() else ""
+    place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    return f"{share} {readable(effect['name'])}{leg}{size}{meaning}."
+    return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
 
 
 def _sizes(parameters):
@@ -171,6 +183,21 @@ def _left(facts):
     return [f"Add {what} to the simulator and {after} mm is left on runs it has not seen; the noise is {noise} mm."]
 
 
+def _open(facts):
+    """What else it could be: the rivals that are named, and what the runs that are advised would decide."""
+    named = [effect["name"] for effect in facts["effects"]]
+    contests = [_apart(run["separates"]) for run in facts["next"]]
+    asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
+    others = dict.fromkeys([*facts["confusable_with"], *(name for name in asked if name not in named)])
+    listed = [_OUTSIDE.get(name, readable(name)) for name in others]
+    doubted = {name for sides in contests if not all(sides) for name in set().union(*sides)}
+    listed += [f"that {readable(name)} does not act" for name in named if name in doubted]
+    if not listed:
+        return []
+    first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
+    return [f"{first}: {', '.join(listed)}."]
+
+
 def _next(facts):
     """What to measure next."""
     if facts["next"]:
@@ -186,6 +213,11 @@ def _next(facts):
 
 def _contest(separates):
     """In what two answers "a+b / a+c" differ, in words."""
-    first, second = (set(side.split("+")) for side in separates.split(" / "))
-    sides = [" + ".join(map(readable, sorted(one - other))) for one, other in ((first, second), (second, first))]
+    sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
     return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
+
+
+def _apart(separates):
+    """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
+    first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
+    return first - second, second - first

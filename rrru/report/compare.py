@@ -12,6 +12,8 @@ from rrru.fit.campaign_fit import CalibrationSettings
 from rrru.store import facts, tables
 
 METHOD = "least_squares"
+# numbers of the instrument's frame
+_FRAME = "world_"
 _READ = ("measurements", "parameters", "correlations", "calibrations", "gap_points")
 
 
@@ -102,8 +104,7 @@ def difference(first, second, calibration):
     """The Difference of two calibrations on a set; raises ConfigError where they have other parameters."""
     values, covariances = zip(*(_estimate(side, calibration) for side in (first, second)), strict=True)
     if list(values[0].index) != list(values[1].index):
-        lists = _listed((first, second), (value.index for value in values))
-        raise ConfigError(f"compare: calibrated with different numbers; {lists}")
+        raise ConfigError(f"compare: {_other_numbers((first, second), [set(value.index) for value in values])}")
     known = np.isfinite(np.diag(covariances[0])) & np.isfinite(np.diag(covariances[1]))
     step = (values[1]["value"] - values[0]["value"]).to_numpy()
     covariance = sum(covariances)[np.ix_(known, known)]
@@ -116,6 +117,20 @@ def difference(first, second, calibration):
     frame = frame.assign(difference=step, in_errors=step / together)
     freedom = int(known.sum())
     return Difference(frame, square, freedom, float(chi2.sf(square, freedom)) if freedom else 1.0)
+
+
+def _other_numbers(sides, names):
+    """Why two sides whose numbers have other names cannot be compared."""
+    own = [sorted(names[k] - names[1 - k]) for k in range(2)]
+    if all(name.startswith(_FRAME) for name in own[0] + own[1]):
+        with_frame = sides[0] if own[0] else sides[1]
+        without = sides[1] if own[0] else sides[0]
+        return (
+            f"of {with_frame.name} the instrument's frame is calibrated, too ({', '.join(own[0] + own[1])}), "
+            f"of {without.name} it is not; give both campaigns the same `frame`: robot or register"
+        )
+    lists = _listed(sides, (one or ["nothing more"] for one in own))
+    return f"calibrated with different numbers; {lists}"
 
 
 def _estimate(side, calibration):

@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import json
+from difflib import get_close_matches
 from pathlib import Path
 
 import yaml
@@ -30,7 +31,17 @@ def check_schema(config, file):
     if error:
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
-        raise ConfigError(f"{'.'.join(map(str, error.absolute_path)) or 'configuration'}: {error.message}{allowed}")
+        place = ".".join(map(str, error.absolute_path)) or "configuration"
+        raise ConfigError(f"{place}: {error.message}{allowed or _meant(error)}")
+
+
+def _meant(error):
+    """Which known keys the unknown ones of a mapping look like, "" where they look like none."""
+    known = list(error.schema.get("properties", ())) if error.validator == "additionalProperties" else []
+    unknown = [key for key in error.instance if key not in known] if known else []
+    near = {key: get_close_matches(str(key), known, n=1) for key in unknown}
+    meant = [f"{found[0]} for {key}" for key, found in near.items() if found]
+    return f"; did you mean {', '.join(meant)}?" if meant else ""
 
 
 def _is_number(value):

@@ -11,6 +11,7 @@ CAMPAIGN = "made_up"
 OPTIONS = {
     "campaign": CAMPAIGN,
     "z_down": True,
+    "drives": (),
     "sweep_campaign": CAMPAIGN,
     "sweep_calibration": "lines",
     "sweep_operators": "matlab_gaussian",

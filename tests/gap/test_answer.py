@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from rrru.effects.library import BY_NAME_ONLY, NAMES, summary
 from rrru.gap import answer
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.rrru3 import Rrru3
 from rrru.store import facts
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
@@ -21,8 +23,8 @@ CAMPAIGN = synthetic.CAMPAIGN
 SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
 
 
-def answered(budget=None, runs=(), **verdict):
-    """Facts of a made-up diagnosis as a file holds them."""
+def answered(budget=None, runs=(), drives=(), **verdict):
+    """Facts of a made-up diagnosis as a file holds them; drives: of an arm."""
     tables = {
         "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
         "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN),
@@ -38,7 +40,7 @@ def answered(budget=None, runs=(), **verdict):
         "gap_next_runs": pd.DataFrame(list(runs), columns=answer._RUN),
     }
     row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
-    return answer.answer(CAMPAIGN, row, tables)
+    return answer.answer(CAMPAIGN, row, tables, drives)
 
 
 RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash / backlash+servo_lag", 14.0)
@@ -72,10 +74,31 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "10 % does not repeat",
         "Add them to the simulator and 0.020 mm is left",
         "the noise is 0.035 mm",
-        "cannot rule out: drive compliance",
+        "cannot rule out: drive compliance, servo lag.",
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",
     ):
         assert words in said
+
+
+@pytest.mark.parametrize(
+    ("separates", "left_open", "decided"),
+    [
+        ("link_flexure+backlash / backlash", "that link flexure does not act", "whether link flexure acts"),
+        ("none / servo_lag", "servo lag", "whether servo lag acts"),
+        ("backlash+tool_offset / backlash+servo_lag", "servo lag, tool offset", "between tool offset and servo lag"),
+    ],
+)
+def test_what_the_advised_run_decides_is_said_to_be_open(separates, left_open, decided):
+    """Also where no rival alone is probable enough to be named."""
+    said = answered(runs=[(*RUN[:-2], separates, 3.0)], confusable_with="")["sentences"]
+    assert f"These data cannot rule out: {left_open}." in said and said[-1].endswith(f"That decides {decided}.")
+
+
+def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
+    said = " ".join(answered(drives=answer.arm_drives(arm))["sentences"])
+    assert "link flexure at axis2 (" in said and " leg " not in said
+    assert answer.arm_drives(Rrru3()) == ()
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():

@@ -131,6 +131,10 @@ def others(tmp_path_factory):
     leave(place, "lines", frame, sets={"sets": {"few": ["line_*"], "both": ["*"]}})
     calibrations = place / "campaigns/lines/calibrations.parquet"
     pd.read_parquet(calibrations).query("calibration == 'few'").to_parquet(calibrations)
+    leave(place, "framed", frame)
+    numbers = place / "campaigns/framed/parameters.parquet"
+    own = pd.read_parquet(numbers)
+    pd.concat([own, own[own["parameter"] == "dL1"].assign(parameter="world_x")]).to_parquet(numbers)
     leave(place, "bare", frame)
     (place / "campaigns/bare/verdict.json").unlink()
     (place / "empty").mkdir()
@@ -147,6 +151,11 @@ def others(tmp_path_factory):
         ("{0}:a", "{1}:other", "is of a robot rrru3, other of delta"),
         ("{0}:a", "{1}:wide", "the nominal robots differ: a has R_mm None, wide 410.0"),
         ("{0}:a", "{1}:lines", "no set of trajectories that both are calibrated on; a: lines, both and lines: few"),
+        (
+            "{0}:a",
+            "{1}:framed",
+            r"of framed the instrument's frame is calibrated, too \(world_x\), of a it is not",
+        ),
         ("{0}:a", "{1}:bare", "lacks verdict.json; run `snakemake` for it first"),
         ("nothing", "{0}:a", "'nothing' is no folder, and no calibrated campaign of results"),
     ],

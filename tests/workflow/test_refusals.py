@@ -8,9 +8,9 @@ from tests.workflow.folder import dry_run, run
 @pytest.mark.parametrize(
     ("overlay", "message"),
     [
-        ("sede: 3", "sede"),
+        ("sede: 3", "did you mean seed for sede?"),
         ("genetic: {crossover_probability: 0.8}", "crossover_probability"),
-        ("campaigns: {mine: {robot: rrru3, ingest: a.csv, nois_mm: 0.02}}", "nois_mm"),
+        ("campaigns: {mine: {robot: rrru3, ingest: a.csv, nois_mm: 0.02}}", "did you mean noise_mm for nois_mm?"),
         ("campaigns: {mine: {robot: rrru9, ingest: a.csv}}", "rrru9"),
         (
             "campaigns: {mine: {robot: rrru3, ingest: nothere.csv}}",
@@ -52,6 +52,11 @@ def test_a_wrong_configuration_fails_before_anything_runs(tmp_path, overlay, mes
     code, output = dry_run(tmp_path, overlays=("wrong.yaml",))
     assert code != 0 and message in output
     assert not (tmp_path / "build").exists()
+
+
+def test_the_page_of_an_unknown_campaign_names_those_there_are(tmp_path):
+    code, output = dry_run(tmp_path, "results/campaigns/feild_09/report.html")
+    assert code != 0 and "there is no campaign 'feild_09'" in output and "field_09" in output
 
 
 def test_a_command_that_is_refused_ends_so_and_leaves_nothing(tmp_path):

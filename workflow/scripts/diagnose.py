@@ -4,7 +4,7 @@ import pandas as pd
 
 from rrru.campaign.noise import read_noise
 from rrru.figures.drawing import draw_all
-from rrru.gap.answer import answer
+from rrru.gap.answer import answer, arm_drives
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES, tables_of
 from rrru.gap.settings import GapSettings
@@ -28,7 +28,9 @@ def main(settings, inputs, outputs):
         from rrru.gap.corrected_model import write_corrected
 
         result = write_corrected(result, settings["robot"]["dimensions"], masses, outputs["corrected"])
-    facts.write(answer(settings["campaign"], result.verdict, result.tables), outputs["verdict"])
+    drives = arm_drives(nominal)
+    told = answer(settings["campaign"], result.verdict, result.tables, drives)
+    facts.write(told, outputs["verdict"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
     frames = {
@@ -36,7 +38,7 @@ def main(settings, inputs, outputs):
         for name, frame in frames.items()
     }
     tables.write_all(tables_of(nominal), frames, outputs)
-    options = settings["options"] | {"z_down": nominal.z_down}
+    options = settings["options"] | {"z_down": nominal.z_down, "drives": drives}
     draw_all(settings["figures"], {name: outputs[name] for name in frames}, options, outputs)
 
 

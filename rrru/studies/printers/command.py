@@ -8,13 +8,15 @@ import yaml
 from jinja2 import Environment
 
 import rrru
-from rrru.errors import FitError, RrruError
+from rrru.errors import ConfigError, FitError, RrruError
 from rrru.studies.printers.answers import answer, failed
 from rrru.studies.printers.files import read_all
 from rrru.studies.printers.judge import judge
 from rrru.studies.printers.printer import Refused
 from rrru.studies.printers.printer_tables import level_of
 
+# the project's, wherever the command is run
+_CONFIG = Path(rrru.__file__).parents[1] / "config.yaml"
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>Delta printers</title>
@@ -36,21 +38,33 @@ def main(arguments=None):
     options = _parser().parse_args(arguments)
     try:
         answers = answers_of(options.files)
-        if options.page:
-            page = Environment(autoescape=True).from_string(_PAGE).render(answers=answers)
-            Path(options.page).write_text(page, encoding="utf-8")
     except RrruError as error:
+        # what an earlier run has left must not look like this one's
+        _write(options.page, [failed("no answer", str(error))])
         sys.exit(f"{type(error).__name__}: {error}")
-    except OSError as error:
-        sys.exit(f"{options.page}: cannot be written ({error.strerror}); allowed: a file in a folder that can be")
+    _write(options.page, answers)
     print("\n\n".join(_text(one) for one in answers))
     if any(not one.settings for one in answers):
         sys.exit(2)
 
 
+def _write(path, answers):
+    """Write the page, if one was asked for."""
+    if path:
+        page = Environment(autoescape=True).from_string(_PAGE).render(answers=answers)
+        try:
+            Path(path).write_text(page, encoding="utf-8")
+        except OSError as error:
+            sys.exit(f"{path}: cannot be written ({error.strerror}); allowed: a file in a folder that can be")
+
+
 def _parser():
     """The command line."""
-    parser = argparse.ArgumentParser(prog="rrru-printer", description="Check the calibration of delta printers.")
+    parser = argparse.ArgumentParser(
+        prog="rrru-printer",
+        description="Check the calibration of delta printers.",
+        epilog=f"Run it in any folder. Its settings are the section printers of {_CONFIG}",
+    )
     told = "Klipper's printer.cfg, or JSON as docs/printers.md describes it"
     parser.add_argument("files", nargs="+", metavar="FILE", help=told)
     parser.add_argument("--page", metavar="FILE.html", help="write the answer into a page, too")
@@ -58,8 +72,15 @@ def _parser():
 
 
 def answers_of(paths):
-    """The Answer for every printer of the files; raises IngestError where none of them can be read."""
-    settings = yaml.safe_load((Path(rrru.__file__).parents[1] / "config.yaml").read_text())["printers"]
+    """The Answer for every printer of the files.
+
+    Raises IngestError where none of them can be read, and ConfigError where the project's settings are not there.
+    """
+    try:
+        settings = yaml.safe_load(_CONFIG.read_text(encoding="utf-8"))["printers"]
+    except OSError as error:
+        allowed = "rrru installed with pip install -e from its project's folder, where the settings stand"
+        raise ConfigError(f"{_CONFIG}: cannot be read ({error.strerror}); allowed: {allowed}") from error
     printers = read_all(paths)
     level = level_of([printer for printer in printers if not isinstance(printer, Refused)], settings)
     return [_answer(printer, settings["stopping_step"], level) for printer in printers]

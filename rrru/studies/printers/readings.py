@@ -56,6 +56,8 @@ def read(path):
         problems.refuse_now(value=error.strerror or str(error), allowed="a file that can be read")
     except (ValueError, RecursionError) as error:
         problems.refuse_now(value=f"no JSON ({error})", allowed="JSON, a list of printers")
+    if isinstance(content, dict):
+        problems.refuse_now(value="one mapping", allowed="a list of printers: put the mapping in [ ]")
     if not (isinstance(content, list) and content and all(isinstance(entry, dict) for entry in content)):
         problems.refuse_now(value="something else", allowed="a list of at least one printer, each a mapping")
     names = [str(entry.get("id", f"number {k}")) for k, entry in enumerate(content, start=1)]

@@ -10,6 +10,7 @@ import pytest
 from rrru.studies.printers import command, printer_fit
 from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
 from rrru.studies.printers.printer_tables import level_of
+from tests.places import ROOT
 from tests.studies.printers.simulated_printers import DISTANCES, ENTRIES, LEVEL, SETTINGS, STEP, simulated
 
 
@@ -56,6 +57,25 @@ def test_a_printer_without_an_answer_is_told_beside_the_others(mine, tmp_path, c
     assert "nowhere.cfg" in code and "No such file" in code and not text
     _, code = told(capsys, mine, "--page", tmp_path / "no" / "page.html")
     assert "cannot be written" in code
+
+
+def test_a_page_of_an_earlier_run_does_not_stay_beside_a_failure(mine, tmp_path, capsys):
+    page = tmp_path / "page.html"
+    assert told(capsys, mine, "--page", page)[1] == 0 and "printer_22" in page.read_text()
+    mine.write_text(json.dumps(ENTRIES["printer_22"]))
+    _, code = told(capsys, mine, "--page", page)
+    text = page.read_text()
+    assert "put the mapping in [ ]" in code and "put the mapping in [ ]" in text and "printer_22" not in text
+
+
+def test_it_runs_in_any_folder_and_says_whose_settings_it_takes(mine, tmp_path, capsys, monkeypatch):
+    (tmp_path / "config.yaml").write_text("printers: {level: 2.0}")
+    here, _ = told(capsys, mine)
+    monkeypatch.chdir(tmp_path)
+    assert told(capsys, mine)[0] == here
+    assert str(ROOT / "config.yaml") in "".join(told(capsys, "--help")[0].split())
+    monkeypatch.setattr(command, "_CONFIG", tmp_path / "nowhere.yaml")
+    assert "nowhere.yaml: cannot be read" in told(capsys, mine)[1]
 
 
 def test_one_reading_1_mm_off_among_eleven_good_ones_is_suspicious_and_good_ones_are_not():

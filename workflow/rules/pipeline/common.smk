@@ -2,6 +2,7 @@ import hashlib
 from pathlib import Path
 
 import rrru.report
+from rrru.errors import ConfigError
 from rrru.objects import module_file
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
@@ -170,6 +171,8 @@ def optional_digests(_):
 def campaign_page(wildcards):
     """All that the page of one campaign shows."""
     name = wildcards.campaign
+    if name not in DIAGNOSED:
+        raise ConfigError(f"there is no campaign {name!r}; allowed: {', '.join(DIAGNOSED)}")
     calibrated = name in CAMPAIGNS
     tables = [*GAP_TABLES, *(CAMPAIGN_TABLES if calibrated else [])]
     own = drawn(CAMPAIGN_FIGURES, "figures" if name == REPRODUCED else f"figures/{name}") if calibrated else {}

@@ -23,8 +23,6 @@ use rule report as campaign_report with:
         report=f"{RESULTS}/campaigns/{{campaign}}/report.html",
     log:
         f"{RESULTS}/logs/report/{{campaign}}.log",
-    wildcard_constraints:
-        campaign="|".join(DIAGNOSED),
     params:
         settings=lambda wildcards: {
             "results": RESULTS,
