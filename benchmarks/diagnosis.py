@@ -1,8 +1,8 @@
 """Diagnoses: seconds and memory by the number of points, and of many campaigns one after the other.
 
 Points: the same drawn robots of the withheld check on its short campaign (222 points), on its full one (732) and on the
-full one with more points a path (5,008), each size in a process of its own. Campaigns: ten small ones again and again in
-one process.
+full one with more points a path (5,008), each size in a process of its own. Campaigns: ten small ones again and again
+in one process.
 """
 
 import json

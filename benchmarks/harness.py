@@ -30,7 +30,8 @@ peer                   str    who did it
 size                   int    how large the task is: points, poses, robots, individuals or campaigns, as the task says
 seconds                float? median; of a pose, a run, a fit or a campaign, as the task says; null where the peer could
     not be installed or did not reach the goal
-ratio                  float? median of the peer's seconds over this package's, of pairs made in turns; null with seconds
+ratio                  float? median of the peer's seconds over this package's, of pairs made in turns; null with the
+    seconds
 low                    float? lower quartile of the ratio
 high                   float? upper quartile of the ratio
 evaluations            float? median evaluations of the objective, of searches

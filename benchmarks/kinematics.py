@@ -52,7 +52,7 @@ def _behind(a, alpha, d, theta):
 
 
 class Arm:
-    """Every library's arm of the same rows; each method takes q (n, 6) to places (n, 3) in m and Jacobians (n, 6, 6)."""
+    """Every library's arm of the same rows: each method takes q (n, 6) to places (n, 3) in m, Jacobians (n, 6, 6)."""
 
     def __init__(self):
         self.rows, self.robot = _rows(), ur10()
@@ -87,12 +87,12 @@ class Arm:
         return _with_jacobian(frame[:, :3, 3], np.stack(axes, axis=1), np.stack(places, axis=1))
 
     def by_toolbox(self, q):
-        """roboticstoolbox: its compiled elementary transforms, poses at once, Jacobians in a loop."""
+        """The toolbox: its compiled elementary transforms, poses at once, Jacobians in a loop."""
         poses = self.ets.eval(q)
         return poses[:, :3, 3], np.array([self.ets.jacob0(one) for one in q])
 
     def by_pybotics(self, q):
-        """pybotics in a loop."""
+        """The link matrices of pybotics, in a loop."""
         pairs = [(self.pybotics.fk(one)[:3, 3], self.pybotics.jacobian_world(one)) for one in q]
         return tuple(map(np.array, zip(*pairs, strict=True)))
 

@@ -1,8 +1,8 @@
 """Calibrations by least squares: SciPy with finite differences, and here with the analytic Jacobian.
 
-Tasks: the 3-RRRU on paper A's seven lines (182 points, 7 parameters), a UR10 and a hexapod (100 points, all numbers that
-the points tell). Both are told the same forward kinematics, so that the difference is the slopes; the first robot also
-has what a user would have without this package, fsolve or NumPy. Seconds of one fit.
+Tasks: the 3-RRRU on paper A's seven lines (182 points, 7 parameters), a UR10 and a hexapod (100 points, all numbers
+that the points tell). Both are told the same forward kinematics, so that the difference is the slopes; the first robot
+also has what a user would have without this package, fsolve or NumPy. Seconds of one fit.
 """
 
 import numpy as np

@@ -148,7 +148,9 @@ def two_cores():
     names = {"wall": "one after the other, by the clock", "process": "one after the other, by seconds on a core"}
     spent = float(np.median(seconds))
     first = [task.row(harness.OURS, spent, [1.0])]
-    return first + [task.row(names[clock], spent * np.median(of), of, note=notes[clock]) for clock, of in ratios.items()]
+    return first + [
+        task.row(names[clock], spent * np.median(of), of, note=notes[clock]) for clock, of in ratios.items()
+    ]
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ _BEGIN, _END = "<!-- measured -->\n", "<!-- end of what was measured -->\n"
 _ROW_MM, _TITLE_ROWS, _AROUND_MM = 4.3, 1.5, 16.0
 # what is told of growth and overheads is in the table
 _NOT_DRAWN = ("diagnosis", "workflow")
+_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
 
 
 def tell(frame):
@@ -38,13 +39,14 @@ def _cpuinfo():
 
 def table(frame):
     """The table as Markdown."""
-    rows = ["| task | size | who | seconds | ratio | quartiles | beside |", "| --- | --- | --- | --- | --- | --- | --- |"]
+    head = "| task | size | who | time | ratio | quartiles | beside |"
+    rows = [head, "| --- | --- | --- | --- | --- | --- | --- |"]
     for row in frame.itertuples():
         spread = "" if np.isnan(row.ratio) or row.low == row.high else f"{_short(row.low)} to {_short(row.high)}"
         beside = [f"{row.evaluations:,.0f} evaluations"] if row.evaluations > 0 else []
         beside += [f"{row.memory_mib:.0f} MiB"] if row.memory_mib > 0 else []
         beside += [row.note] if row.note else []
-        cells = row.what, f"{row.size:,}", row.peer, _short(row.seconds), _short(row.ratio), spread, "; ".join(beside)
+        cells = row.what, f"{row.size:,}", row.peer, _time(row.seconds), _short(row.ratio), spread, "; ".join(beside)
         rows.append("| " + " | ".join(cells) + " |")
     return "\n".join(rows)
 
@@ -54,6 +56,14 @@ def _short(number):
     if np.isnan(number):
         return ""
     return f"{number:,.0f}" if number >= 1000.0 else f"{number:.3g}"
+
+
+def _time(seconds):
+    """Seconds in a unit that makes them readable."""
+    if np.isnan(seconds):
+        return ""
+    size, unit = next((pair for pair in _UNITS if seconds >= pair[0]), _UNITS[-1])
+    return f"{_short(seconds / size)} {unit}"
 
 
 @style.printed
@@ -84,8 +94,15 @@ def _panel(axes, rows, task):
         bars = {"fmt": "o" if faster else "s", "color": color, "ecolor": style.BLACK, "capsize": 2.0}
         axes.errorbar(middle[own], place[own], xerr=spread[:, own], elinewidth=0.7, **bars)
     for row, at in zip(middle, place, strict=True):
-        axes.annotate(_short(row), (1.0, at), xycoords=("axes fraction", "data"), xytext=(4, 0),
-                      textcoords="offset points", va="center", fontsize=7.0)
+        axes.annotate(
+            _short(row),
+            (1.0, at),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.0,
+        )
     axes.set_xscale("log")
     style.plain_log(axes.xaxis)
     axes.set_yticks(place, rows["peer"])

@@ -13,8 +13,8 @@ from benchmarks.harness import Call
 from rrru.robots.compiled import fma
 
 LIMIT = "limit: its arithmetic at this core's rates"
-# a leg's closure: 12 multiply-adds, 9 products and sums, a root; the three equations: 19 and 20, a division; before them
-# 24 multiply-adds make the start, after them 2, 5 and a root the distance
+# a leg's closure: 12 multiply-adds, 9 products and sums, a root; the three equations: 19 and 20, a division; before
+# them 24 multiply-adds make the start, after them 2, 5 and a root the distance
 _STEPS, _LEGS = 2, 3
 _SIMPLE = (24 + _STEPS * (_LEGS * 12 + 19) + 2) + (_STEPS * (_LEGS * 9 + 20) + 5)
 _ROOTS, _DIVISIONS = _STEPS * _LEGS + 1, _STEPS

@@ -1,8 +1,8 @@
 """The workflow: seconds inside of its rules against seconds around them.
 
-Runs of the target `gap` with `tests/minimal.yaml` on one core, each in a folder of its own. Inside is from a job's start to
-its end, Python's start and imports included, as Snakemake records it; around is the rest of the run by the clock:
-planning, checks of the configuration, and what Snakemake does between two jobs.
+Runs of the target `gap` with `tests/minimal.yaml` on one core, each in a folder of its own. Inside is from a job's
+start to its end, Python's start and imports included, as Snakemake records it; around is the rest of the run by the
+clock: planning, checks of the configuration, and what Snakemake does between two jobs.
 """
 
 import json
