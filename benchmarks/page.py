@@ -14,7 +14,7 @@ _BEGIN, _END = "<!-- measured -->\n", "<!-- end of what was measured -->\n"
 _ROW_MM, _TITLE_ROWS, _AROUND_MM = 4.3, 1.5, 16.0
 # what is told of growth and overheads is in the table
 _NOT_DRAWN = ("diagnosis", "workflow")
-_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
+_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 
 def tell(frame):
