@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN = .venv/bin
 
-.PHONY: results report compare check-data test lint lock
+.PHONY: results report compare check-data test bench lint lock
 
 results: .venv/ready
 	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
@@ -27,6 +27,10 @@ check-data: .venv/ready
 test: .venv/ready
 	$(BIN)/python -m pytest
 
+# beside what a user would use instead, docs/benchmarks.md: make bench [GROUPS="objective genetic"]
+bench: .venv-bench/ready
+	.venv-bench/bin/python -m benchmarks $(GROUPS)
+
 lint: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -41,6 +45,15 @@ lint: .venv/ready
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $@
 
-# needs uv; run after changing requirements.in
+# the lock names all that is needed; that pybotics asks for an older NumPy is overridden there
+.venv-bench/ready: benchmarks/requirements.lock pyproject.toml
+	$(PYTHON) -m venv .venv-bench
+	.venv-bench/bin/python -m pip install --quiet --no-deps --require-hashes -r benchmarks/requirements.lock
+	.venv-bench/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $@
+
+# needs uv; run after changing a requirements.in
+COMPILE = uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate
 lock:
-	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate requirements.in -o requirements.lock
+	$(COMPILE) requirements.in -o requirements.lock
+	$(COMPILE) benchmarks/requirements.in --override benchmarks/overrides.txt -o benchmarks/requirements.lock

@@ -1,79 +1,121 @@
-"""Seconds and right answers of the gap diagnosis, beside what one would do instead: linear signatures of single effects
-and the BIC.
+"""Diagnoses: seconds and memory by the number of points, and of many campaigns one after the other.
 
-`.venv/bin/python benchmarks/diagnosis.py` on robots of the withheld check, one after another in one run on one core.
+Points: the same drawn robots of the withheld check on its short campaign (222 points), on its full one (732) and on the
+full one with more points a path (5,008), each size in a process of its own. Campaigns: ten small ones again and again
+in one process.
 """
 
+import json
+import subprocess
 import sys
-from time import perf_counter
+from dataclasses import replace
+from time import process_time
 
 import numpy as np
+import yaml
 
-from rrru.gap.attribute import calibrate
-from rrru.gap.case import make_case
-from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
+from benchmarks import harness
+from benchmarks.harness import RESULTS, Task
+from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
+from rrru.studies import config as parts
 from rrru.studies.withheld.chunks import Member
 from rrru.studies.withheld.draw import draw
 from rrru.studies.withheld.robots import Conditions
 
-_SETTINGS = {
-    "seed": 2021,
-    "robot": {"name": "rrru3", "dimensions": {}},
-    "masses": {},
-    "motion": {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0},
-    "withheld": {"noise_mm": 0.02},
-}
+# kind of campaign, points of a line and of the spiral
+SIZES = {222: ("paper", 26, 40), 732: ("full", 26, 40), 5008: ("full", 178, 273)}
+_ROBOTS, _CAMPAIGNS, _GROUP = (1, 2, 4, 5, 6), (10, 100, 1000), 10
+# of the many: few points and one cause, so that a thousand take minutes
+_SHORT, _FEW = ("line_1", "spiral"), ("backlash",)
+_BY_POINTS = "ratio: seconds a point over those of the same robot at 222 points"
+_BY_CAMPAIGNS = "ratio: seconds a campaign over those of the first ten; 66 points, one cause"
 
 
-def plain(measurements, conditions, settings):
-    """Name of the effect of lowest BIC, none or unexplained: columns of single effects beside the calibration."""
-    noise_mm = conditions.noise_mm
-    case = make_case(measurements, sim(conditions.mechanism), conditions.masses, noise_mm, settings.library())
-    linear = case.linearise(calibrate(case))
-    data, base = linear.data.ravel() / noise_mm, linear.base.reshape(-1, 7) / noise_mm
-    found = {}
-    for (name, _), columns in {("none", 0): np.zeros((*base.shape[:1], 0)), **linear.columns}.items():
-        design = np.concatenate([base, columns.reshape(len(data), -1) / noise_mm], axis=1)
-        misfit = float(((data - design @ np.linalg.lstsq(design, data, rcond=None)[0]) ** 2).sum())
-        found[name] = min(found.get(name, (np.inf, 0.0)), (misfit + design.shape[1] * np.log(len(data)), misfit))
-    best = min(found, key=found.get)
-    too_much = found[best][1] > len(data) + 5.0 * np.sqrt(2.0 * len(data))
-    return "unexplained" if too_much else best
+def known():
+    """Conditions of the withheld check, and settings of the diagnosis, as configured."""
+    config = yaml.safe_load((RESULTS.parent / "config.yaml").read_text())
+    own = {"robot": {"name": "rrru3", "dimensions": config["robots"]["rrru3"]}, "masses": parts.masses(config, {})}
+    keys = ("seed", "motion", "withheld")
+    settings = GapSettings.from_config(config["gap"], config["seed"])
+    return Conditions.from_config(own | {key: config[key] for key in keys}), settings
 
 
-def main(count=40):
-    """Print a line per robot and the sums."""
-    conditions, settings = Conditions.from_config(_SETTINGS), GapSettings()
-    known = MeasuredRobot(conditions.mechanism, conditions.masses, conditions.noise_mm)
-    seconds, right = {"here": [], "plain": []}, {"here": 0, "plain": 0}
-    for number in range(count):
-        robot = draw(Member("label", "", number), conditions)
-        (measurements, _), truth = robot.campaign(conditions).run(), robot.truth
-        answers = {}
-        for name, method in (
-            ("here", lambda m: diagnose(m, known, settings).verdict["effects"]),
-            ("plain", lambda m: plain(m, conditions, settings)),
-        ):
-            start = perf_counter()
-            answers[name] = method(measurements)
-            if number:
-                seconds[name].append((len(measurements), perf_counter() - start))
-            same = set(answers[name].split("+")) == set(truth.split("+"))
-            right[name] += same or (truth.startswith("outside") and "unexplained" in answers[name])
-        print(
-            f"{len(measurements):4d} points  {truth:45s} here: {answers['here']:45s} plain: {answers['plain']}",
-            flush=True,
-        )
-    for name, times in seconds.items():
-        print(f"{name}: right {right[name]} of {count}")
-        for size, chosen in (
-            ("up to 400 points", [t for n, t in times if n <= 400]),
-            ("more", [t for n, t in times if n > 400]),
-        ):
-            if chosen:
-                print(f"  {size}: median {np.median(chosen):.2f} s, longest {max(chosen):.2f} s")
+def measured(number, conditions, size=None):
+    """Measurements of a robot of the check, on its own campaign or on one of a size."""
+    robot = draw(Member("label", "", number), conditions)
+    if size:
+        kind, line, spiral = SIZES[size]
+        paths = robot.trajectories
+        paths = paths | {"lines": paths["lines"] | {"points": line}, "spiral": paths["spiral"] | {"points": spiral}}
+        robot = replace(robot, kind=kind, trajectories=paths)
+    return robot.measured(conditions)
+
+
+def spent(measurements, conditions, settings):
+    """Seconds of a diagnosis."""
+    robot = MeasuredRobot(conditions.mechanism, conditions.masses, conditions.noise_mm)
+    start = process_time()
+    diagnose(measurements, robot, settings)
+    return process_time() - start
+
+
+def of_size(size):
+    """Seconds of all robots at a size and the process' memory."""
+    conditions, settings = known()
+    spent(measured(0, conditions, 222), conditions, settings)
+    seconds = []
+    for number in _ROBOTS:
+        measurements = measured(number, conditions, size)
+        assert len(measurements) == size
+        seconds.append(spent(measurements, conditions, settings))
+    return {"seconds": seconds, "memory_mib": harness.peak_mib()}
+
+
+def of_many(count):
+    """Mean seconds of every ten of so many short campaigns, the same ten again and again, and memory after each ten."""
+    conditions, settings = known()
+    settings, tables = replace(settings, effects=_FEW), []
+    for number in range(_GROUP):
+        table = measured(number, conditions, 222)
+        tables.append(table[table["trajectory"].isin(_SHORT)].reset_index(drop=True))
+    seconds, memory = [], []
+    for _ in range(count // _GROUP + 1):
+        seconds.append(float(np.mean([spent(table, conditions, settings) for table in tables])))
+        memory.append(harness.peak_mib())
+    # the first ten also load what is compiled
+    return {"seconds": seconds[1:], "memory_mib": memory[1:]}
+
+
+def apart(what, size):
+    """What one of the two functions above tells in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks.diagnosis", what, str(size)]
+    told = subprocess.run(command, cwd=RESULTS.parent, check=True, capture_output=True, text=True)
+    return json.loads(told.stdout.splitlines()[-1])
+
+
+def rows():
+    """Rows of the group."""
+    result, first = [], None
+    for size in SIZES:
+        found = apart("size", size)
+        each = np.array(found["seconds"]) / size
+        first = each if first is None else first
+        task, median = Task("diagnosis", "diagnosis by points", size), float(np.median(found["seconds"]))
+        result.append(task.row(harness.OURS, median, each / first, memory_mib=found["memory_mib"], note=_BY_POINTS))
+    found = apart("many", max(_CAMPAIGNS))
+    for count in _CAMPAIGNS:
+        # the second half of the campaigns so far
+        groups = count // _GROUP
+        seconds = np.array(found["seconds"][groups // 2 : groups])
+        task, memory = Task("diagnosis", "diagnosis by campaigns", count), found["memory_mib"][groups - 1]
+        ratios = seconds / found["seconds"][0]
+        result.append(task.row(harness.OURS, np.median(seconds), ratios, memory_mib=memory, note=_BY_CAMPAIGNS))
+    return result
 
 
 if __name__ == "__main__":
-    main(*(int(text) for text in sys.argv[1:]))
+    if len(sys.argv) == 3:
+        print(json.dumps({"size": of_size, "many": of_many}[sys.argv[1]](int(sys.argv[2]))))
+    else:
+        harness.keep("diagnosis", rows())

@@ -1,36 +1,49 @@
-"""Pose solves per second of the calibration's objective, beside a loop over scipy.optimize.fsolve, in one run on one
-core.
+"""Pose solves of the calibration's objective: a loop over fsolve, NumPy, the compiled kernel, and the limit of this
+core's arithmetic.
 
-`.venv/bin/python benchmarks/objective.py`
+Task: mean distance of a population of 30 over paper A's seven lines, 182 points, 8 parameters; seconds a pose.
 """
 
-from time import perf_counter
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from os import cpu_count, getloadavg
+from time import perf_counter, process_time
 
 import numpy as np
 from scipy.optimize import fsolve
 
+from benchmarks import harness, rates
+from benchmarks.harness import Call, Task
 from rrru.campaign.trajectories import line_groups, sample
 from rrru.fit.residuals import Residuals
 from rrru.robots.rrru3 import Rrru3
 
-_POPULATION = 30
+POPULATION, SIDES_MM = 30, (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5)
+TABLE_5 = {"dtheta1": 0.0012, "dtheta2": -0.0003, "dtheta3": 0.0003}
+TABLE_5 |= {"dL1": 0.3092, "dL2": 0.2405, "dL3": -0.1761, "dR": -1.209, "dr": 0.8865}
+# the solutions of all have to be as near
+_SAME_MM, _LAST_STEP_MM2 = 1e-8, 1e-8
+_LOOPS, _WORKERS = 4000, 2
 
 
-def _campaign():
-    """182 points of seven lines under errors like Table 5's, tied model."""
-    robot = Rrru3(parameter_set="tied")
-    lines = line_groups((-800.0, 0.0, 600.0), (-300.0, 0.0, 600.0), (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5), 26)
+def campaign(sides_mm=SIDES_MM, parameter_set="tied", noise_mm=0.3):
+    """Residuals of lines at the given y, measured under Table 5's errors and noise."""
+    robot = Rrru3(parameter_set=parameter_set)
+    lines = line_groups((-800.0, 0.0, 600.0), (-300.0, 0.0, 600.0), sides_mm, 26)
     points = np.concatenate([sample(line) for line in lines])
-    theta = robot.require_reachable(points)
-    truth = robot.parameters.vector({"dtheta1": 0.0012, "dL1": 0.3, "dL2": 0.24, "dr": 2.1})
-    return Residuals(robot, theta, robot.forward(theta, truth, points), points)
+    theta, real = robot.require_reachable(points), Rrru3(parameter_set="tied")
+    measured = real.forward(theta, real.parameters.vector(TABLE_5), points)
+    return Residuals(robot, theta, measured + np.random.default_rng(0).normal(0.0, noise_mm, measured.shape), points)
 
 
-def _fsolve_rate(residuals, deviations, count):
-    """Pose solves per second of fsolve on eq. (8), written out in plain numpy as a user would, and the positions
-    (count, 3).
-    """
-    legs, (cx, cy) = residuals.mechanism.legs(deviations), residuals.mechanism.azimuth_cos_sin
+def population(count=POPULATION):
+    """Deviations (count, 8) of a usual size."""
+    return np.random.default_rng(0).uniform(-1.0, 1.0, (count, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
+
+
+def by_fsolve(residuals, deviations):
+    """Positions (n, 3) under deviations (p,) by scipy's fsolve on eq. (8), a point after the other."""
+    legs, (cx, cy) = residuals.mechanism.numbers(deviations), residuals.mechanism.azimuth_cos_sin
 
     def closure(p, theta):
         u, v = p[0] * cx + p[1] * cy, p[1] * cx - p[0] * cy
@@ -39,33 +52,106 @@ def _fsolve_rate(residuals, deviations, count):
         z = p[2] - legs[:, 1] * np.sin(angle)
         return x * x + z * z - (legs[:, 2] + np.sqrt(legs[:, 3] ** 2 - v * v)) ** 2
 
-    start = perf_counter()
-    positions = [
-        fsolve(closure, g, args=(t,))
-        for t, g in zip(residuals.actuators[:count], residuals.start_mm[:count], strict=True)
+    pairs = zip(residuals.actuators, residuals.start_mm, strict=True)
+    return np.array([fsolve(closure, start, args=(theta,)) for theta, start in pairs])
+
+
+def mean_by_fsolve(residuals, deviations):
+    """The objective of one individual (p,) with `by_fsolve` inside."""
+    return float(np.linalg.norm(by_fsolve(residuals, deviations) - residuals.measured_mm, axis=1).mean())
+
+
+class Batch:
+    """The objective in NumPy, whole population at once: the kernel's algorithm, one array operation a term."""
+
+    def __init__(self, residuals):
+        self.residuals, robot = residuals, residuals.mechanism
+        self.robot, self.start = robot, residuals.nominal_mm
+        self.slope = robot.parameter_jacobian(self.start, residuals.actuators).reshape(-1, len(robot.parameters)).T
+
+    def __call__(self, deviations):
+        """Mean distances (m,)."""
+        return np.linalg.norm(self.positions(deviations) - self.residuals.measured_mm, axis=-1).mean(axis=1)
+
+    def positions(self, deviations):
+        """Positions (m, n, 3) in mm."""
+        position = self.start + (deviations @ self.slope).reshape(len(deviations), -1, 3)
+        legs, (cx, cy) = self.robot.numbers(deviations)[:, None], self.robot.azimuth_cos_sin
+        angle = self.residuals.actuators + legs[..., 0]
+        foot, height = legs[..., 4] - legs[..., 1] * np.cos(angle), legs[..., 1] * np.sin(angle)
+        longest = np.inf
+        while longest > _LAST_STEP_MM2:
+            x, y, z = (position[..., axis, None] for axis in range(3))
+            v, big_x, big_z = cx * y - cy * x, cx * x + cy * y + foot, z - height
+            s = np.sqrt(legs[..., 3] ** 2 - v * v)
+            rho = legs[..., 2] + s
+            side, closure = rho * v / s, 0.5 * (big_x**2 + big_z**2 - rho**2)
+            step = _solved(big_x * cx - side * cy, big_x * cy + side * cx, big_z, -closure)
+            position = position + step
+            longest = (step**2).sum(axis=-1).max()
+        return position
+
+
+def _solved(x, y, z, right):
+    """Solutions (.., 3) of three equations x a + y b + z c = right each, all (.., 3 equations), by Cramer's rule."""
+
+    def across(a, b):
+        return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
+
+    yz = across(y, z)
+    parts = [(right * yz).sum(axis=-1), (right * across(z, x)).sum(axis=-1), (right * across(x, y)).sum(axis=-1)]
+    return np.stack(parts, axis=-1) / (x * yz).sum(axis=-1)[..., None]
+
+
+def rows():
+    """Rows of the group."""
+    residuals, deviations = campaign(), population()
+    kernel, batch = residuals.mean_distance, Batch(residuals)
+    assert np.abs(by_fsolve(residuals, deviations[0]) - residuals.model(deviations[0])).max() < 1e-6
+    assert abs(mean_by_fsolve(residuals, deviations[0]) - kernel(deviations)[0]) < 1e-6
+    assert np.abs(batch(deviations) - kernel(deviations)).max() < _SAME_MM
+    poses = len(deviations) * len(residuals)
+    task = Task("objective", "a pose of the objective, 30 individuals x 182 points", poses)
+    peers = {
+        "SciPy fsolve, a loop over points": Call(lambda: by_fsolve(residuals, deviations[0]), len(residuals)),
+        "NumPy, whole population at once": Call(lambda: batch(deviations), poses),
+    }
+    own = Call(lambda: kernel(deviations), poses)
+    peers[rates.LIMIT] = rates.limit_call(len(residuals))
+    return [*task.in_turns(own, peers, notes={rates.LIMIT: rates.in_words()}), *two_cores()]
+
+
+def _work(_=0):
+    """Evaluate the objective for a while; when it began and ended, and seconds of this process."""
+    kernel, deviations = campaign().mean_distance, population()
+    kernel(deviations)
+    start, spent = perf_counter(), process_time()
+    for _ in range(_LOOPS):
+        kernel(deviations)
+    return start, perf_counter(), process_time() - spent
+
+
+def two_cores():
+    """Rows of the same work in two processes at once: how often faster than one after the other."""
+    ratios, seconds = {"wall": [], "process": []}, []
+    with ProcessPoolExecutor(_WORKERS, mp_context=get_context("spawn")) as pool:
+        list(pool.map(_work, range(_WORKERS)))
+        for _ in range(9):
+            single = np.array([pool.submit(_work).result() for _ in range(_WORKERS)])
+            both = np.array(list(pool.map(_work, range(_WORKERS))))
+            wall = both[:, 1].max() - both[:, 0].min()
+            ratios["wall"].append((single[:, 1] - single[:, 0]).sum() / wall)
+            ratios["process"].append(single[:, 2].sum() / both[:, 2].max())
+            seconds.append(wall / (_WORKERS * _LOOPS * POPULATION * 182))
+    task = Task("objective", "a pose of the objective, two processes at once", POPULATION * 182)
+    notes = {"wall": f"load {getloadavg()[0]:.0f} on {cpu_count()} cores", "process": "goal: 1.9"}
+    names = {"wall": "one after the other, by the clock", "process": "one after the other, by seconds on a core"}
+    spent = float(np.median(seconds))
+    first = [task.row(harness.OURS, spent, [1.0])]
+    return first + [
+        task.row(names[clock], spent * np.median(of), of, note=notes[clock]) for clock, of in ratios.items()
     ]
-    return count / (perf_counter() - start), np.array(positions)
-
-
-def main():
-    """Print both rates and their ratio, several rounds side by side."""
-    residuals = _campaign()
-    generator = np.random.default_rng(0)
-    deviations = generator.uniform(-1.0, 1.0, (_POPULATION, 8)) * np.r_[[0.005] * 3, [1.0] * 5]
-    residuals.mean_distance(deviations)
-    for _ in range(5):
-        repeats = 200
-        start = perf_counter()
-        for _ in range(repeats):
-            residuals.mean_distance(deviations)
-        ours = repeats * _POPULATION * len(residuals) / (perf_counter() - start)
-        theirs, positions = _fsolve_rate(residuals, deviations[0], len(residuals))
-        apart = np.abs(positions - residuals.model(deviations[0])).max()
-        print(
-            f"objective {ours:.3g} pose solves/s, fsolve {theirs:.3g}, ratio {ours / theirs:.0f}, "
-            f"positions apart {apart:.1e} mm"
-        )
 
 
 if __name__ == "__main__":
-    main()
+    harness.keep("objective", rows())

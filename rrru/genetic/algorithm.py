@@ -1,6 +1,7 @@
 """The paper's genetic algorithm: MATLAB's `ga` step by step, in blocks of generations that run compiled.
 
-PyGAD's own algorithm, another reading of the paper, is in `pygad_run`; `minimise` calls what the settings name.
+PyGAD's own algorithm, another reading of the paper, is in `pygad_run`, an evolution strategy in `cma_es`; `minimise`
+calls what the settings name.
 """
 
 from numbers import Integral
@@ -8,7 +9,7 @@ from numbers import Integral
 import numpy as np
 
 from rrru.errors import ConfigError, FitError
-from rrru.genetic import operators, pygad_run
+from rrru.genetic import cma_es, operators, pygad_run
 from rrru.genetic.islands import migrate
 from rrru.genetic.plan import Box, directions, make_rules, migrants_of, mutants_of, mutation_sigma, uniforms_needed
 from rrru.genetic.result import GeneticResult, means
@@ -34,8 +35,9 @@ def minimise(objective, low, high, settings, seed):
         raise ConfigError(f"bounds are {low} and {high}; allowed: two vectors of one length, finite, low < high")
     if not is_number(seed, Integral) or not 0 <= seed < 2**32:
         raise ConfigError(f"seed is {seed!r}; allowed: a whole number in 0..{2**32 - 1}")
-    if settings.operators == "pygad":
-        return pygad_run.run(checked(objective), Box(low, high), settings, int(seed))
+    for name, other in (("pygad", pygad_run), ("cma_es", cma_es)):
+        if settings.operators == name:
+            return other.run(checked(objective), Box(low, high), settings, int(seed))
     return _Run(objective, Box(low, high), settings, np.random.default_rng(seed)).result()
 
 

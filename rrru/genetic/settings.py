@@ -8,8 +8,9 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.genetic.plan import elite_count
 
-# readings of the paper: MATLAB's step with its Gaussian or its adaptive feasible mutation, and PyGAD's own operators
-OPERATORS = ("matlab_gaussian", "matlab_adaptive", "pygad")
+# readings of the paper: MATLAB's step with its Gaussian or its adaptive feasible mutation, and PyGAD's own operators;
+# and what finds the same with a fraction of the evaluations
+OPERATORS = ("matlab_gaussian", "matlab_adaptive", "pygad", "cma_es")
 _ALLOWED = {
     "crossover_fraction": (Real, 0.0, 1.0, "0 to 1"),
     "migration_fraction": (Real, 0.0, 1.0, "0 to 1"),
@@ -25,10 +26,10 @@ _ALLOWED = {
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """Settings of one run, named as MATLAB's; see `operators`, `plan` and `pygad_run` for what each does.
+    """Settings of one run, named as MATLAB's; see `operators`, `plan`, `pygad_run` and `cma_es` for what each does.
 
     operators: one of OPERATORS; "pygad" takes of the others only the crossover fraction, as its crossover probability,
-    and those of islands, generations and stalling.
+    and those of islands, generations and stalling; "cma_es" only the whole population, generations and stalling.
     crossover_fraction: P_c, share of the non-elite children made by crossover, the rest by mutation.
     migration_fraction: P_m, share of the smaller island that migrates every `migration_interval` generations.
     populations: sizes of the islands. elite_share: elites per island are ceil(share size). stall_generations,

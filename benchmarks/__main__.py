@@ -1,0 +1,28 @@
+"""All groups, each in a process of its own; then the table, the figure and the page: `make bench`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from benchmarks import harness, page
+from rrru.store import tables
+
+GROUPS = ("objective", "genetic", "least_squares", "kinematics", "sysid", "diagnosis", "workflow")
+
+
+def main(groups):
+    """Measure groups, by default all, and tell them with what was measured before of the others."""
+    if unknown := set(groups) - set(GROUPS):
+        sys.exit(f"no group {unknown.pop()!r}; allowed: {', '.join(GROUPS)}")
+    here = Path(__file__).parent
+    for group in groups or [name for name in GROUPS if (here / f"{name}.py").exists()]:
+        print(f"{group} ..", flush=True)
+        subprocess.run([sys.executable, "-m", f"benchmarks.{group}"], cwd=here.parent, check=True)
+    parts = [path for path in map(harness.part, GROUPS) if path.exists()]
+    whole = harness.RESULTS / harness.TABLE.path
+    tables.gather(parts, whole)
+    page.tell(tables.read(whole))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

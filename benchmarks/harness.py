@@ -1,0 +1,123 @@
+"""Seconds of calls made in turns in one process, and the table that they go into.
+
+The machine's speed changes from second to second, so that a figure is a ratio of two calls made one right after the
+other, and what is told of many such pairs is their median and quartiles (as pytest-benchmark does; pyperf and asv
+compare runs that lie minutes apart). Calls shorter than `_SHORTEST_S` are repeated within a pair (as timeit does).
+"""
+
+import resource
+import statistics
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+import pandas as pd
+
+from rrru.store import tables
+from rrru.store.schema import read_tables
+
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+OURS = "rrru"
+TABLE = read_tables("""
+## benchmarks | tables/benchmarks.parquet | what peer size
+Seconds of this package beside what a user would use instead, from `make bench`.
+--
+group                  str    the script of benchmarks/ that measured it
+what                   str    the task
+peer                   str    who did it
+size                   int    how large the task is: points, poses, robots, individuals or campaigns, as the task says
+seconds                float? median; of a pose, a run, a fit or a campaign, as the task says; null where the peer could
+    not be installed or did not reach the goal
+ratio                  float? median of the peer's seconds over this package's, of pairs made in turns; null with the
+    seconds
+low                    float? lower quartile of the ratio
+high                   float? upper quartile of the ratio
+evaluations            float? median evaluations of the objective, of searches
+memory_mib             float? most memory of the process, where it was measured
+note                   str    what a reader has to know; empty for nothing
+""")[0]
+
+_SHORTEST_S, _ROUNDS, _LEAST_ROUNDS = 0.02, 15, 3
+
+
+@dataclass(frozen=True)
+class Call:
+    """What is timed: a function, and how many of the units that seconds are told for it does at once."""
+
+    function: Callable
+    units: int = 1
+
+    def seconds(self, clock, loops):
+        """Seconds a unit."""
+        start = clock()
+        for _ in range(loops):
+            self.function()
+        return (clock() - start) / (loops * self.units)
+
+    def loops(self, clock):
+        """How often it has to be called to last long enough, after a first call that may compile."""
+        self.function()
+        loops = 1
+        while (spent := self.seconds(clock, loops) * loops * self.units) < _SHORTEST_S:
+            loops = max(2 * loops, int(loops * _SHORTEST_S / max(spent, 1e-9)))
+        return loops
+
+
+@dataclass(frozen=True)
+class Task:
+    """Group, what is done and its size: what the rows of one task share."""
+
+    group: str
+    what: str
+    size: int
+
+    def row(self, peer, seconds=None, ratios=(), **more):
+        """The row of a peer: median seconds, median and quartiles of its ratios."""
+        low, ratio, high = np.quantile(ratios, [0.25, 0.5, 0.75]) if len(ratios) else [None] * 3
+        spent = {"seconds": seconds, "ratio": ratio, "low": low, "high": high}
+        others = {"evaluations": None, "memory_mib": None, "note": ""}
+        return {"group": self.group, "what": self.what, "size": self.size, "peer": peer} | spent | others | more
+
+    def in_turns(self, ours, peers, budget_s=40.0, clock=process_time, notes=None):
+        """Rows of Calls: `peers` by name, each followed by `ours` in every round.
+
+        The clock counts seconds of this process, so that what else runs on the machine counts little. Rounds end with
+        the budget, three are made in any case.
+        """
+        notes, started = notes or {}, perf_counter()
+        own_loops, loops = ours.loops(clock), {name: call.loops(clock) for name, call in peers.items()}
+        own, theirs = {name: [] for name in peers}, {name: [] for name in peers}
+        for done in range(_ROUNDS):
+            if done >= _LEAST_ROUNDS and perf_counter() - started > budget_s:
+                break
+            for name, call in peers.items():
+                theirs[name].append(call.seconds(clock, loops[name]))
+                own[name].append(ours.seconds(clock, own_loops))
+        every = [second for seconds in own.values() for second in seconds]
+        rows = [self.row(OURS, statistics.median(every), [1.0], note=notes.get(OURS, ""))]
+        for name in peers:
+            ratios = np.divide(theirs[name], own[name])
+            rows.append(self.row(name, statistics.median(theirs[name]), ratios, note=notes.get(name, "")))
+        return rows
+
+
+def peak_mib():
+    """Most memory that this process has had."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+
+def part(group):
+    """Where a group's rows are kept."""
+    return RESULTS / "benchmarks" / f"{group}.parquet"
+
+
+def keep(group, rows):
+    """Write a group's rows and print them."""
+    frame = pd.DataFrame(rows)
+    numbers = ["seconds", "ratio", "low", "high", "evaluations", "memory_mib"]
+    frame = frame.astype(dict.fromkeys(numbers, float))
+    part(group).parent.mkdir(parents=True, exist_ok=True)
+    tables.write(TABLE, frame, part(group))
+    print(frame.drop(columns="group").to_string(index=False, float_format=lambda value: f"{value:.3g}"), flush=True)
