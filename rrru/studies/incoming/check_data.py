@@ -18,6 +18,8 @@ from rrru.studies.incoming.costs import costs, without_times
 from rrru.studies.incoming.propose import fitting_robots, propose
 
 _SHOWN = 8
+# a line of the overlay that is longer becomes several
+_WIDE = 110
 _UNFINISHED = (
     "NOT ACCEPTED YET: a run refuses the file for what is listed above. Mend that first; so far the overlay is:"
 )
@@ -143,7 +145,8 @@ def main(arguments=None):
     parser.add_argument("--configfile", nargs="*", default=[], help="overlays of config.yaml")
     given = parser.parse_args(arguments)
     try:
-        found = check_file(given.file, read_config(given.configfile), given.robot, given.commands)
+        config = read_config(given.configfile)
+        found = check_file(given.file, config, given.robot, given.commands)
     except RrruError as error:
         print(error, file=sys.stderr)
         return 2
@@ -154,6 +157,9 @@ def main(arguments=None):
         print(f"refused: {len(found.refused) - _SHOWN} problems more")
     print(f"\n{_UNFINISHED if found.refused else 'overlay to paste:'}\n")
     print(_pasted(found))
+    if not found.refused:
+        page, overlays = f"{config['results_dir'].rstrip('/')}/campaigns/{found.name}/report.html", given.configfile
+        print(f"# saved as mine.yaml: snakemake --cores 2 {page} --configfile {' '.join([*overlays, 'mine.yaml'])}")
     return 1 if found.refused else 0
 
 
@@ -161,9 +167,11 @@ def _pasted(found):
     """The overlay as text, with what nobody can read from a file as comments."""
     lines = ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
     for key, value in found.section.items():
-        flow = None if isinstance(value, dict | list) else False
-        text = yaml.safe_dump({key: value}, sort_keys=False, allow_unicode=True, default_flow_style=flow, width=1000)
-        lines += [f"    {line}" for line in text.splitlines()]
+        short, long = (
+            yaml.safe_dump({key: value}, sort_keys=False, allow_unicode=True, default_flow_style=flow, width=1000)
+            for flow in (None if isinstance(value, dict | list) else False, False)
+        )
+        lines += [f"    {line}" for line in (short if len(short) < _WIDE else long).splitlines()]
     lines += [f"    # {key}: {words}" for key, words in _UNREADABLE.items() if key not in found.section]
     return "\n".join(lines)
 

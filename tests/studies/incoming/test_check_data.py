@@ -192,6 +192,7 @@ def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
     text = capsys.readouterr().out
     overlay = yaml.safe_load(text.partition("overlay to paste:")[2])
     assert overlay == {"campaigns": {"field_12": {"robot": "rrru3", "ingest": "data/field_12.csv"}}}
+    assert "snakemake --cores 2 results/campaigns/field_12/report.html --configfile mine.yaml" in text
     # what the file cannot tell is there to be filled in
     filled = yaml.safe_load(
         text.partition("overlay to paste:")[2].replace("# noise_mm", "noise_mm").replace("# pl", "pl")
