@@ -26,13 +26,14 @@ def answer(campaign, verdict, tables, drives=()):
     drives: names of an arm's drives, see `arm_drives`.
     """
     budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
+    budget = [part | {"probability": _clipped(part["probability"])} for part in budget]
     names = [name for name in verdict["effects"].split("+") if name not in _APART]
     facts = {
         "schema": SCHEMA,
         "campaign": campaign,
         "effects": [_effect(name, tables, budget, drives) for name in names],
         "unexplained": "unexplained" in verdict["effects"].split("+"),
-        "probability": verdict["probability"],
+        "probability": _clipped(verdict["probability"]),
         "leg": verdict["leg"] or None,
         "where": verdict["where"],
         "confusable_with": [name for name in verdict["confusable_with"].split(", ") if name],
@@ -94,6 +95,11 @@ def _row(values, names):
     return {name: values[name] for name in names}
 
 
+def _clipped(value):
+    """A probability that is a sum without what rounding adds to 1; NaN stays."""
+    return value if np.isnan(value) else min(value, 1.0)
+
+
 def _effect(name, tables, budget, drives):
     """Facts of one effect of the verdict."""
     share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
@@ -103,7 +109,7 @@ def _effect(name, tables, budget, drives):
     return {
         "name": name,
         "meaning": summary(name),
-        "probability": cause["probability"],
+        "probability": _clipped(cause["probability"]),
         "legs": legs,
         "place": _place(int(legs), drives) if legs.isdigit() else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},

@@ -39,7 +39,7 @@ class Step:
 @dataclass(frozen=True)
 class Card:
     """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead
-    sentence, the others, what is next, notes, and parts and steps of the bars.
+    sentence, the others, what is next, notes, links to corrected files of the robot, and parts and steps of the bars.
     """
 
     campaign: str
@@ -52,12 +52,15 @@ class Card:
     sentences: list
     next: str
     notes: list
+    models: list
     parts: list
     steps: list
 
 
-def card(facts, source="", found=None):
-    """The Card of facts; source: where the campaign came from; found: the Worth of its calibration, or None."""
+def card(facts, source="", found=None, models=()):
+    """The Card of facts; source: where the campaign came from; found: the Worth of its calibration, or None; models:
+    links to corrected files of the robot.
+    """
     lead, *others, following = facts["sentences"]
     if found is not None:
         others = [*worth.sentences(found, facts["gap_rms_mm"]), *others]
@@ -72,6 +75,7 @@ def card(facts, source="", found=None):
         others,
         following,
         facts["notes"],
+        list(models),
         _parts(facts["budget"]),
         _steps(facts),
     )

@@ -2,6 +2,7 @@
 
 import base64
 import html
+import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -98,6 +99,11 @@ class Results:
         registered = told.set_index("campaign")["registration_rms_mm"].notna().get(name, False)
         return worth(errors[errors["campaign"] == name], tables.read(place), noise_rms_mm, bool(registered))
 
+    def models(self, name, beside):
+        """Links to the robot's file with what was found, from a folder; empty where it came as none."""
+        found = sorted((self.folder / "campaigns" / name).glob("corrected.*"))
+        return [os.path.relpath(place, beside) for place in found]
+
     def picture(self, name, title):
         """A figure of a path below figures/ without its ending, None where it was not drawn."""
         place = self.folder / "figures" / f"{name}.svg"
@@ -137,7 +143,8 @@ def write(folder, path, reproduced, campaign=None):
         answer = facts.read(results.folder / "campaigns" / name / "verdict.json")
         drawn = results.picture(f"{name}/gap_map", f"{name}: where it misses")
         found = results.worth(name, answer["noise_rms_mm"])
-        answers.append((cards.card(answer, sources.get(name, "virtual robot of a study"), found), drawn))
+        source, models = sources.get(name, "virtual robot of a study"), results.models(name, Path(path).parent)
+        answers.append((cards.card(answer, source, found, models), drawn))
     chosen = [s for s in contents.SECTIONS if campaign is None or s.key in contents.OF_A_CAMPAIGN]
     parts = [part for part in (_part(results, section) for section in chosen) if part]
     values = {"answers": answers, "parts": parts, "campaign": campaign, "glyphs": results.glyphs}

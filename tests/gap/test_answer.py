@@ -51,6 +51,7 @@ RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash /
     [
         {},
         {"effects": "none", "leg": 0, "where": "", "next_runs": "", "confusable_with": ""},
+        {"probability": 1.0 + 5e-14},
         {"effects": "unexplained", "leg": 0, "confusable_with": "backlash, none"},
         {"effects": "link_flexure+unexplained", "noise_stated_mm": np.nan, "notes": "a; b"},
     ],

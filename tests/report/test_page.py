@@ -1,5 +1,7 @@
 """The page of whatever is there: parts of a run, nothing at all, left-overs of an earlier one."""
 
+import shutil
+
 import pytest
 
 from rrru.figures import style
@@ -40,6 +42,16 @@ def test_a_part_of_a_run_is_shown_and_what_an_earlier_one_has_left_is_not(folder
     for lacking in ("table-gap_shrink", 'id="calibration"', 'id="printers"'):
         assert lacking not in text
     assert written(folder) == text and not list(folder.glob("*.partial"))
+
+
+def test_the_corrected_file_of_a_robot_is_linked_from_where_the_page_lies(folder):
+    assert "corrected" not in written(folder)
+    place = folder / "campaigns" / CAMPAIGN / "corrected.xml"
+    place.write_text("<mujoco/>")
+    assert f'<a href="campaigns/{CAMPAIGN}/corrected.xml">' in written(folder)
+    shutil.copy(folder / "tables/gap_verdicts.parquet", place.parent)
+    page.write(folder, place.parent / "report.html", "paper", CAMPAIGN)
+    assert '<a href="corrected.xml">' in (place.parent / "report.html").read_text()
 
 
 def test_texts_of_files_are_texts_on_the_page(folder):

@@ -18,9 +18,16 @@ from rrru.studies.incoming.costs import costs, without_times
 from rrru.studies.incoming.propose import fitting_robots, propose
 
 _SHOWN = 8
+# a line of the overlay that is longer becomes several
+_WIDE = 110
 _UNFINISHED = (
     "NOT ACCEPTED YET: a run refuses the file for what is listed above. Mend that first; so far the overlay is:"
 )
+# what only the user knows, with an example
+_UNREADABLE = {
+    "noise_mm": "0.02  # of the instrument, 1 sigma per axis; as it stands, the file tells it or it is estimated",
+    "platform_mass_kg": "3.0  # what the robot carries beside payload_kg: the platform or tool",
+}
 _OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
 
 
@@ -39,8 +46,12 @@ class Check:
     @property
     def overlay(self):
         """The overlay to paste."""
-        name = "".join(one if one.isalnum() or one in "_-" else "_" for one in Path(self.section["ingest"]).stem)
-        return {"campaigns": {name: self.section}}
+        return {"campaigns": {self.name: self.section}}
+
+    @property
+    def name(self):
+        """A name for the campaign."""
+        return "".join(one if one.isalnum() or one in "_-" else "_" for one in Path(self.section["ingest"]).stem)
 
 
 def check_file(file, config, robot=None, commands=None):
@@ -134,7 +145,8 @@ def main(arguments=None):
     parser.add_argument("--configfile", nargs="*", default=[], help="overlays of config.yaml")
     given = parser.parse_args(arguments)
     try:
-        found = check_file(given.file, read_config(given.configfile), given.robot, given.commands)
+        config = read_config(given.configfile)
+        found = check_file(given.file, config, given.robot, given.commands)
     except RrruError as error:
         print(error, file=sys.stderr)
         return 2
@@ -144,8 +156,24 @@ def main(arguments=None):
     if len(found.refused) > _SHOWN:
         print(f"refused: {len(found.refused) - _SHOWN} problems more")
     print(f"\n{_UNFINISHED if found.refused else 'overlay to paste:'}\n")
-    print(yaml.safe_dump(found.overlay, sort_keys=False, allow_unicode=True, default_flow_style=None, width=110))
+    print(_pasted(found))
+    if not found.refused:
+        page, overlays = f"{config['results_dir'].rstrip('/')}/campaigns/{found.name}/report.html", given.configfile
+        print(f"# saved as mine.yaml: snakemake --cores 2 {page} --configfile {' '.join([*overlays, 'mine.yaml'])}")
     return 1 if found.refused else 0
+
+
+def _pasted(found):
+    """The overlay as text, with what nobody can read from a file as comments."""
+    lines = ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
+    for key, value in found.section.items():
+        short, long = (
+            yaml.safe_dump({key: value}, sort_keys=False, allow_unicode=True, default_flow_style=flow, width=1000)
+            for flow in (None if isinstance(value, dict | list) else False, False)
+        )
+        lines += [f"    {line}" for line in (short if len(short) < _WIDE else long).splitlines()]
+    lines += [f"    # {key}: {words}" for key, words in _UNREADABLE.items() if key not in found.section]
+    return "\n".join(lines)
 
 
 if __name__ == "__main__":

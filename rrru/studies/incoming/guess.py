@@ -38,7 +38,7 @@ _NAMED = {
     "point": ("point", "index", "number", "punkt", "nummer", "nr"),
     "name": ("name", "point", "point name", "point id", "punkt", "punktname"),
     "time_s": ("time", "timestamp", "time stamp", "date time", "t", "zeit", "zeitstempel", "uhrzeit"),
-    "speed_mm_s": ("speed", "velocity", "feed", "geschwindigkeit", "vorschub"),
+    "speed_mm_s": ("speed", "velocity", "v", "feed", "geschwindigkeit", "vorschub"),
     "payload_kg": ("payload", "load", "last", "nutzlast"),
     "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
     "target": ("target", "reflector", "marker", "reflektor"),

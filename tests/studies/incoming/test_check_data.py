@@ -192,6 +192,23 @@ def test_the_command_prints_an_overlay(tmp_path, monkeypatch, capsys):
     text = capsys.readouterr().out
     overlay = yaml.safe_load(text.partition("overlay to paste:")[2])
     assert overlay == {"campaigns": {"field_12": {"robot": "rrru3", "ingest": "data/field_12.csv"}}}
+    assert "snakemake --cores 2 results/campaigns/field_12/report.html --configfile mine.yaml" in text
+    # what the file cannot tell is there to be filled in
+    filled = yaml.safe_load(
+        text.partition("overlay to paste:")[2].replace("# noise_mm", "noise_mm").replace("# pl", "pl")
+    )
+    assert filled["campaigns"]["field_12"].keys() == {"robot", "ingest", "noise_mm", "platform_mass_kg"}
+    jsonschema.validate(filled["campaigns"], SCHEMA["properties"]["campaigns"] | {"$defs": SCHEMA["$defs"]})
+
+
+@pytest.mark.parametrize("stem", ["123", "no", "a b: c", "1e5"])
+def test_the_printed_overlay_is_the_proposed_one_whatever_the_file_is_called(stem, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    path = tmp_path / f"{stem}.csv"
+    FIELD.head(60).rename(columns={"command_x_mm": "Goal X [mm]: or"}).to_csv(path, index=False, sep=";")
+    main([str(path), "--robot", "rrru3"])
+    printed = "campaigns:" + capsys.readouterr().out.partition("\ncampaigns:")[2]
+    assert yaml.safe_load(printed) == check_file(str(path), CONFIG, "rrru3").overlay
 
 
 @pytest.mark.parametrize(
