@@ -17,6 +17,8 @@ _SERVOS = ("position", "general")
 _STIFF = "0.9999 0.9999 0.0001"
 # ASSUME friction holds an arm against this many times the largest load of the campaign
 _HOLDS = 1.25
+# ASSUME and drags an arm that carries no load along at this, by kind: rad/s^2, m/s^2
+_DRAGS = {"R": 2.0, "P": 1.0}
 _NONE = dict.fromkeys(("ref", "springref", "stiffness", "damping", "frictionloss", "margin"), "0")
 
 
@@ -70,7 +72,8 @@ def write_plays(document, structure, found, lines):
             document.drop(tag, f"{move.origin}_play")
         # to m and N m, or rad and N
         scale, force, unit = (1.0, 1.0 / MM, "rad") if move.kind == "R" else (1.0 / MM, 1.0, "m")
-        whole, holding = scale * width, _HOLDS * force * found.loads.get(number, 0.0)
+        load = max(force * found.loads.get(number, 0.0), _DRAGS[move.kind] * inertia[move.joint])
+        whole, holding = scale * width, _HOLDS * load
         stiffness = _stiffness(structure, found, number)
         play = whole - 2.0 * holding / stiffness
         told = f"lost motion of {whole:.4g} +- {sizes(scale * error)} {unit} at {move.origin}"
@@ -87,7 +90,7 @@ def write_plays(document, structure, found, lines):
         section = document.inside(document.root, "tendon", {}) if section is None else section
         tendon = {"name": f"{move.origin}_play", "frictionloss": words(holding)}
         tendon = document.inside(section, "fixed", tendon | hard)
-        document.note(tendon, f"assumed: {_HOLDS:g} times the largest load holds the arm within its play")
+        document.note(tendon, f"assumed: {_HOLDS:g} times the largest load, or inertia, holds the arm within its play")
         for name in (move.origin, f"{move.origin}_play"):
             document.inside(tendon, "joint", {"joint": name, "coef": "1"})
 

@@ -37,13 +37,19 @@ _CRANK = (
 )
 
 
-@pytest.mark.parametrize(("kp", "friction_alone"), [(2e4, False), (1e3, True)])
-def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp, friction_alone):
+_LOAD = 1000.0 * 9.81 * 0.3 * 0.2
+
+
+# an upright axis carries nothing, and its arm must not swing on
+@pytest.mark.parametrize(
+    ("kp", "friction_alone", "axis", "load"),
+    [(2e4, False, "0 1 0", _LOAD), (1e3, True, "0 1 0", _LOAD), (2e4, False, "0 0 1", 0.0)],
+)
+def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp, friction_alone, axis, load):
     """Between limits or by friction alone, against gravity: both ends of a slow swing are apart by the width found."""
     option = '<option timestep="0.0002" integrator="implicitfast"/>'
     actuator = f'<position joint="crank" kp="{kp}" kv="{20 if friction_alone else 60}"/>'
-    file = mjcf(tmp_path, _CRANK, actuators=actuator, more=option)
-    load = 1000.0 * 9.81 * 0.3 * 0.2
+    file = mjcf(tmp_path, _CRANK.replace("0 1 0", axis), actuators=actuator, more=option)
     found = Found({}, play={0: (1e-3, 1e-5)}, loads={0: load})
     path = file_of(tmp_path, to_mjcf(file, "tip", found, tmp_path)[0], "corrected.xml")
     model = mujoco.MjModel.from_xml_path(str(path))
