@@ -3,7 +3,7 @@ PYTHON ?= python3
 CORES ?= 2
 BIN = .venv/bin
 
-.PHONY: results report compare check-data test bench lint lock
+.PHONY: results report compare check-data test test-slurm bench lint lock
 
 results: .venv/ready
 	@$(BIN)/snakemake --unlock >/dev/null 2>&1 || true
@@ -26,6 +26,10 @@ check-data: .venv/ready
 
 test: .venv/ready
 	$(BIN)/python -m pytest
+
+# a study through a Slurm of one node, which it starts and ends; some minutes
+test-slurm: .venv/ready
+	RRRU_SLURM=1 $(BIN)/python -m pytest -n 0 -rs tests/workflow/test_slurm.py
 
 # beside what a user would use instead, docs/benchmarks.md: make bench [GROUPS="objective genetic"]
 bench: .venv-bench/ready

@@ -5,6 +5,8 @@ from snakemake.utils import min_version, validate
 from rrru.studies.checks import check_once, check_schema
 
 min_version("9.0")
+# the last digits of sums depend on how many threads of linear algebra share them: one, whatever `threads` a rule has
+shell.prefix("set -euo pipefail; export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1; ")
 
 
 configfile: "config.yaml"

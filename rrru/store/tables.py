@@ -1,7 +1,9 @@
 """Result tables on disk: parquet with a schema that is checked on writing; a table is either whole or absent."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pyarrow as arrow
@@ -12,6 +14,8 @@ from rrru.store.schema import Column, Table
 from rrru.store.whole import whole
 
 _ARROW = {"int64": arrow.int64(), "float64": arrow.float64(), "str": arrow.string(), "bool": arrow.bool_()}
+# of one row group of a file, Parquet's own default
+_GROUP_ROWS = 1024 * 1024
 
 
 def check(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
@@ -52,10 +56,14 @@ def _typed(column: Column, values: pd.Series) -> bool:
 
 def write(table: Table, frame: pd.DataFrame, path: str | Path) -> None:
     """Write a frame as a `Table`: checked, typed, to a temporary file first and then moved into place."""
+    gather([typed(table, frame)], path)
+
+
+def typed(table: Table, frame: pd.DataFrame) -> arrow.Table:
+    """A frame as what a file of a `Table` holds, checked."""
     frame = check(table, frame)
     schema = arrow.schema([arrow.field(c.name, _ARROW[c.kind], c.nullable) for c in table.columns])
-    data = arrow.Table.from_pandas(frame, schema=schema, preserve_index=False, safe=True).replace_schema_metadata(None)
-    _write(data, path)
+    return arrow.Table.from_pandas(frame, schema=schema, preserve_index=False, safe=True).replace_schema_metadata(None)
 
 
 def write_all(tables: Iterable[Table], frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
@@ -65,17 +73,38 @@ def write_all(tables: Iterable[Table], frames: Mapping[str, pd.DataFrame], paths
         write(known[name], frame, paths[name])
 
 
-def read(path: str | Path) -> pd.DataFrame:
-    """The table at a path as a frame."""
-    return parquet.read_table(path).to_pandas()
+def read(
+    paths: str | Path | list[str], columns: list[str] | None = None, rows: list[Any] | None = None
+) -> pd.DataFrame:
+    """The table at a path as a frame, or those of one schema at paths, one below the other.
+
+    columns: these alone; rows: (column, operator, value) that all have to hold, or lists of them of which one has to.
+    Of what is not asked for next to nothing is loaded.
+    """
+    return parquet.read_table(paths, columns=columns, filters=rows).to_pandas()
 
 
-def gather(paths: Iterable[str | Path], path: str | Path) -> None:
-    """Write the tables of one schema at paths as one table, one below the other."""
-    _write(arrow.concat_tables([parquet.read_table(part) for part in paths]).combine_chunks(), path)
+def gather(parts: Iterable[str | Path | arrow.Table], path: str | Path) -> None:
+    """Write tables of one schema, at paths or as `typed` gives them, as one table, one below the other.
+
+    However many they are, no more than a group of rows and one of them are loaded at a time.
+    """
+    loaded = (part if isinstance(part, arrow.Table) else parquet.read_table(part) for part in parts)
+    first = next(loaded)
+    with whole(path) as (partial,), parquet.ParquetWriter(partial, first.schema, compression="zstd") as writer:
+        for group in _groups(chain([first], loaded)):
+            writer.write_table(group, _GROUP_ROWS)
 
 
-def _write(data: arrow.Table, path: str | Path) -> None:
-    """Write an Arrow table so that the file is there as a whole or not at all."""
-    with whole(path) as (partial,):
-        parquet.write_table(data, partial, compression="zstd")
+def _groups(parts: Iterable[arrow.Table]) -> Iterator[arrow.Table]:
+    """Tables one below the other, cut into groups of rows; the last one has what is left, or nothing."""
+    held: list[arrow.Table] = []
+    count = 0
+    for part in parts:
+        held.append(part)
+        count += part.num_rows
+        while count > _GROUP_ROWS:
+            joined = arrow.concat_tables(held)
+            yield joined.slice(0, _GROUP_ROWS).combine_chunks()
+            held, count = [joined.slice(_GROUP_ROWS)], count - _GROUP_ROWS
+    yield arrow.concat_tables(held).combine_chunks()

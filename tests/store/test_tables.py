@@ -1,9 +1,8 @@
 """Result tables: typed, checked, whole or absent, and described."""
 
-from pathlib import Path
-
 import numpy as np
 import pandas as pd
+import pyarrow
 import pyarrow.parquet as parquet
 import pytest
 
@@ -62,14 +61,43 @@ def test_a_failed_write_leaves_the_old_table_and_nothing_else(tmp_path, monkeypa
     tables.write(TABLES["correlations"], _ROWS, path)
     before = path.read_bytes()
 
-    def broken(data, where, **options):
-        Path(where).write_bytes(b"half")
+    def broken(writer, *rows):
         raise OSError("disk full")
 
-    monkeypatch.setattr(parquet, "write_table", broken)
+    monkeypatch.setattr(parquet.ParquetWriter, "write_table", broken)
     with pytest.raises(WriteError, match=r"t.parquet: cannot be written \(disk full\)"):
         tables.write(TABLES["correlations"], _ROWS.assign(correlation=0.1), path)
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["t.parquet"]
+
+
+def _numbered(folder, counts):
+    """Paths of tables of so many rows each, all rows different, and those rows."""
+    rows = pd.DataFrame({"campaign": [f"c{k:03d}" for k in range(sum(counts))], "calibration": "x"})
+    rows = rows.assign(parameter_a="p", parameter_b="q", correlation=np.linspace(0.0, 1.0, len(rows)))
+    paths = [folder / f"{k}.parquet" for k in range(len(counts))]
+    for path, first, count in zip(paths, np.cumsum([0, *counts]), counts, strict=False):
+        tables.write(TABLES["correlations"], rows.iloc[first : first + count], path)
+    return list(map(str, paths)), rows
+
+
+@pytest.mark.parametrize("counts", [[3], [3, 0, 4], [5, 5], [10, 1], [0, 0], [2] * 9, [17]])
+@pytest.mark.parametrize("group", [5, 1000])
+def test_gathered_parts_are_the_bytes_of_one_table(tmp_path, monkeypatch, counts, group):
+    """Whatever the parts and the rows of a group: pyarrow writes the whole at once beside it."""
+    monkeypatch.setattr(tables, "_GROUP_ROWS", group)
+    paths, rows = _numbered(tmp_path, counts)
+    last = tables.typed(TABLES["correlations"], rows.head(1).assign(campaign="last"))
+    tables.gather([*paths, last], tmp_path / "all.parquet")
+    parts = pyarrow.concat_tables([*map(parquet.read_table, paths), last]).combine_chunks()
+    parquet.write_table(parts, tmp_path / "once.parquet", row_group_size=group, compression="zstd")
+    assert (tmp_path / "all.parquet").read_bytes() == (tmp_path / "once.parquet").read_bytes()
+
+
+def test_reading_of_many_tables_takes_rows_and_columns_in_order(tmp_path):
+    paths, rows = _numbered(tmp_path, [4, 3, 5])
+    pd.testing.assert_frame_equal(tables.read(paths), rows, check_dtype=False)
+    some = tables.read(paths, columns=["correlation"], rows=[("campaign", "in", ["c009", "c002"])])
+    pd.testing.assert_frame_equal(some, rows.loc[[2, 9], ["correlation"]].reset_index(drop=True))
 
 
 def test_the_glossary_describes_every_table_and_column():

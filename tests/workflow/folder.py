@@ -18,6 +18,7 @@ MINIMAL = "tests/minimal.yaml"
 
 def link(folder):
     """Link what a run needs into a folder, once."""
+    folder.mkdir(parents=True, exist_ok=True)
     for name in ("Snakefile", "config.yaml", "profiles", "workflow", "data", "examples", "tests"):
         place = folder / name
         if not place.exists():
@@ -32,6 +33,8 @@ def start(folder, *targets, overlays=(MINIMAL,), cores=2, record=None):
         environment |= {
             "PYTHONPATH": f"{ROOT / 'tests/workflow/recorder'}{os.pathsep}{ROOT}",
             "RRRU_RECORD": str(record),
+            # of a user who knows nothing of this
+            **dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "8"),
         }
     command = [SNAKEMAKE, "--cores", str(cores), *targets, *(["--configfile", *overlays] if overlays else [])]
     return subprocess.Popen(

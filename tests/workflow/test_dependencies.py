@@ -59,6 +59,13 @@ def test_a_rule_is_handed_what_its_jobs_read_and_nothing_else(records):
         assert handed <= read, (rule, sorted(handed - read, key=str))
 
 
+def test_linear_algebra_has_one_thread_in_every_job(records):
+    """More of them change the last digits of results, and would share the cores with other jobs."""
+    for rule, jobs in records.items():
+        pools = {tuple(pool) for row in jobs for pool in row["threads"]}
+        assert ("openblas", 1) in pools and {count for _, count in pools} == {1}, (rule, pools)
+
+
 def test_a_digest_follows_imports_wherever_they_stand(tmp_path, monkeypatch):
     files = {
         "rrru/__init__.py": "",

@@ -58,8 +58,8 @@ def _shell(line, folder):
         program = [sys.executable, "-c", "from rrru.studies.printers.command import main; main()", *words[1:]]
         told = subprocess.run(program, cwd=folder, capture_output=True, text=True, check=False)
         return told.returncode, told.stdout + told.stderr
-    assert words[:2] == ["snakemake", "--cores"], f"no way to try {line!r}"
-    told = words[3:]
+    assert words[0] == "snakemake" and words[1] in ("--cores", "--profile"), f"no way to try {line!r}"
+    told = words[3:] if words[1] == "--cores" else words[1:]
     split = told.index("--configfile") if "--configfile" in told else len(told)
     return dry_run(folder, *told[:split], overlays=tuple(told[split + 1 :]))
 

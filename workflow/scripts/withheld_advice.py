@@ -8,7 +8,7 @@ from rrru.robots.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.withheld.advice import advice_summary, ambiguous, follow
+from rrru.studies.withheld.advice import UNSURE, advice_summary, ambiguous, follow
 from rrru.studies.withheld.members import robot_of
 from rrru.studies.withheld.robots import Conditions
 from rrru.studies.withheld.schemas import TABLES
@@ -16,16 +16,16 @@ from rrru.studies.withheld.schemas import TABLES
 
 def main(settings, inputs, outputs):
     """Write how many ambiguous robots the advice settles; of all chunks only those robots' points are kept."""
-    verdicts, answers = (
-        pd.concat([tables.read(path) for path in inputs[name]], ignore_index=True)
-        for name in ("withheld_verdicts", "withheld_answers")
-    )
+    verdicts = tables.read(inputs["withheld_verdicts"], columns=UNSURE)
     names = ambiguous(verdicts, settings["withheld"]["advice"])
+    # no robot is called ""
+    chosen = [("robot", "in", names or [""])]
     conditions, library = Conditions.from_config(settings), GapSettings.from_config(settings["gap"], settings["seed"])
     mechanism, masses = setup.mechanism(settings["robot"]), Masses(**settings["masses"])
-    drawn, result = answers.set_index("robot")["drawn"], []
+    answers, result = tables.read(inputs["withheld_answers"], columns=["robot", "drawn"], rows=chosen), []
+    drawn = answers.set_index("robot")["drawn"]
     for path in inputs["withheld_measurements"]:
-        points = tables.read(path)
+        points = tables.read(path, rows=chosen)
         for name in [name for name in names if name in set(points["robot"])]:
             own = points[points["robot"] == name].drop(columns=["robot", "kind"]).reset_index(drop=True)
             known = MeasuredRobot(mechanism, masses, conditions.noise_mm, name)

@@ -9,7 +9,6 @@ from typing import Any
 import pandas as pd
 
 from rrru.errors import ConfigError
-from rrru.robots.catalogue import OWN
 from rrru.studies.config import own_robot_file
 
 # the folder that data which may not be shipped are read from
@@ -116,6 +115,9 @@ def _check_arm(where: str, section: Mapping[str, Any], robots: Mapping[str, Any]
         raise ConfigError(
             f"{where}: got {'both' if 'robot' in section else 'no'} robot and chain; allowed: one of them"
         )
+    # not at the top: it imports every robot, and every start of the workflow imports this
+    from rrru.robots.catalogue import OWN
+
     own = [name for name, robot in robots.items() if set(OWN) & set(robot)]
     if "robot" in section and section["robot"] not in own:
         raise ConfigError(

@@ -20,6 +20,8 @@ from rrru.studies.withheld.verdicts import is_right
 # as sure as this, and right, an answer is settled; times that the advice is followed one after another
 SURE, ROUNDS = 0.9, 3
 ARMS = ("advised", "random")
+# columns of withheld_verdicts that `ambiguous` reads
+UNSURE = ["check", "robot", "probability", "confusable_with", "next_runs"]
 _GROUPS = {
     "all": "",
     "a run is advised": "kind == 'run'",

@@ -1,14 +1,11 @@
 """Noises of the check on withheld effects that are not what is stated: white, Gaussian and alike on all axes.
 
-Sizes are over the stated noise, one sigma per axis.
+Sizes are over the stated noise, one sigma per axis. Light to import: the workflow asks for the noises' names.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
-
-from rrru.campaign import measurements as rows
 
 
 @dataclass(frozen=True)
@@ -48,6 +45,8 @@ class NoiseLaw:
 
     def _correlated(self, white, run):
         """The autoregression (n, 3) of unit variance of each run from white noise (n, 3)."""
+        from scipy.signal import lfilter
+
         result = white.copy()
         for number in np.unique(run):
             own = white[run == number] * np.sqrt(1.0 - self.correlation**2)
@@ -72,5 +71,7 @@ NOISES = {
 
 def with_noise(measurements, law, noise_mm, generator):
     """A measurement table with noise of a law added to its measured positions."""
+    from rrru.campaign import measurements as rows
+
     read = rows.measured(measurements) + law.draw(measurements, noise_mm, generator)
     return measurements.assign(**rows.vector_columns("measured", read))

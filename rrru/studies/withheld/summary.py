@@ -20,6 +20,11 @@ _WEAK_GROUP = "one effect, gap 0.3 to 1 x noise"
 _ALL_ACTS = ("none", "one", "two", "outside")
 
 
+# all that `summary` reads of these tables: columns of withheld_limits, rows of withheld_parts
+LIMITS = ["check", "robot", "weakest", "imitated_share"]
+PARTS = [[("check", "==", "many")], [("kind", "==", "unexplained")]]
+
+
 def wilson(hits, count):
     """95 % interval of a share from hits out of a count (E. B. Wilson, JASA 22, 1927); NaN for none."""
     if not count:
@@ -124,7 +129,7 @@ _CHECKS = {
 
 def summary(scores, limits, parts):
     """Frame `withheld_summary` from `withheld_scores`, `withheld_limits` and `withheld_parts`."""
-    scores = scores.merge(limits[["check", "robot", "weakest", "imitated_share"]], "left", ["check", "robot"])
+    scores = scores.merge(limits[LIMITS], "left", ["check", "robot"])
     off = (scores["share_closed"] - scores["share_closed_true"]).abs()
     pairs = zip(scores["truth"], scores["verdict"], strict=True)
     scores = scores.assign(

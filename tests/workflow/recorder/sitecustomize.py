@@ -1,4 +1,5 @@
-"""Writes down what every workflow script reads of its settings and which modules of the package it has loaded.
+"""Writes down what every workflow script reads of its settings, which modules of the package it has loaded, and in how
+many threads linear algebra runs.
 
 It is on the path of the shared run's jobs only; see `tests/workflow/test_dependencies.py`.
 """
@@ -7,6 +8,8 @@ import json
 import os
 import sys
 from pathlib import Path
+
+from threadpoolctl import threadpool_info
 
 from rrru.store import job
 
@@ -81,6 +84,7 @@ def run(main, snakemake):
     script = Path(main.__code__.co_filename).name.partition(".")[2]
     row = {"rule": snakemake.rule, "script": script, "modules": loaded, "code": snakemake.params.code}
     row |= {"handed": sorted(leaves(snakemake.params.settings), key=str), "read": sorted(seen, key=str)}
+    row |= {"threads": [(pool["internal_api"], pool["num_threads"]) for pool in threadpool_info()]}
     file = Path(os.environ["RRRU_RECORD"]) / f"{snakemake.rule}_{os.getpid()}.json"
     file.write_text(json.dumps(row))
 
