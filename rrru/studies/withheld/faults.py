@@ -126,6 +126,11 @@ class Fault:
         """The same fault, so many times as large."""
         return replace(self, sizes=tuple((factor * np.array(self.sizes)).tolist()))
 
+    def beyond(self, robot):
+        """Whether it is larger than the law of the library allows that is the right answer."""
+        kind = KINDS[self.kind]
+        return bool(kind.law and kind.answer and (np.abs(self.sizes) > kind.law(robot).coordinates.most).any())
+
     def values(self, robot):
         """Its Effect on a robot, and the law's parameter values by name."""
         law = KINDS[self.kind].law(robot)

@@ -29,7 +29,7 @@ from rrru.studies.withheld.verdicts import NONE, UNEXPLAINED
 # what can be seen at all, and what an own tracker would find
 WEAKEST, STRONGEST = 0.7, 10.0
 _OFFSET_SD = {"rad": 0.002, "mm": 0.5}
-_DRAWS, _STEPS = 5, 2
+_DRAWS, _STEPS = 20, 2
 # a gap over the noise that is rounding
 _NOTHING = 1e-6
 # MuJoCo's robots rest where they are read unless their servos are slow: inertia is to be a hundredth of weight at most
@@ -168,8 +168,8 @@ def residual(measurements, conditions):
 def draw(member, conditions):
     """The robot of a Member, see `rrru.studies.withheld.chunks`, and its measurements.
 
-    A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, is drawn again; raises the
-    last of these errors where none can be driven.
+    A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, or that nobody's robot has, is
+    drawn again; raises the last of these errors where none can be driven.
     """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
     offsets = [_OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
@@ -190,7 +190,10 @@ def draw(member, conditions):
 
 
 def sized(robot, fault, strength, conditions):
-    """A fault of a strength on our own plant, where a calibration does not take it up."""
+    """A fault of a strength on our own plant, where a calibration does not take it up.
+
+    Raises UnreachableError where none has that strength, or one only that is larger than the library has causes.
+    """
     if KINDS[fault.kind].law is None:
         return fault
     still = residual(noise_free(replace(robot, plant="own", acting=()), conditions), conditions)
@@ -202,6 +205,8 @@ def sized(robot, fault, strength, conditions):
         if not gap > _NOTHING:
             raise UnreachableError(f"{robot.name}: a calibration takes up {fault.kind} of {fault.sizes}")
         fault = fault.scaled(strength / gap)
+    if fault.beyond(conditions.mechanism):
+        raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} is more than its law allows")
     return fault
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.effects.library import find
 from rrru.errors import UnreachableError
 from rrru.studies.withheld import foreign
 from rrru.studies.withheld.chunks import Member
@@ -127,6 +128,16 @@ def test_a_fault_that_the_calibration_takes_up_cannot_be_sized():
     fault = Fault("clearance", (0.1,) * 6, {})
     with pytest.raises(UnreachableError, match="a calibration takes up clearance"):
         foreign.sized(short("own", "hexapod_file"), fault, 3.0, conditions("hexapod_file"))
+
+
+def test_a_fault_that_nobody_has_is_none():
+    """A drive's compliance of a size beyond its parameter's bound."""
+    known = conditions("arm6_file")
+    law = find("drive_compliance", known.mechanism)
+    most = law.parameters.parameters[0].high
+    assert Fault("soft_servo", (1.01 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
+    assert not Fault("soft_servo", (0.99 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
+    assert not Fault("base_on_springs", (1.0, 1.0, 0.0, 0.0), {}).beyond(known.mechanism)
 
 
 def _budget():
