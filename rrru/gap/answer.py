@@ -208,8 +208,8 @@ def _next(facts):
     """What to measure next."""
     if facts["next"]:
         best = facts["next"][0]
-        verb = "measure" if best["kind"] == "poses" else "drive"
-        return f"Next: {verb} {best['run']}. That decides {_contest(best['separates'])}."
+        what = f"measure {best['run']} (see gap_next_poses)" if best["kind"] == "poses" else f"drive {best['run']}"
+        return f"Next: {what}. That decides {_contest(best['separates'])}."
     if facts["unexplained"]:
         return "Next: no run is advised, since the library has nothing to test; see where the gap lies."
     if facts["probability"] >= _SURE:

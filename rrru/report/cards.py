@@ -63,7 +63,7 @@ def card(facts, source="", found=None, models=()):
     """
     lead, *others, following = facts["sentences"]
     if found is not None:
-        others = [*worth.sentences(found, facts["gap_rms_mm"]), *others]
+        others = [*others, *worth.sentences(found, facts["gap_rms_mm"])]
     return Card(
         facts["campaign"],
         source,

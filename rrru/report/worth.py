@@ -36,8 +36,9 @@ def worth(errors, points, noise_rms_mm, registered):
 
 def sentences(found, left_out_mm):
     """What a Worth says beside the size at points that were left out of the calibration."""
-    first = "before any calibration" + (", once the instrument's frame was fitted" if found.registered else "")
-    said = [f"At these {found.points} points, noise taken out alike, it was {rounded(found.before_mm)} mm {first}."]
+    registered = ", once the instrument's frame was fitted" if found.registered else ""
+    size = f"{rounded(found.before_mm)} mm at the same {found.points} points, noise taken out alike"
+    said = [f"Before any calibration it missed by {size}{registered}."]
     if left_out_mm >= found.before_mm:
         said.append(
             f"Where the calibration has seen the points, {rounded(found.seen_mm)} mm is left: it has taken up a part "
