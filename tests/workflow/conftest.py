@@ -33,7 +33,8 @@ def _make(folder):
     (folder / "record").mkdir(parents=True, exist_ok=True)
     (folder / "answers.csv").write_text(_ANSWERS)
     (folder / "field.yaml").write_text(_CHECKED)
-    targets = ("all", "withheld", "build/minimal/twin/delta.yaml", "report")
+    # a rule that takes two cores, see `test_dependencies`
+    targets = ("all", "withheld", "build/minimal/twin/delta.yaml", "report", "--set-threads", "published=2")
     code, output = run(folder, *targets, overlays=(MINIMAL, "field.yaml"), record=folder / "record")
     assert code == 0, output
     (folder / "output").write_text(output)

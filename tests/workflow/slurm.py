@@ -13,7 +13,7 @@ import time
 
 _DAEMONS = ("munged", "slurmctld", "slurmd")
 _COMMANDS = ("sbatch", "srun", "squeue", "scancel", "scontrol", "sinfo")
-# nothing is charged to accounts, processes are followed by /proc, and a job that has ended stays in the list
+# nothing is charged to accounts, a job ends with all its process group, and stays in the list
 _CONF = """\
 ClusterName=one
 SlurmctldHost={host}(127.0.0.1)
@@ -27,7 +27,7 @@ StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
 SlurmctldPidFile={folder}/slurmctld.pid
 SlurmdPidFile={folder}/slurmd.pid
-ProctrackType=proctrack/linuxproc
+ProctrackType=proctrack/pgid
 TaskPlugin=task/none
 JobAcctGatherType=jobacct_gather/none
 AccountingStorageType=accounting_storage/none
@@ -64,6 +64,12 @@ def cluster(folder):
 def said(environment, *command):
     """What one of Slurm's commands prints."""
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False).stdout
+
+
+def left_over(folder):
+    """Commands of running processes that name the folder: of a cluster that has ended there are none."""
+    commands = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout.splitlines()
+    return [command for command in commands if str(folder) in command]
 
 
 def _place(name):

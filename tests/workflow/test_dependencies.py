@@ -60,7 +60,7 @@ def test_a_rule_is_handed_what_its_jobs_read_and_nothing_else(records):
 
 
 def test_linear_algebra_has_one_thread_in_every_job(records):
-    """More of them change the last digits of results, and would share the cores with other jobs."""
+    """Also where the rule has two (`published`) and the user's environment eight: more change the last digits."""
     for rule, jobs in records.items():
         pools = {tuple(pool) for row in jobs for pool in row["threads"]}
         assert ("openblas", 1) in pools and {count for _, count in pools} == {1}, (rule, pools)

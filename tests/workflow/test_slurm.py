@@ -10,9 +10,11 @@ import yaml
 
 from tests.places import ROOT
 from tests.workflow.folder import MINIMAL, SNAKEMAKE, digests, dry_run, link, run
-from tests.workflow.slurm import cluster, missing, said
+from tests.workflow.slurm import cluster, left_over, missing, said
 
 _PROFILE = ("--profile", "profiles/slurm")
+# three chunks and what counts them
+_TABLE = "build/minimal/tables/withheld_summary.parquet"
 _PATIENCE_S = 900.0
 
 
@@ -43,7 +45,7 @@ def test_the_profile_names_rules_that_are_there(tmp_path):
     reason=f"not installed: {', '.join(missing())}; of Debian: apt-get install --no-install-recommends slurm-wlm munge",
 )
 def test_a_study_through_slurm_ends_with_the_same_bytes_though_a_job_is_killed(tmp_path):
-    code, output = run(tmp_path / "here", "withheld")
+    code, output = run(tmp_path / "here", _TABLE)
     assert code == 0, output
     folder = tmp_path / "there"
     with cluster(tmp_path / "slurm") as environment:
@@ -55,9 +57,10 @@ def test_a_study_through_slurm_ends_with_the_same_bytes_though_a_job_is_killed(t
             said(environment, "scancel", "--signal=KILL", "--full", job)
             _until(lambda: process.poll() is not None, process)
         finally:
-            process.terminate()
+            process.kill()
             process.wait()
         states = said(environment, "squeue", "--noheader", "--states=all", "--format", "%i %T").splitlines()
+    assert not left_over(tmp_path)
     log = (folder / "log").read_text()
     assert process.returncode == 0, log
     ended = dict(line.split() for line in states)
@@ -70,7 +73,7 @@ def _submitted(folder, environment):
     """A running snakemake whose jobs go to a cluster that keeps no accounts."""
     link(folder)
     told = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2")
-    command = [SNAKEMAKE, *_PROFILE, *told, "withheld", "--configfile", MINIMAL]
+    command = [SNAKEMAKE, *_PROFILE, *told, _TABLE, "--configfile", MINIMAL]
     environment = environment | {"PYTHONPATH": str(ROOT)}
     with (folder / "log").open("w") as log:
         return subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=subprocess.STDOUT)
