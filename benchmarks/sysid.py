@@ -72,8 +72,10 @@ seconds                float  of this process and its threads
 # seeds from 0 on; the first few are also fitted in the other structure
 ROBOTS, WRONG, OUT = 6, 2, ROOT / "results/tables/sysid.parquet"
 _MASSES = Masses(0.0, 0.0, 0.0)
-# steps of the finite differences in the numbers' units, and the most iterations
-_EPS, _MOST, _SIGMAS = 1e-3, 10, 1.96
+# in the numbers' units: steps of the finite differences, and changes that end a fit; its default of 1e-8 is below the
+# noise of a simulation in which friction creeps
+_HOW = {"eps": 1e-3, "xtol": 1e-4, "gtol": 1e-4, "max_iters": 10, "x_scale": "jac"}
+_SIGMAS = 1.96
 _START = {"zero": 0.0, "soft_servo": 0.1, "play": 0.2}
 _BOUNDS = {"zero": (-20.0, 20.0), "soft_servo": (0.005, 50.0), "play": (0.0, 5.0)}
 
@@ -157,7 +159,7 @@ def by_sysid(truth, given, measured, fresh):
     edit, params = structure(given, truth.drive), unknown(given, truth.drive)
     residual = residual_of(edit, *measured)
     with contextlib.redirect_stdout(io.StringIO()):
-        found, result = sysid.optimize(params, residual, eps=_EPS, x_scale="jac", max_iters=_MOST)
+        found, result = sysid.optimize(params, residual, **_HOW)
     left, _, _ = residual(result.x, found)
     _, widths = sysid.calculate_intervals(left, result.jac)
     seconds = process_time() - before
