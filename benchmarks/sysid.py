@@ -8,7 +8,7 @@ has it (with the joint and the friction that the plant has). Residuals are in mm
 make sequences of their own, as it advises. It is also given the other cause's structure, to see what it says then. The
 diagnosis is told the file and nothing of causes; what it finds is tried by its corrected file.
 
-Needs `mujoco[sysid]` beside the package. `python -m benchmarks.sysid` writes results/tables/sysid.parquet.
+`make bench GROUPS=sysid` writes results/tables/sysid.parquet.
 """
 
 import contextlib
@@ -24,6 +24,7 @@ import pandas as pd
 import yaml
 from mujoco import sysid
 
+from benchmarks import harness
 from benchmarks.recorded import (
     AXES,
     FILE,
@@ -37,6 +38,7 @@ from benchmarks.recorded import (
     draw,
     trajectories,
 )
+from benchmarks.sysid_table import TABLE, beside
 from rrru.campaign import measurements as rows
 from rrru.gap.corrected_model import write_corrected
 from rrru.gap.diagnose import MeasuredRobot, diagnose
@@ -44,31 +46,9 @@ from rrru.gap.settings import GapSettings
 from rrru.plant import mujoco_causes, mujoco_model
 from rrru.robots.dynamics import Masses
 from rrru.store import tables
-from rrru.store.schema import read_tables
 from rrru.studies import setup
 from rrru.studies.circle.models import errors
 
-TABLE = read_tables("""
-## sysid | tables/sysid.parquet | robot by given
-`mujoco.sysid` and the diagnosis on the same campaigns of arms that MuJoCo drives, from benchmarks/sysid.py.
---
-robot                  int    seed that it was drawn with
-cause                  str    what acts, beside zeros that are off {soft_servo, play}
-by                     str    who {mujoco.sysid, rrru}
-given                  str    structure that mujoco.sysid was told to fit; the diagnosis is told none
-    {soft_servo, play, nothing}
-answer                 str    verdict of the diagnosis with its probability; warnings of mujoco.sysid
-numbers                int    numbers of the cause with a finite interval
-held                   int    of these, true numbers within their 95 % interval
-off_sigmas             float? deviation of the cause's number over its standard error; null without such a number
-zeros                  int    zeros of drives with a finite interval
-zeros_held             int    of these, true ones within it
-left_mm                float  rms of what is left of the campaign
-fresh_mm               float  rms of what is left of a fresh one
-noise_mm               float  rms of the noise
-points                 int    of the campaign
-seconds                float  of this process and its threads
-""")[0]
 # seeds from 0 on; the first few are also fitted in the other structure
 ROBOTS, WRONG, OUT = 6, 2, ROOT / "results/tables/sysid.parquet"
 _MASSES = Masses(0.0, 0.0, 0.0)
@@ -232,7 +212,7 @@ def rows_of(seed):
 
 
 def main():
-    """Write the table and print it."""
+    """Write the table and print it; the seconds are rows of `benchmarks`, too."""
     result = []
     for seed in range(ROBOTS):
         result += rows_of(seed)
@@ -240,6 +220,7 @@ def main():
         OUT.parent.mkdir(parents=True, exist_ok=True)
         tables.write(TABLE, frame, OUT)
         print(frame[frame["robot"] == seed].T.to_string(), flush=True)
+    harness.keep("sysid", beside(frame))
 
 
 if __name__ == "__main__":
