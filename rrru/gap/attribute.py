@@ -26,8 +26,8 @@ from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
 
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
-# a gap of fewer times the noise is linear in everything that can cause it
-_SMALL = 10.0
+# times the noise below which a gap, and share of the noise, rms, below which what the sim bends by is small
+_SMALL, _STRAIGHT = 10.0, 0.1
 # more columns than this share of the numbers read leave too little to tell the noise by
 _MOST_FITTED = 0.5
 _NO_COVARIANCE = np.zeros((0, 0))
@@ -200,14 +200,24 @@ class _Looks:
         return under, linear, self._source
 
 
+def _bends(case, linear, state, hypothesis, level):
+    """Whether the exact sim that a hypothesis without shapes fits is off what its linearisation about a state says."""
+    if not hypothesis.terms:
+        return False
+    with suppress(FitError):
+        fitted, _ = refine(case, state, hypothesis, level)
+        said = linear.data - linear.base @ (fitted.deviations - state.deviations)
+        said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
+        return bool(np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > _STRAIGHT * case.noise_mm)
+    return False
+
+
 def _rounds(case, calibrated, prior, stated):
     """Search and refinement in turn until the best hypothesis repeats itself."""
     state, covariance, last, looks = calibrated, _NO_COVARIANCE, None, _Looks(stated, case.noise_mm)
     case, linear, source = looks.at(case, state)
     case, linear = with_seen(case, linear)
     evidence = case.evidence(linear)
-    # where an unknown function wins, a second look from its fit shows nothing else, unless the gap is too large for the
-    # linear sim or a law's shape is still to be fitted
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
     for _ in range(_MOST_ROUNDS):
         beliefs = posterior(evidence, search(evidence), prior)
@@ -217,12 +227,16 @@ def _rounds(case, calibrated, prior, stated):
             break
         shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
         unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
-        if last == frozenset(hypothesis.terms) or (small and not shaped and unknown):
+        named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown else None
+        bends = named and small and not shaped and _bends(case, linear, state, *named)
+        # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the way
+        # there or a law's shape is still to be fitted
+        if last == frozenset(hypothesis.terms) or (unknown and small and not shaped and not bends):
             break
         last = frozenset(hypothesis.terms)
-        if shaped and unknown:
-            # a law off the grid of its shapes gets its chance before an unknown function takes what it leaves
-            hypothesis, level = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) or (hypothesis, level)
+        if named and (shaped or bends):
+            # laws get their chance before an unknown function takes what their linear fit leaves
+            hypothesis, level = named
         try:
             # what a dropped effect has done to the others' numbers can hold a fit back
             dropped = {name for name, _ in state.effects} - hypothesis.effects
