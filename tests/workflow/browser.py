@@ -34,11 +34,15 @@ def chromium(profile):
 
 def open_page(driver, path, width, scheme):
     """Load a file at a width in pixels under a colour scheme."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     features = [{"name": "prefers-color-scheme", "value": scheme}]
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
     driver.get(path.as_uri())
+    # of a page that was open already some is there before all is
+    WebDriverWait(driver, 60).until(lambda one: one.execute_script("return document.readyState") == "complete")
 
 
 def requested(driver):

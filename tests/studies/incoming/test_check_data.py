@@ -116,7 +116,6 @@ def test_german_headers_are_read(tmp_path):
     [
         ("delta", ()),
         ("ptt3", LENGTHS[:3]),
-        ("arm6_file", ()),
         ("delta", ("theta1_rad", "theta2_rad", "theta3_rad")),
     ],
 )
