@@ -66,6 +66,13 @@ def typed(table: Table, frame: pd.DataFrame) -> arrow.Table:
     return arrow.Table.from_pandas(frame, schema=schema, preserve_index=False, safe=True).replace_schema_metadata(None)
 
 
+def check_keys(table: Table, path: str | Path) -> None:
+    """Raise TableError where two rows of a gathered `Table` at a path have the same key; only that is loaded."""
+    keys = read(path, columns=list(table.key))
+    if (again := keys.duplicated()).any():
+        raise TableError(f"table {table.name}: {keys[again].iloc[0].to_dict()} is there more than once")
+
+
 def write_all(tables: Iterable[Table], frames: Mapping[str, pd.DataFrame], paths: Mapping[str, str]) -> None:
     """Write frames by table name, each to paths[name], as the ones of the `tables` with these names."""
     known = {table.name: table for table in tables}

@@ -80,6 +80,16 @@ def _numbered(folder, counts):
     return list(map(str, paths)), rows
 
 
+def test_gathered_rows_of_one_key_are_refused(tmp_path):
+    table, path = TABLES["correlations"], tmp_path / "t.parquet"
+    parts = [tables.typed(table, _ROWS.iloc[[row]]) for row in (0, 1)]
+    tables.gather(parts, path)
+    tables.check_keys(table, path)
+    tables.gather([*parts, parts[0]], path)
+    with pytest.raises(TableError, match=r"correlations: .*'parameter_b': 'q'.* more than once"):
+        tables.check_keys(table, path)
+
+
 @pytest.mark.parametrize("counts", [[3], [3, 0, 4], [5, 5], [10, 1], [0, 0], [2] * 9, [17]])
 @pytest.mark.parametrize("group", [5, 1000])
 def test_gathered_parts_are_the_bytes_of_one_table(tmp_path, monkeypatch, counts, group):

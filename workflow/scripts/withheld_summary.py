@@ -13,6 +13,7 @@ def main(settings, inputs, outputs):
     for name in (name for name in inputs if name in outputs):
         more = [tables.typed(schemas[name], field[name])] if name in field else []
         tables.gather([*inputs[name], *more], outputs[name])
+        tables.check_keys(schemas[name], outputs[name])
     scores = tables.read(outputs["withheld_scores"])
     limits = tables.read(outputs["withheld_limits"], columns=LIMITS)
     frames = {
