@@ -200,16 +200,11 @@ class _Looks:
         return under, linear, self._source
 
 
-def _bends(case, linear, state, hypothesis, level):
-    """Whether the exact sim that a hypothesis without shapes fits is off what its linearisation about a state says."""
-    if not hypothesis.terms:
-        return False
-    with suppress(FitError):
-        fitted, _ = refine(case, state, hypothesis, level)
-        said = linear.data - linear.base @ (fitted.deviations - state.deviations)
-        said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
-        return bool(np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > _STRAIGHT * case.noise_mm)
-    return False
+def _bends(case, linear, state, fitted):
+    """Whether the exact sim at a fitted state without shapes is off what a linearisation about a state says there."""
+    said = linear.data - linear.base @ (fitted.deviations - state.deviations)
+    said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
+    return np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > _STRAIGHT * case.noise_mm
 
 
 def _rounds(case, calibrated, prior, stated):
@@ -227,20 +222,22 @@ def _rounds(case, calibrated, prior, stated):
             break
         shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
         unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
-        named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown else None
-        bends = named and small and not shaped and _bends(case, linear, state, *named)
         # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the way
         # there or a law's shape is still to be fitted
-        if last == frozenset(hypothesis.terms) or (unknown and small and not shaped and not bends):
+        settled = unknown and small and not shaped
+        # laws get their chance before an unknown function takes what their linear fit leaves
+        named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
+        tried, its_level = named or (hypothesis, level)
+        if last == frozenset(hypothesis.terms) or (settled and (tried is hypothesis or not tried.terms)):
             break
         last = frozenset(hypothesis.terms)
-        if named and (shaped or bends):
-            # laws get their chance before an unknown function takes what their linear fit leaves
-            hypothesis, level = named
         try:
             # what a dropped effect has done to the others' numbers can hold a fit back
-            dropped = {name for name, _ in state.effects} - hypothesis.effects
-            state, covariance = refine(case, calibrated if dropped else state, hypothesis, level)
+            dropped = {name for name, _ in state.effects} - tried.effects
+            fitted, spread = refine(case, calibrated if dropped else state, tried, its_level)
+            if settled and not _bends(case, linear, state, fitted):
+                break
+            hypothesis, level, state, covariance = tried, its_level, fitted, spread
             case, linear, source = looks.at(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:
