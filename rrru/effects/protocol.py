@@ -120,7 +120,8 @@ class Coordinates:
 
     typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest
     sizes that the law allows; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all;
-    positive (c,): whether it cannot be negative; shapes: values of the parameters that are no coordinates, each a
+    positive (c,): whether it cannot be negative; alike: whether legs are of one design, so that one value may hold for
+    all; shapes: values of the parameters that are no coordinates, each a
     variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,); weights: prior
     probabilities of the shapes, None where all are alike; searched: what is searched beside the listed shapes, of which
     the first so many are stated; doubt: share that a shape's parameter may be off by, 1 sigma, of what is searched the
@@ -134,6 +135,7 @@ class Coordinates:
     positive: np.ndarray
     to_values: Callable[[np.ndarray, Mapping[str, float]], np.ndarray]
     shapes: tuple[Mapping[str, float], ...] = ({},)
+    alike: bool = True
     most: np.ndarray | float = np.inf
     weights: tuple[float, ...] | None = None
     searched: Search | None = None

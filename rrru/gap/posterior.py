@@ -118,6 +118,7 @@ class _LogPrior:
 
     def __init__(self, library, prior):
         self._prior, self._effects = prior, {}
+        self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)
         for name in library.keys() - UNKNOWN.keys():
             kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
@@ -133,7 +134,7 @@ class _LogPrior:
         for term in known:
             total += self._effects[term.effect][term.shape]
             if term.legs not in (EACH, SAME):
-                total -= np.log(3.0)
+                total -= np.log(self._legs[term.effect])
         return total
 
     def levels(self, unexplained):

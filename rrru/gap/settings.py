@@ -67,7 +67,9 @@ class GapSettings:
                 result[name] = _with_known(result[name], values)
             elif name not in self.effects:
                 raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
-        return result
+        # legs are of one design, the joints of an arm are not
+        alike = len(robot.legs.legs) >= len(robot.parts.drives)
+        return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
 
 
 def _with_known(effect, values):

@@ -37,12 +37,12 @@ def variants(effect):
     """All terms of an effect: each shape with each choice of legs that makes a difference.
 
     One value for all legs is tried for coordinates that cannot be negative: sizes of one design, unlike the signed
-    errors of an assembly.
+    errors of an assembly, and unlike the joints of an arm.
     """
     coordinates, legs = effect.coordinates, per_leg(effect)
     choices = (
         EACH,
-        *((SAME,) if legs and coordinates.positive.all() else ()),
+        *((SAME,) if legs and coordinates.alike and coordinates.positive.all() else ()),
         *(np.unique(coordinates.legs).tolist() if legs else ()),
     )
     return tuple(Term(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)

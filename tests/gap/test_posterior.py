@@ -8,18 +8,26 @@ from scipy.special import logsumexp
 
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis
-from rrru.gap.settings import Prior
+from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
 from rrru.gap.verdict import decide, label
 from rrru.gap.whitened import LEVELS
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.rrru3 import Rrru3
 from tests.gap.campaigns import EFFECTS
+from tests.places import ROOT
 
 WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_axis_error"}
 
 
-def _stub(explained=0.0):
+def _stub(explained=0.0, library=EFFECTS):
     """Evidence that tells how much a hypothesis explains, in units of the noise."""
-    return SimpleNamespace(library=EFFECTS, explained=lambda h, effects: explained if h.effects & set(effects) else 0.0)
+    return SimpleNamespace(library=library, explained=lambda h, effects: explained if h.effects & set(effects) else 0.0)
+
+
+def _arm():
+    """The library of an arm of six axes."""
+    return GapSettings().library(make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}))
 
 
 def _hypothesis(*terms, evidence=0.0):
@@ -27,9 +35,9 @@ def _hypothesis(*terms, evidence=0.0):
     return Hypothesis(tuple(terms), value, np.ones((len(LEVELS), len(terms))))
 
 
-def _all(size):
+def _all(size, library=EFFECTS):
     """Every hypothesis of no, one or two effects."""
-    single = [term for effect in EFFECTS.values() for term in variants(effect)]
+    single = [term for effect in library.values() for term in variants(effect)]
     if size < 2:
         return [()] if size == 0 else [(term,) for term in single]
     return [(a, b) for k, a in enumerate(single) for b in single[k + 1 :] if a.effect != b.effect]
@@ -42,6 +50,12 @@ def test_effects_with_legs_are_tried_on_each_and_positive_ones_on_all_alike():
         expected = {EACH, 1, 2, 3} if name in WITH_LEGS else {EACH}
         assert kinds == expected | ({SAME} if per_leg(effect) and effect.coordinates.positive.all() else set())
         assert len(variants(effect)) == len(kinds) * len(effect.coordinates.shapes)
+
+
+def test_the_joints_of_an_arm_are_not_of_one_design():
+    kinds = {term.legs for effect in _arm().values() for term in variants(effect)}
+    assert kinds == {EACH, 1, 2, 3, 4, 5, 6}
+    assert SAME in {term.legs for effect in GapSettings().library(Rrru3()).values() for term in variants(effect)}
 
 
 @pytest.mark.parametrize("name", sorted(WITH_LEGS))
@@ -57,15 +71,17 @@ def test_a_terms_numbers_spread_over_its_legs(name):
     assert one.sum() == 3 and sorted(coordinates.legs[one > 0]) == [1, 2, 3]
 
 
-def test_without_data_the_probabilities_are_the_prior():
+@pytest.mark.parametrize("arm", [False, True])
+def test_without_data_the_probabilities_are_the_prior(arm):
     """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and
-    pairs.
+    pairs, however many legs there are.
     """
-    prior = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1)
-    beliefs = posterior(_stub(1.5), [_hypothesis(*terms) for size in range(3) for terms in _all(size)], prior)
+    prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1), _arm() if arm else EFFECTS
+    every = [_hypothesis(*terms) for size in range(3) for terms in _all(size, library)]
+    beliefs = posterior(_stub(1.5, library), every, prior)
     assert beliefs.weights.sum() == pytest.approx(1.0)
     sets = beliefs.sets()
-    effects = len(EFFECTS)
+    effects = len(library)
     pairs = effects * (effects - 1) // 2
     for size, count, kinds in ((0, 0.3, 1), (1, 0.5, effects), (2, 0.2, pairs)):
         found = {key: p for key, p in sets.items() if len(key[0]) == size and not key[1]}
