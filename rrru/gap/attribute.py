@@ -9,8 +9,7 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign import noise
 from rrru.errors import FitError
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
@@ -39,13 +38,14 @@ KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 class Attribution:
     """What the search has found.
 
-    calibrated: State of the calibration alone; state: of the best hypothesis, fitted on the exact sim, with the
-    covariance (k, k) of its terms' coefficients; evidence: on the last linearisation, about that state; posterior over
-    all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given", "repeats" or
-    "fitted"; dropped: number of points left out as outliers.
+    origin: State that calibrations start from; calibrated: of the calibration alone; state: of the best hypothesis,
+    fitted on the exact sim, with the covariance (k, k) of its terms' coefficients; evidence: on the last linearisation,
+    about that state; posterior over all hypotheses; hypothesis, level: the best one and its discrepancy level;
+    noise_from: "given", "repeats" or "fitted"; dropped: number of points left out as outliers.
     """
 
     case: Case
+    origin: State
     calibrated: State
     state: State
     covariance: np.ndarray
@@ -65,14 +65,6 @@ class Attribution:
         """The attribution with another posterior and its best hypothesis; the state stays."""
         hypothesis, level = beliefs.best()
         return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
-
-
-def calibrate(case):
-    """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    frame = case.measurements[case.used]
-    driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)
-    fit = least_squares(Residuals(case.mechanism, *driven, rows.readings(frame, case.arm_mm)))
-    return State(fit.deviations, {})
 
 
 def with_arm(case, noise_mm=None, noise_rad=None):
@@ -171,7 +163,7 @@ def with_effects(attribution, effects):
     if hypothesis.terms:
         # where the exact sim cannot follow only the linear one is corrected
         with suppress(FitError):
-            state, covariance = refine(attribution.case, attribution.state, hypothesis, level)
+            state, covariance = refine(attribution.case, (attribution.state, attribution.origin), hypothesis, level)
     return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
 
 
@@ -210,6 +202,7 @@ def _bends(case, linear, state, fitted):
 def _rounds(case, calibrated, prior, stated):
     """Search and refinement in turn until the best hypothesis repeats itself."""
     state, covariance, last, looks = calibrated, _NO_COVARIANCE, None, _Looks(stated, case.noise_mm)
+    start = origin(case)
     case, linear, source = looks.at(case, state)
     case, linear = with_seen(case, linear)
     evidence = case.evidence(linear)
@@ -234,7 +227,7 @@ def _rounds(case, calibrated, prior, stated):
         try:
             # what a dropped effect has done to the others' numbers can hold a fit back
             dropped = {name for name, _ in state.effects} - tried.effects
-            fitted, spread = refine(case, calibrated if dropped else state, tried, its_level)
+            fitted, spread = refine(case, (calibrated if dropped else state, start), tried, its_level)
             if settled and not _bends(case, linear, state, fitted):
                 break
             hypothesis, level, state, covariance = tried, its_level, fitted, spread
@@ -243,4 +236,4 @@ def _rounds(case, calibrated, prior, stated):
         except FitError:
             # the sim cannot follow: what the last linearisation says stands
             break
-    return Attribution(case, calibrated, state, covariance, evidence, beliefs, hypothesis, level, source)
+    return Attribution(case, start, calibrated, state, covariance, evidence, beliefs, hypothesis, level, source)

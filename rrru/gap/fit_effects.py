@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.state import State
 
 _STEPS, _STILL = 12, 1e-6

@@ -1,5 +1,7 @@
 """Fitting the numbers of a hypothesis together with the calibration's, on the exact sim."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from rrru.errors import FitError
@@ -9,15 +11,35 @@ from rrru.gap.terms import spread
 _STEPS, _HALVINGS = 6, 5
 # relative gain in the sum of squares below which the search has ended
 _ENOUGH = 1e-4
+# fits that differ by less are as likely
+_ALIKE_NATS = 1.0
 # one step moves a shape's parameter by no more than this many of its standard deviations
 _MOST_SHAPE_STEPS = 1.5
 
 
-def refine(case, state, hypothesis, level):
-    """State of the hypothesis fitted from a start: Gauss-Newton on a renewed linearisation, steps halved where worse.
+def refine(case, starts, hypothesis, level):
+    """State of the hypothesis fitted on the exact sim, from the first State of some starts that leads straight there.
 
-    Returns (state, covariance (k, k) of the terms' coefficients). Raises FitError where the sim loses its pose.
+    Where none does, the first that is as likely as the best of all: a calibration that has gone far to hide an effect
+    is a place that nothing leads away from. Returns (state, covariance (k, k) of the terms' coefficients). Raises
+    FitError where the sim loses its pose.
     """
+    fits, straight = [], False
+    for start in starts:
+        with suppress(FitError):
+            *fit, straight = _descent(case, start, hypothesis, level)
+            fits.append(fit)
+        if straight:
+            break
+    if not fits:
+        names = ", ".join(term.effect for term in hypothesis.terms)
+        raise FitError(f"the sim with {names} loses its pose")
+    enough = min(cost for cost, *_ in fits) + 2.0 * _ALIKE_NATS * case.noise_mm**2
+    return next((state, covariance) for cost, state, covariance in fits if cost <= enough)
+
+
+def _descent(case, state, hypothesis, level):
+    """Gauss-Newton on a renewed linearisation, steps halved where worse: cost, state, covariance, whether none was."""
     keys = [(term.effect, term.shape) for term in hypothesis.terms]
     library, strengths = case.library, hypothesis.strengths[level]
     state = State(
@@ -25,7 +47,7 @@ def refine(case, state, hypothesis, level):
         {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys},
         {key[0]: state.shape(library, key) for key in keys},
     )
-    cost, covariance = _cost(case, state), None
+    cost, covariance, straight = _cost(case, state), None, True
     for _ in range(_STEPS):
         linear = case.linearise(state, keys)
         evidence = case.evidence(linear)
@@ -36,14 +58,16 @@ def refine(case, state, hypothesis, level):
             trial = _between(state, target, 0.5**halving)
             trial_cost = _cost(case, trial)
             if trial_cost < cost:
-                state, cost = trial, trial_cost
+                state, cost, straight = trial, trial_cost, straight and not halving
                 break
         if not cost < last * (1.0 - _ENOUGH):
             break
+    else:
+        straight = False
     if not np.isfinite(cost):
-        raise FitError(f"the sim with {', '.join(key[0] for key in keys)} loses its pose")
+        raise FitError("loses its pose")
     count = sum(spread(library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)
-    return state, covariance[:count, :count]
+    return cost, state, covariance[:count, :count], straight
 
 
 def _target(linear, state, hypothesis, mean, library):

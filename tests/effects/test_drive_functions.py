@@ -8,7 +8,7 @@ import pytest
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.state import State
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta

@@ -11,7 +11,7 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import starts_of_runs
 from rrru.errors import FitError
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.make_case import at_reversals
 from rrru.gap.state import State
 from tests.gap import campaigns

@@ -14,7 +14,8 @@ from rrru.campaign.noise import isolated
 from rrru.errors import ConfigError
 from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap import shrink
-from rrru.gap.attribute import calibrate, with_noise
+from rrru.gap.attribute import with_noise
+from rrru.gap.calibrate import calibrate
 from rrru.gap.heldout import HeldOut, Prediction, resampled_rows
 from rrru.gap.terms import Term
 from rrru.gap.whitened import LEVELS

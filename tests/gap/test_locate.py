@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import chi2
 
 from rrru.effects.protocol import Coordinates, plain_coordinates
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate, worst_spot
 from rrru.gap.state import State

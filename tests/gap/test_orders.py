@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.effects.protocol import ActiveEffect
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.orders import periodogram, resolution, with_orders
 from rrru.gap.settings import GapSettings
 from tests.gap.campaigns import EFFECTS, NOISE_MM, ROBOT, case_of, diagnosed, measure, strong

@@ -9,7 +9,8 @@ import pytest
 from rrru.effects.protocol import Coordinates
 from rrru.gap import poses
 from rrru.gap.advise import advise
-from rrru.gap.attribute import Attribution, calibrate
+from rrru.gap.attribute import Attribution
+from rrru.gap.calibrate import calibrate
 from rrru.gap.posterior import posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
@@ -95,7 +96,7 @@ def between():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), Prior())
-    found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    found = Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return advise(found, verdict, MASSES)

@@ -11,7 +11,8 @@ import pytest
 
 from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import NOTHING, advise
-from rrru.gap.attribute import Attribution, attribute, calibrate
+from rrru.gap.attribute import Attribution, attribute
+from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import averaged
 from rrru.gap.posterior import posterior
 from rrru.gap.refine import refine
@@ -102,7 +103,7 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     truth = 3.0 * drawn(name, 7)
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
-    state, covariance = refine(case, start, _hypothesis(Term(name)), 0)
+    state, covariance = refine(case, (start,), _hypothesis(Term(name)), 0)
     before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth),) * 2
@@ -115,7 +116,7 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
     true = replace(active("thermal_growth", [8e-4]), values={"strain": 8e-4, "time_constant": 380.0})
     case = case_of(measure((true,)), {"thermal_growth": effect})
     shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
-    state, _ = refine(case, calibrate(case), _hypothesis(Term("thermal_growth", shape)), 0)
+    state, _ = refine(case, (calibrate(case),), _hypothesis(Term("thermal_growth", shape)), 0)
     assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
     assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
 
@@ -123,9 +124,9 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
 def test_an_exact_fit_from_another_fit_keeps_what_both_share():
     both = (strong("servo_lag", 4.0), strong("leg_asymmetry", 4.0))
     case = case_of(measure(both), _library("servo_lag", "leg_asymmetry"))
-    one, _ = refine(case, calibrate(case), _hypothesis(Term("servo_lag")), 0)
-    two, covariance = refine(case, one, _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
-    direct, _ = refine(case, calibrate(case), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
+    one, _ = refine(case, (calibrate(case),), _hypothesis(Term("servo_lag")), 0)
+    two, covariance = refine(case, (one,), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
+    direct, _ = refine(case, (calibrate(case),), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
     error = np.sqrt(np.diag(covariance)[:3])
     assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
     left = np.sqrt((case.residual(two) ** 2).mean())
@@ -158,7 +159,7 @@ def twins():
     case, calibrated = _twins()
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), Prior())
-    found = Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    found = Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
     return found, verdict, advise(found, verdict, MASSES).runs
 

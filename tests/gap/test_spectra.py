@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.effects.library import find
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.spectra import amplitudes, likeliest, pursue
 from tests.gap import arms
 from tests.gap.arms import NOISE_MM

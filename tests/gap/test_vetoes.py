@@ -7,7 +7,8 @@ import pytest
 
 from rrru.effects.protocol import Coordinates
 from rrru.gap import diagnose
-from rrru.gap.attribute import Attribution, calibrate
+from rrru.gap.attribute import Attribution
+from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.posterior import NEGLIGIBLE, posterior
@@ -84,7 +85,7 @@ def attribution():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), PRIOR)
-    return Attribution(case, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    return Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
 
 
 def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypatch):

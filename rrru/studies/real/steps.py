@@ -15,7 +15,7 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
-from rrru.gap.attribute import calibrate
+from rrru.gap.calibrate import calibrate
 from rrru.gap.case import Case
 from rrru.gap.fit_effects import fit_effects, identified
 from rrru.gap.state import State
