@@ -1,6 +1,6 @@
 """What the robot is told to do: runs along trajectories with times, speed, payload and path. Lengths mm, times s."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -28,6 +28,11 @@ class Run:
     speed_mm_s: float
     payload_kg: float
 
+    def resting(self, settle_s):
+        """The run of a robot that waits at every point until it rests, and is read then."""
+        still, waited = np.zeros_like(self.points_mm), settle_s * np.arange(len(self.points_mm))
+        return replace(self, time_s=self.time_s + waited, velocity_mm_s=still, acceleration_mm_s2=still)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -49,6 +54,11 @@ class Plan:
         values = mechanism.require_reachable(target)
         drives = dict(zip(mechanism.parts.columns, values.T, strict=True))
         return table.assign(time_s=self.time_s(), **vector_columns("command", target), **drives)
+
+    def resting(self, settle_s):
+        """The plan of a robot that waits at every point until it rests, and is read then; itself if it does."""
+        moving = any(run.velocity_mm_s.any() for run in self.runs)
+        return replace(self, runs=tuple(run.resting(settle_s) for run in self.runs)) if moving else self
 
     def time_s(self):
         """Times (n,) of all sampled points since the campaign's start, the rests between the runs included."""

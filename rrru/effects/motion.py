@@ -7,6 +7,9 @@ import numpy as np
 from rrru.effects.protocol import Motion
 from rrru.robots.dynamics import drive_rates, loads
 
+# fields of a Motion that are loads
+LOADS = frozenset(("force_n", "held_force_n", "drive_load", "follower_load", "across", "base_moment"))
+
 
 @dataclass(frozen=True)
 class Course:
@@ -31,11 +34,12 @@ class Course:
     temperature_c: np.ndarray | float = np.nan
 
 
-def make_motion(robot, masses, course):
+def make_motion(robot, masses, course, stands=None):
     """Motion along a Course: rates and loads of the nominal robot with `rrru.robots.dynamics.Masses`.
 
     Where the velocity is NaN the rates are; the loads then count the platform as at rest, and an unknown payload as
-    none. The loads are those at the commanded position: a controller's own corrections are too small to change them.
+    none. The loads are those at the commanded position, or where the robot `stands`, from the TwistMap there and
+    drive values (n, K) that bring the nominal robot there: see `standing`.
     """
     position, velocity, acceleration, payload = (
         np.asarray(values, dtype=float)
@@ -47,7 +51,8 @@ def make_motion(robot, masses, course):
     nominal, carried = course.drive if robot.orients else robot.inverse(position), np.nan_to_num(payload)
     inertial = np.where(known, acceleration, 0.0)
     turning = tuple(np.where(known, values, 0.0) for values in (rate, drive_acceleration))
-    load = loads(robot, masses, position, nominal, turning, inertial, carried)
+    nominal, at = stands or (nominal, robot.map_at(nominal, position))
+    load = loads(robot, masses, at, nominal, turning, inertial, carried)
     return Motion(
         robot=robot,
         position_mm=position,
@@ -67,6 +72,25 @@ def make_motion(robot, masses, course):
         last_move=last_move(course.drive, course.path_index) if course.stops else np.full_like(rate, np.nan),
         temperature_c=np.broadcast_to(np.asarray(course.temperature_c, dtype=float), len(position)),
     )
+
+
+def standing(robot, actuators, position_mm, poses, turned=True):
+    """Drive values (n, K) that bring the nominal robot next to Poses, and its TwistMap there.
+
+    actuators (n, K), position_mm (n, 3): what the controller sent; turned: whether the poses' orientations count, or
+    the tool's position alone. One linear step: the poses differ by what zeros, geometry and sag are off.
+    """
+    at = robot.map_at(actuators, position_mm)
+    tool = np.asarray(robot.tool_mm)[None]
+    shift, turn = poses.point(tool) - at.poses.point(tool), poses.turned_from(at.poses.turn)
+    lack, slopes = shift, at.point @ at.drive_counts
+    if turned:
+        arm = robot.angle_arm_mm
+        lack = np.concatenate([shift, arm * turn], axis=1)
+        slopes = np.concatenate([slopes, arm * at.turn @ at.drive_counts], axis=1)
+    known, step = np.isfinite(lack).all(axis=1), np.zeros(actuators.shape)
+    step[known] = (np.linalg.pinv(slopes[known]) @ lack[known][..., None])[..., 0]
+    return actuators + step, robot.map_at(actuators + step, position_mm + np.nan_to_num(shift))
 
 
 def last_move(drive, stop):

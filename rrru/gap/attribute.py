@@ -136,6 +136,7 @@ def attribute(case, prior, stated=KNOWN):
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
+        case = case.standing(calibrated)
         attribution = _rounds(case, calibrated, prior, stated)
         found = attribution.case
         outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
@@ -231,6 +232,7 @@ def _rounds(case, calibrated, prior, stated):
             if settled and not _bends(case, linear, state, fitted):
                 break
             hypothesis, level, state, covariance = tried, its_level, fitted, spread
+            case = case.standing(state)
             case, linear, source = looks.at(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:

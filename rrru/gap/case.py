@@ -4,6 +4,7 @@ The sim with effects is the exact closure of the plant; a hypothesis is fitted o
 best one found. Lengths in mm, angles in rad.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,11 +14,11 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import follows_path, stops
 from rrru.campaign.noise import reading_series
+from rrru.effects.motion import standing
 from rrru.effects.protocol import Contribution, Motion
-from rrru.errors import FitError
 from rrru.gap.evidence import ModelEvidence
+from rrru.gap.linearise import linearised
 from rrru.gap.noise_model import NoiseModel
-from rrru.gap.state import Linear
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
 
@@ -30,7 +31,8 @@ class Case:
     library: effects by name that the campaign can test, and after them the functions of `rrru.gap.unknown` that it can;
     untestable: name to the reason for the other effects; noise_mm: deviation per axis; arm_mm: of
     `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none; beside_scale: factor by which
-    rows of reflectors beside the robot count, so that they have the noise of the others.
+    rows of reflectors beside the robot count, so that they have the noise of the others; motion_at: from where the
+    robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`.
     """
 
     mechanism: object
@@ -43,6 +45,7 @@ class Case:
     arm_mm: float = np.nan
     noise: NoiseModel | None = None
     beside_scale: float = 1.0
+    motion_at: Callable | None = None
 
     def __len__(self):
         return len(self.at)
@@ -53,14 +56,14 @@ class Case:
         return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
 
     @cached_property
-    def _readings(self):
+    def readings(self):
         """What was read at all points, None where that are positions of the tool."""
         return rows.readings(self.measurements, self.arm_mm)
 
     @cached_property
     def _kept(self):
         """Rows (m,) of the used points among those of all readings."""
-        points = np.arange(len(self.used)) if self._readings is None else self._readings.rows
+        points = np.arange(len(self.used)) if self.readings is None else self.readings.rows
         return np.flatnonzero(self.used[points])
 
     @cached_property
@@ -74,7 +77,7 @@ class Case:
         on_world = rows.on_the_world(self.measurements)
         return np.zeros(len(self), dtype=bool) if on_world is None else on_world[self.at]
 
-    def _of_rows(self, values):
+    def of_rows(self, values):
         """Of values (n, 3, ..) of all that was read those of the rows (m, 3, ..), as they count."""
         kept = values[self._kept]
         if self.beside_scale == 1.0:
@@ -85,7 +88,7 @@ class Case:
     @cached_property
     def at(self):
         """Number (m,) of the point that each row was read at."""
-        return self._kept if self._readings is None else self._readings.rows[self._kept]
+        return self._kept if self.readings is None else self.readings.rows[self._kept]
 
     @cached_property
     def stop(self):
@@ -123,7 +126,7 @@ class Case:
     @cached_property
     def series(self):
         """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
-        return reading_series(self.measurements, self._readings)[self._kept]
+        return reading_series(self.measurements, self.readings)[self._kept]
 
     def by_point(self, values):
         """Values (m, 3, ..) of rows as those of the used points (n, 3 or 6, ..), zero where no orientation was read."""
@@ -143,6 +146,15 @@ class Case:
         noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
         return ModelEvidence(self.library, linear, self.series, noise, self._along_paths)
 
+    def standing(self, state):
+        """The case with the loads where the robot of a state stands.
+
+        Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
+        """
+        poses, _ = self.posed(state)
+        at = standing(self.mechanism, *self.driven, poses, self.readings is not None)
+        return replace(self, motion=self.motion_at(at))
+
     def without(self, dropped):
         """The case without the used points of the rows flagged in (m,)."""
         used = self.used.copy()
@@ -150,19 +162,19 @@ class Case:
         return replace(self, used=used)
 
     @cached_property
-    def _driven(self):
+    def driven(self):
         """Actuator values (N, K) and commanded positions (N, 3)."""
         return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
 
     def sim(self, deviations):
         """Positions (N, 3) of the tool by the calibrated sim without effects."""
-        actuators, command = self._driven
+        actuators, command = self.driven
         return self.mechanism.forward(actuators, deviations, command)
 
     def posed(self, state):
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         change = sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
-        actuators, command = self._driven
+        actuators, command = self.driven
         twists = self.mechanism.twists(state.deviations) + change.twists
         return self.mechanism.solve(actuators, command, twists), twists
 
@@ -171,80 +183,21 @@ class Case:
 
         The sim is the exact closure where the state has effects, the calibrated one where it has none.
         """
-        if self._readings is not None:
-            return lacking(self.mechanism, self._readings, *self.posed(state))
+        if self.readings is not None:
+            return lacking(self.mechanism, self.readings, *self.posed(state))
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
         return rows.measured(self.measurements) - model
 
     def by_other(self, robot, poses, twists):
         """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
-        if self._readings is not None:
-            return self._of_rows(lacking(robot, self._readings, poses, twists))
-        return self._of_rows(rows.measured(self.measurements) - robot.measured(poses, twists))
+        if self.readings is not None:
+            return self.of_rows(lacking(robot, self.readings, poses, twists))
+        return self.of_rows(rows.measured(self.measurements) - robot.measured(poses, twists))
 
     def residual(self, state):
         """`left` of the used points (m, 3)."""
-        return self._of_rows(self.left(state))
+        return self.of_rows(self.left(state))
 
     def linearise(self, state, keys=None):
-        """The sim linearised about a state; raises FitError where the state's sim has no pose at a point.
-
-        keys: (effect, shape) pairs to make columns for, by default all.
-        """
-        at, data = self._map(state), self.residual(state)
-        lost = ~np.isfinite(data).all(axis=1) | ~np.isfinite(at.point_mm[self.at]).all(axis=1)
-        if lost.any():
-            raise FitError(f"the sim has no pose at {int(lost.sum())} points")
-        if keys is None:
-            keys = [(name, k) for name, effect in self.library.items() for k in range(len(effect.coordinates.shapes))]
-        columns = {key: self._columns(at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
-        by_shape = {key[0]: self._by_shape(at, key, state) for key in state.effects}
-        for key, coordinates in state.effects.items():
-            data = data + columns[key] @ coordinates
-        return Linear(
-            data,
-            self._of_rows(at.columns(self.mechanism.directions)),
-            columns,
-            {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
-            {name: steps for name, (_, steps) in by_shape.items()},
-            self._of_rows(at.drive_effect),
-        )
-
-    def _map(self, state):
-        """The map at a state's deviations, without its effects."""
-        actuators, command = self._driven
-        if self._readings is None:
-            return self.mechanism.map_at(actuators, self.sim(state.deviations), state.deviations)
-        twists = self.mechanism.twists(state.deviations)
-        return self.mechanism.map(actuators, self.mechanism.solve(actuators, command, twists), twists, self._readings)
-
-    def _by_shape(self, at, key, state):
-        """`Linear.shape_columns` and `Linear.shape_steps` of one effect of the state."""
-        shape, effect = state.shape(self.library, key), self.library[key[0]]
-        own = state.contribution(self.library, key, self.motion)
-        columns, steps = [], []
-        for name, value in shape.items():
-            stepped = effect.doubted(name, value)
-            if stepped != value:
-                other = state.contribution(self.library, key, self.motion, shape=dict(shape) | {name: stepped})
-                columns.append(self._of_rows(at.move((other - own).twists)))
-                steps.append((name, value, stepped))
-        nothing = np.zeros((len(self), 3, 0))
-        return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
-
-    def _columns(self, at, key, state):
-        """Derivative (n, 3, c) by the coordinates of one effect: secants over their present or typical size."""
-        functions = getattr(self.library[key[0]], "along_drives", None)
-        if functions is not None:
-            response = self._of_rows(at.drive_effect)
-            made = (f[self.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(functions(self.motion)))
-            return np.concatenate(list(made), axis=-1)
-        step = np.array(self.library[key[0]].coordinates.typical)
-        if key in state.effects:
-            active = state.effects[key]
-            step = np.where(np.abs(active) > 1e-3 * step, active, step)
-        result = np.empty((len(self), 3, len(step)))
-        for k, one in enumerate(np.diag(step)):
-            change = state.contribution(self.library, key, self.motion, one)
-            result[..., k] = self._of_rows(at.move(change.twists)) / step[k]
-        return result
+        """The sim linearised about a state, see `rrru.gap.linearise`."""
+        return linearised(self, state, keys)

@@ -3,6 +3,9 @@
 Lengths in mm, angles in rad.
 """
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 
 from rrru.campaign import measurements as rows
@@ -30,7 +33,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     if not len(measurements):
         raise FitError("the campaign has no points")
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
-    motion = _motion(measurements, mechanism, masses, actuators)
+    motion_at = partial(make_motion, mechanism, masses, _course(measurements, mechanism, actuators))
+    motion = motion_at()
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
     stop = stops(measurements)
@@ -46,7 +50,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
-    return Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+    case = Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
+    return replace(case, motion_at=motion_at)
 
 
 def _tested(library, motion, used, told):
@@ -105,8 +110,8 @@ def at_reversals(motion):
     return result
 
 
-def _motion(measurements, mechanism, masses, actuators):
-    """The motion that the effects see; at the measured points with the table's own actuator values."""
+def _course(measurements, mechanism, actuators):
+    """What the robot was told to do; at the measured points with the table's own actuator values."""
     path, told = driven_path(measurements)
     if mechanism.orients:
         told["drive_motion"] = drive_rates(measurements, actuators)
@@ -122,4 +127,4 @@ def _motion(measurements, mechanism, masses, actuators):
         path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
     path_drive[told["path_index"]] = actuators
     at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
-    return make_motion(mechanism, masses, Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told))
+    return Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)

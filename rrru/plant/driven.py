@@ -10,6 +10,8 @@ from rrru.plant.tracker import Sees, measure
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 
+# ASSUME a robot that is read at rest waits so long at every point
+SETTLE_S = 5.0
 _ONLY_TOOL = Sees()
 
 
@@ -61,9 +63,13 @@ class DrivenRobot(ABC):
 
     def motion(self, plan, controller):
         """What the effects may know about a plan driven through a controller; the nominal mechanism's loads."""
+        return make_motion(self.mechanism, self.masses, self.course(plan, controller))
+
+    def course(self, plan, controller):
+        """The Course of a plan driven through a controller."""
         path, index = plan.path()
         along = controller(path)
-        course = Course(
+        return Course(
             position_mm=plan.targets(),
             drive=along[index],
             path_drive=along,
@@ -74,7 +80,6 @@ class DrivenRobot(ABC):
             payload_kg=np.concatenate([np.full(len(run.points_mm), run.payload_kg) for run in plan.runs]),
             stops=not any(run.velocity_mm_s.any() for run in plan.runs),
         )
-        return make_motion(self.mechanism, self.masses, course)
 
     def positions(self, motion, target=None):
         """Platform centres (n, 3) in the tracker's frame and sizes (n,) of its rotation along a motion near targets.

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.plant import mujoco_model
-from rrru.plant.driven import DrivenRobot
+from rrru.plant.driven import SETTLE_S, DrivenRobot
 from rrru.plant.mujoco_causes import MOVING, apply
 from rrru.plant.mujoco_run import Machine
 from rrru.robots.dynamics import Masses
@@ -45,10 +45,19 @@ class MujocoRobot(DrivenRobot):
         edit.spec.option.gravity = turn.apply(edit.nominal.opt.gravity)
         return Machine(edit, self.file)
 
+    @property
+    def moves(self):
+        """Whether it is read on the way; else it rests at every point."""
+        return not set(MOVING).isdisjoint(self.causes)
+
+    def run(self, plan, *how, **more):
+        """Drive a plan, see DrivenRobot; a robot that rests at every point takes longer than the plan says."""
+        return super().run(plan if self.moves else plan.resting(SETTLE_S), *how, **more)
+
     def posed(self, motion, target):
         """Poses (n) along a Motion as simulated, with no twists; see Machine.drive for the errors raised."""
         payload = np.nan_to_num(motion.payload_kg)
-        position, turn = self.machine(payload.max(initial=0.0)).drive(motion, not set(MOVING).isdisjoint(self.causes))
+        position, turn = self.machine(payload.max(initial=0.0)).drive(motion, self.moves)
         count, legs = len(position), self.mechanism.legs
         passive = np.broadcast_to(legs.home_passive, (count, len(legs.passive_joints)))
         poses = Poses(position, turn, passive, np.zeros(count), np.ones(count, dtype=bool))

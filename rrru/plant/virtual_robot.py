@@ -6,12 +6,16 @@ from functools import cached_property
 import numpy as np
 
 from rrru.effects.library import active_effects
+from rrru.effects.motion import LOADS, make_motion, standing
 from rrru.effects.protocol import together
 from rrru.errors import ConfigError
 from rrru.plant.driven import DrivenRobot
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.robots.rrru3 import Rrru3
+
+# how often loads and where they make the robot stand are found from each other: what sags by a millimetre is still then
+_SAGS = 3
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,17 @@ class VirtualRobot(DrivenRobot):
     def twists(self):
         """Twists (1, sites, 6) of its deviations and axes."""
         return self.mechanism.twists_of(self.deviations) + self.axis_deviations
+
+    def motion(self, plan, controller):
+        """What the effects may know about a plan; the loads are those where the robot stands, off and sagged."""
+        motion = super().motion(plan, controller)
+        if any(LOADS.intersection(active.effect.needs) for active in self.effects):
+            course = self.course(plan, controller)
+            for _ in range(_SAGS):
+                poses, _ = self.posed(motion, course.position_mm)
+                at = standing(self.mechanism, course.drive, course.position_mm, poses)
+                motion = make_motion(self.mechanism, self.masses, course, at)
+        return motion
 
     def posed(self, motion, target):
         """Poses (n) near targets (n, 3), and twists (n, sites, 6) of all that is off."""

@@ -87,13 +87,12 @@ class Loads:
     base: np.ndarray
 
 
-def loads(robot, masses, position_mm, actuators, drive_motion, acceleration_mm_s2, payload_kg):
-    """Loads of a motion; position_mm (n, 3) and actuators (n, K) fit each other; drive_motion: rates and
-    accelerations (n, K) of the drives; payload_kg (n,).
+def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payload_kg):
+    """Loads of a motion; at: TwistMap of its poses at actuators (n, K); drive_motion: rates and accelerations (n, K) of
+    the drives; payload_kg (n,).
 
     NaN where a pose cannot be reached.
     """
-    at = robot.map_at(actuators, position_mm)
     force = _platform_load(robot, masses, acceleration_mm_s2, payload_kg)
     member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
     motion = np.asarray(actuators, dtype=float), *drive_motion

@@ -1,6 +1,7 @@
 """The virtual robot as a whole: statics by virtual work, what is reported, reproducibility."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -149,6 +150,7 @@ class _Everything:
     """A contribution at every site at once."""
 
     contribution: Contribution
+    effect = SimpleNamespace(needs=())
 
     def contribute(self, motion):
         return self.contribution

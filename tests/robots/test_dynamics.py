@@ -77,7 +77,15 @@ def _potential(theta, guess):
 def test_static_torque_is_the_potential_energys_slope(rich_poses):
     points, theta = rich_poses
     nothing = np.zeros_like(points)
-    torque = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, np.full(len(points), _PAYLOAD_KG)).drive
+    torque = loads(
+        _ROBOT,
+        _MASSES,
+        _ROBOT.map_at(theta, points),
+        theta,
+        (nothing, nothing),
+        nothing,
+        np.full(len(points), _PAYLOAD_KG),
+    ).drive
     h = 1e-5
     for leg in range(3):
         step = h * np.eye(3)[leg]
@@ -93,7 +101,7 @@ def test_motors_supply_the_change_of_energy(rich_poses):
     velocity, acceleration = _motion(len(points))
     payload = np.full(len(points), _PAYLOAD_KG)
     rate, second = drive_rates(_ROBOT, points, velocity, acceleration)
-    torque = loads(_ROBOT, _MASSES, points, theta, (rate, second), acceleration, payload).drive
+    torque = loads(_ROBOT, _MASSES, _ROBOT.map_at(theta, points), theta, (rate, second), acceleration, payload).drive
     h = 1e-4
 
     def energy(t):
@@ -115,7 +123,7 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
     points, theta = rich_poses
     _, acceleration = _motion(len(points))
     still, payload = (np.zeros_like(points),) * 2, np.full(len(points), _PAYLOAD_KG)
-    force = loads(_ROBOT, _MASSES, points, theta, still, acceleration, payload).member_n
+    force = loads(_ROBOT, _MASSES, _ROBOT.map_at(theta, points), theta, still, acceleration, payload).member_n
     mass = 3.0 + _PAYLOAD_KG + 1.8
     weight = mass * (np.array([0.0, 0.0, GRAVITY_MM_S2]) - acceleration) / 1000.0
     # joint 4 lies at the platform's U joint, joint 3 a forearm before it
@@ -134,8 +142,24 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
 def test_forces_grow_with_the_mass_that_hangs_on_the_platform(rich_poses, payload_kg):
     points, theta = rich_poses
     nothing = np.zeros_like(points)
-    bare = loads(_ROBOT, Masses(1.0, 0.0, 0.0), points, theta, (nothing, nothing), nothing, np.zeros(len(points)))
-    full = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, np.full(len(points), payload_kg))
+    bare = loads(
+        _ROBOT,
+        Masses(1.0, 0.0, 0.0),
+        _ROBOT.map_at(theta, points),
+        theta,
+        (nothing, nothing),
+        nothing,
+        np.zeros(len(points)),
+    )
+    full = loads(
+        _ROBOT,
+        _MASSES,
+        _ROBOT.map_at(theta, points),
+        theta,
+        (nothing, nothing),
+        nothing,
+        np.full(len(points), payload_kg),
+    )
     np.testing.assert_allclose(full.member_n, bare.member_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
     np.testing.assert_allclose(full.held_n, bare.held_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
 
@@ -144,7 +168,7 @@ def test_held_forces_carry_the_load_along_the_lines_from_elbow_to_joint(rich_pos
     """Independent: the elbow from the definition of the drive arm, the balance of forces at the platform."""
     points, theta = rich_poses
     nothing, payload = np.zeros_like(points), np.full(len(points), _PAYLOAD_KG)
-    force = loads(_ROBOT, _MASSES, points, theta, (nothing, nothing), nothing, payload).held_n
+    force = loads(_ROBOT, _MASSES, _ROBOT.map_at(theta, points), theta, (nothing, nothing), nothing, payload).held_n
     total = np.zeros_like(points)
     for leg, azimuth in enumerate(_ROBOT.azimuth_rad):
         out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -164,7 +188,15 @@ def test_gravity_points_down_in_every_robots_frame():
 def test_legs_without_an_inner_joint_are_held_as_they_are(robot):
     actuators = robot.inverse([robot.legs.home_mm]) if robot.name == "delta" else robot.inverse([[10.0, 5.0, -250.0]])
     position, nothing = robot.forward(actuators), np.zeros((1, 3))
-    load = loads(robot, _MASSES, position, actuators, (nothing, nothing), nothing, np.full(1, _PAYLOAD_KG))
+    load = loads(
+        robot,
+        _MASSES,
+        robot.map_at(actuators, position),
+        actuators,
+        (nothing, nothing),
+        nothing,
+        np.full(1, _PAYLOAD_KG),
+    )
     np.testing.assert_array_equal(load.held_n, load.member_n)
 
 
@@ -180,7 +212,9 @@ def test_bars_carry_a_hexapods_own_masses():
     robot = hexapod(base, plate, 400.0, lumps=tuple(own))
     points = np.add([0.0, 0.0, 400.0], np.random.default_rng(8).uniform(-60.0, 60.0, (20, 3)))
     legs, still = robot.inverse(points), np.zeros((20, 6))
-    load = loads(robot, Masses(0.0, 0.0, 0.0), points, legs, (still, still), np.zeros((20, 3)), np.zeros(20))
+    load = loads(
+        robot, Masses(0.0, 0.0, 0.0), robot.map_at(legs, points), legs, (still, still), np.zeros((20, 3)), np.zeros(20)
+    )
     for point, found in zip(points, load.member_n, strict=True):
         ends = plate + point
         lines = (ends - base) / np.linalg.norm(ends - base, axis=1, keepdims=True)

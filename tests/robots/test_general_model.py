@@ -349,7 +349,7 @@ def _still(robot, points, actuators):
     """Loads at rest."""
     nothing = np.zeros_like(points)
     payload = np.full(len(points), _PAYLOAD_KG)
-    return loads(robot, _MASSES, points, actuators, (nothing, nothing), nothing, payload)
+    return loads(robot, _MASSES, robot.map_at(actuators, points), actuators, (nothing, nothing), nothing, payload)
 
 
 @every_robot
@@ -390,7 +390,9 @@ def test_a_hexapods_bars_carry_its_weight_and_load_their_drives():
     robot, points, actuators = _about_home(replace(GENERAL["hexapod"], tool_mm=(0.0, 0.0, 0.0)))
     nothing, step = np.zeros_like(actuators), 0.05
     payload = np.full(_COUNT, _PAYLOAD_KG)
-    load = loads(robot, _MASSES, points, actuators, (nothing, nothing), np.zeros_like(points), payload)
+    load = loads(
+        robot, _MASSES, robot.map_at(actuators, points), actuators, (nothing, nothing), np.zeros_like(points), payload
+    )
     # half of each of six legs hangs on the platform
     weight = (_MASSES.platform_kg + _PAYLOAD_KG + 3.0 * _MASSES.forearm_kg) * GRAVITY_MM_S2 / 1000.0
     for k in range(6):

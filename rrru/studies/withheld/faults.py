@@ -83,6 +83,8 @@ KINDS = {
     "base_on_springs": Kind(_leaning_base, None),
     "speed_friction": Kind(_speed_friction, None),
 }
+# what shows only while the robot moves; all others are read at rest
+IN_MOTION = ("slow_servo", "speed_friction")
 # what is given to the robots of one model, one after the other
 ORDER = (
     *("play", NONE, "soft_servo", "base_on_springs", "slow_servo", "length", NONE, "soft_link", "speed_friction"),

@@ -15,12 +15,13 @@ from rrru.campaign.trajectories import from_config
 from rrru.errors import SimulationError, UnreachableError
 from rrru.fit.campaign_fit import select
 from rrru.fit.least_squares import least_squares
+from rrru.plant.driven import SETTLE_S
 from rrru.plant.tracker import Sees
 from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
 from rrru.studies.withheld.box import draw_trajectories
-from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
+from rrru.studies.withheld.faults import IN_MOTION, KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.plants import PLANTS
 from rrru.studies.withheld.robots import Conditions, WithheldCampaign
@@ -127,6 +128,8 @@ class FileRobot:
         robot = PLANTS[self.plant](conditions, self.offsets, *self.acting)
         sees = Sees(conditions.model.targets)
         plan, noise_mm = self.plan(conditions), conditions.noise_mm
+        if not any(one.kind in IN_MOTION for one in self.acting):
+            plan = plan.resting(SETTLE_S)
         return WithheldCampaign(robot, plan, noise_mm, conditions.seed, self.name, sees=sees)
 
     def measured(self, conditions):
