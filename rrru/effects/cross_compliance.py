@@ -20,7 +20,7 @@ joints' own values, with terms between joints. So this law tells a robot whose p
 its own from one whose joint is carried by rods: of a chest with the value -(q_1 + q_2) it finds c_13 = -k_1 and
 c_23 = -k_2 beside c_33 = k_1 + k_2 + k_3.
 
-Assumptions: linear springs, loads at the commanded pose.
+Assumptions: linear springs.
 
 Source: Betti, Teoria della elasticita, Il Nuovo Cimento 7, 1872 (reciprocity). The size is assumed: half that of a
 drive's own compliance.

@@ -16,8 +16,7 @@ part looks like errors of lengths and drives; a second payload shows it plainly,
 grows with it.
 
 Assumptions: linear spring (harmonic drives stiffen with torque by a factor of about two over their range), no lost
-motion (that is `backlash`), wind-up small enough that loads are those at the commanded pose, no vibration (a motion
-slow against the drive's resonance).
+motion (that is `backlash`), no vibration (a motion slow against the drive's resonance).
 
 A joint that a rod or belt makes follow drives gives way to the loads about itself, beside what its drives do.
 

@@ -21,8 +21,7 @@ An arm has no such members: its links bend, and its bearings tilt. At every turn
 with the moment m of the loads about the joint and its axis a: one compliance c_j per joint, alike in both directions
 across the axis. What turns about the axis is `drive_compliance`.
 
-Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring; the loads
-are those at the commanded pose.
+Assumptions: a two-force member, no bending (the lumped half of its own mass hangs at its end); linear spring.
 
 Source: bar under axial force, dL = f L / (E A) (Timoshenko, Strength of Materials, 1930, part 1, chapter 1). A plain
 aluminium tube of 800 mm and 300 mm^2 has 4e-5 mm/N; joints, clamps and glued ends are softer by far, so the sizes here

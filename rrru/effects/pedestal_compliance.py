@@ -11,8 +11,7 @@ and everything that stands on the same body move as one, so that it is a twist o
 floor sees it: reflectors on the table beside the robot show it plainly, together with those on the tool. Without them
 it is told from `drive_compliance` of the first joints by its pattern alone.
 
-Assumptions: linear spring; loads at rest, those of the commanded pose; the weight itself, which does not change, is
-part of where the robot stands.
+Assumptions: linear spring; loads at rest; the weight itself, which does not change, is part of where the robot stands.
 
 Source: cantilever under an end moment, w = m h / (E I), v = w h / 2 (Timoshenko, Strength of Materials, 1930, part 1,
 chapter 5). A steel tube of 200 x 8 mm and 700 mm turns by 1.3e-10 rad/(N mm); its bolts and the floor are softer, so

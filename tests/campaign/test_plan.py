@@ -102,3 +102,16 @@ def test_impossible_plans_are_refused():
     )
     with pytest.raises(UnreachableError, match="out of reach"):
         far.commands(Rrru3())
+
+
+def test_a_robot_that_rests_at_every_point_takes_longer_and_has_no_speed_there():
+    trajectories = line_groups((-500.0, 0.0, 600.0), (-300.0, 0.0, 600.0), [0.0, 20.0], 5)
+    plan = make_plan(
+        trajectories, [{"payload_kg": 0.0, "reverse": False}, {"payload_kg": 0.0, "reverse": True}], 80.0, 40.0, 2.0
+    )
+    rests = plan.resting(3.0)
+    moved, waited = plan.time_s(), rests.time_s()
+    np.testing.assert_allclose(np.diff(waited), np.diff(moved) + np.where(np.diff(moved) == 2.0, 0.0, 3.0))
+    assert not any(run.velocity_mm_s.any() or run.acceleration_mm_s2.any() for run in rests.runs)
+    assert rests.resting(3.0) is rests
+    np.testing.assert_array_equal(rests.targets(), plan.targets())

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from rrru.effects.motion import Course, make_motion
+from rrru.effects.motion import Course, make_motion, standing
 from rrru.plant.virtual_robot import VirtualRobot
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
 from tests.effects.robots import EFFECTS, FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
+from tests.robots.mjcf import HEXAPOD
 
 _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
 
@@ -110,3 +112,18 @@ def test_shifts_along_a_group_act_at_each_of_its_sites():
         for site in group:
             np.testing.assert_array_equal(twists[:, robot.legs.site_numbers[site], 0], shifts[:, k])
     assert not twists[:, :, 1:].any() and np.count_nonzero(twists.any(axis=(0, 2))) == 6
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_drive_values_bring_the_nominal_robot_to_where_it_stands(turned):
+    """A hexapod whose drives are off by a known amount: that is what is found, and the pose that it makes."""
+    robot = make_mechanism("hexapod", {"mjcf": str(HEXAPOD), "platform": "plate"}, parameter_set="zero")
+    place = robot.legs.home_mm + np.random.default_rng(2).uniform(-30.0, 30.0, (20, 3))
+    drive, off = robot.inverse(place), np.array([0.5, -0.3, 0.2, 0.0, -0.6, 0.4])
+    poses = robot.solve(drive + off, place)
+    found, at = standing(robot, drive, place, poses, turned)
+    # one linear step: a hundredth of the way is left
+    np.testing.assert_allclose(at.poses.position_mm, poses.position_mm, atol=5e-3)
+    if turned:
+        np.testing.assert_allclose(found, drive + off, atol=5e-3)
+        np.testing.assert_allclose(at.poses.turn, poses.turn, atol=1e-5)
