@@ -42,7 +42,7 @@ def corrected_drives(attribution, masses):
     for approach in (-1, 1):
         told = nominal
         for _ in range(_LOOKS):
-            motion = at_rest(robot, masses, (position, told, payload, end_s), approach)
+            motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
             twists = robot.twists(attribution.state.deviations) + _change(attribution, motion)
             told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
         found[approach] = told
@@ -77,8 +77,11 @@ def _grid(commands):
     return points[far <= _NEAR], number[far <= _NEAR]
 
 
-def at_rest(robot, masses, state, approach):
-    """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side."""
+def at_rest(robot, masses, state, approach, nominal):
+    """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side.
+
+    nominal (n, K): drive values that bring the nominal robot there, which is where it stands.
+    """
     position, drive, payload, end_s = state
     count, nothing = len(position), np.zeros_like(position)
     before = drive - approach * np.array([_APPROACH[unit] for unit in robot.parts.units])
@@ -94,7 +97,7 @@ def at_rest(robot, masses, state, approach):
         payload_kg=np.full(count, payload),
         drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
     )
-    return make_motion(robot, masses, course)
+    return make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
 
 
 def _change(attribution, motion):

@@ -129,7 +129,8 @@ def test_corrected_drives_bring_the_measured_robot_to_where_it_is_commanded(name
         lengths = []
         for approach, own in table.groupby("approach"):
             drives, place = own[[prefix + column for column in robot.parts.columns]].to_numpy(), rows.command(own)
-            motion = at_rest(robot, _MASSES, (place, drives, 0.0, 0.0), approach)
+            nominal = own[[*robot.parts.columns]].to_numpy()
+            motion = at_rest(robot, _MASSES, (place, drives, 0.0, 0.0), approach, nominal)
             twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
             lengths.append(np.linalg.norm(robot.measured(robot.solve(drives, place, twists), twists) - place, axis=1))
         off[prefix] = np.sqrt(np.mean(np.concatenate(lengths) ** 2))
