@@ -74,14 +74,18 @@ def make_motion(robot, masses, course, stands=None):
     )
 
 
-def standing(robot, actuators, position_mm, poses, turned=True):
-    """Drive values (n, K) that bring the nominal robot next to Poses, and its TwistMap there.
+def standing(robot, sent, posed, turned=True):
+    """Drive values (n, K) that bring the nominal robot next to where one stands, and its TwistMap there.
 
-    actuators (n, K), position_mm (n, 3): what the controller sent; turned: whether the poses' orientations count, or
-    the tool's position alone. One linear step: the poses differ by what zeros, geometry and sag are off.
+    sent: actuator values (n, K) and positions (n, 3); posed: Poses and the twists (n or 1, sites, 6) of all that is off
+    in them; turned: whether the poses' orientations count, or the tool's position alone. Of an arm what is off in its
+    drives alone counts, of others the poses, by one linear step.
     """
-    at = robot.map_at(actuators, position_mm)
-    tool = np.asarray(robot.tool_mm)[None]
+    (actuators, position), (poses, twists) = sent, posed
+    if not robot.legs.parallel:
+        drive = actuators + robot.drive_errors(np.broadcast_to(twists, (len(actuators), *twists.shape[1:])))
+        return drive, robot.map_at(drive, position)
+    at, tool = robot.map_at(actuators, position), np.asarray(robot.tool_mm)[None]
     shift, turn = poses.point(tool) - at.poses.point(tool), poses.turned_from(at.poses.turn)
     lack, slopes = shift, at.point @ at.drive_counts
     if turned:
@@ -90,7 +94,7 @@ def standing(robot, actuators, position_mm, poses, turned=True):
         slopes = np.concatenate([slopes, arm * at.turn @ at.drive_counts], axis=1)
     known, step = np.isfinite(lack).all(axis=1), np.zeros(actuators.shape)
     step[known] = (np.linalg.pinv(slopes[known]) @ lack[known][..., None])[..., 0]
-    return actuators + step, robot.map_at(actuators + step, position_mm + np.nan_to_num(shift))
+    return actuators + step, robot.map_at(actuators + step, position + np.nan_to_num(shift))
 
 
 def last_move(drive, stop):

@@ -151,8 +151,7 @@ class Case:
 
         Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
         """
-        poses, _ = self.posed(state)
-        at = standing(self.mechanism, *self.driven, poses, self.readings is not None)
+        at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
         return replace(self, motion=self.motion_at(at))
 
     def without(self, dropped):

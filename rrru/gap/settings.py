@@ -68,7 +68,7 @@ class GapSettings:
             elif name not in self.effects:
                 raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
         # legs are of one design, the joints of an arm are not
-        alike = len(robot.legs.legs) >= len(robot.parts.drives)
+        alike = robot.legs.parallel
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
 
 

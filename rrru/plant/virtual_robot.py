@@ -47,8 +47,8 @@ class VirtualRobot(DrivenRobot):
         if any(LOADS.intersection(active.effect.needs) for active in self.effects):
             course = self.course(plan, controller)
             for _ in range(_SAGS):
-                poses, _ = self.posed(motion, course.position_mm)
-                at = standing(self.mechanism, course.drive, course.position_mm, poses)
+                sent = course.drive, course.position_mm
+                at = standing(self.mechanism, sent, self.posed(motion, course.position_mm))
                 motion = make_motion(self.mechanism, self.masses, course, at)
         return motion
 

@@ -166,6 +166,11 @@ class Legs:
         """Number of every passive joint by its name."""
         return {joint.name: number for number, joint in enumerate(self.passive_joints)}
 
+    @property
+    def parallel(self):
+        """Whether every drive has a leg of its own, unlike those of arms."""
+        return len(self.legs) >= len(self.driven_kinds)
+
     def longest_mm(self, first=0):
         """Length of the longest leg from its joint of this number on, to the platform's frame."""
         bars = {leg: leg.bar.length_mm + np.linalg.norm(leg.bar.platform_mm) if leg.bar else 0.0 for leg in self.legs}

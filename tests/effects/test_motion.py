@@ -10,7 +10,7 @@ from rrru.robots.delta import Delta
 from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
 from tests.effects.robots import EFFECTS, FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
-from tests.robots.mjcf import HEXAPOD
+from tests.robots.mjcf import ARM, HEXAPOD
 
 _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
 
@@ -121,9 +121,21 @@ def test_drive_values_bring_the_nominal_robot_to_where_it_stands(turned):
     place = robot.legs.home_mm + np.random.default_rng(2).uniform(-30.0, 30.0, (20, 3))
     drive, off = robot.inverse(place), np.array([0.5, -0.3, 0.2, 0.0, -0.6, 0.4])
     poses = robot.solve(drive + off, place)
-    found, at = standing(robot, drive, place, poses, turned)
+    found, at = standing(robot, (drive, place), (poses, robot.twists()), turned)
     # one linear step: a hundredth of the way is left
     np.testing.assert_allclose(at.poses.position_mm, poses.position_mm, atol=5e-3)
     if turned:
         np.testing.assert_allclose(found, drive + off, atol=5e-3)
         np.testing.assert_allclose(at.poses.turn, poses.turn, atol=1e-5)
+
+
+def test_what_is_off_in_an_arms_drives_moves_its_loads_and_its_geometry_does_not():
+    arm = make_mechanism("arm", {"urdf": str(ARM)}, parameter_set="full")
+    drive, off = np.random.default_rng(3).uniform(-1.0, 1.0, (4, 6)), np.array([3.0, -2.0, 1.0, 0.5, -4.0, 2.0]) * 1e-3
+    zeros = [f"d{column.removesuffix('_rad')}" for column in arm.parts.columns]
+    for more in ({}, {"axis3_x": 2.0}):
+        twists = arm.twists_of(dict(zip(zeros, off, strict=True)) | more)
+        place = arm.forward(drive)
+        found, at = standing(arm, (drive, place), (arm.solve(drive, place, twists), twists))
+        np.testing.assert_allclose(found, drive + off, atol=1e-12)
+        np.testing.assert_allclose(at.point_mm, arm.forward(drive + off), atol=1e-9)

@@ -25,7 +25,7 @@ _ALIKE = (
     ("hexapod_file", "slow_servo", 0.01),
     ("hexapod_file", "length", 0.001),
     ("hexapod_file", "warming", 0.001),
-    ("arm6_file", "soft_link", 0.001),
+    ("arm6_file", "soft_link", 0.002),
     ("arm6_file", "tilted_axis", 0.001),
     ("arm6_file", "base_on_springs", 0.001),
     ("arm6_file", "soft_servo_on_a_slope", 0.001),
