@@ -121,13 +121,13 @@ class Coordinates:
     typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest
     sizes that the law allows; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all;
     positive (c,): whether it cannot be negative; alike: whether legs are of one design, so that one value may hold for
-    all; shapes: values of the parameters that are no coordinates, each a
-    variant of the law to be tried; to_values: coordinates (c,) and a shape to parameter values (p,); weights: prior
-    probabilities of the shapes, None where all are alike; searched: what is searched beside the listed shapes, of which
-    the first so many are stated; doubt: share that a shape's parameter may be off by, 1 sigma, of what is searched the
-    order itself; broad: so many coordinates that they are averaged over before anything else is tried; spectra: sizes
-    (c,) of the coordinates, of which the campaign chooses; sized: whether it has, and the typical sizes are its own;
-    log_prior: of a choice that has been made otherwise.
+    all; shapes: values of the parameters that are no coordinates, each a variant of the law to be tried; to_values:
+    coordinates (c,) and a shape to parameter values (p,); weights: prior probabilities of the shapes, None where all
+    are alike; searched: what is searched beside the listed shapes, of which the first so many are stated; doubt: share
+    that a shape's parameter may be off by, 1 sigma, of what is searched the order itself; broad: so many coordinates
+    that they are averaged over before anything else is tried; spectra: sizes (c,) of the coordinates, of which the
+    campaign chooses; sized: whether it has, and the typical sizes are its own; log_prior: of a choice that has been
+    made otherwise.
     """
 
     typical: np.ndarray
