@@ -147,10 +147,12 @@ class Case:
         return ModelEvidence(self.library, linear, self.series, noise, self._along_paths)
 
     def standing(self, state):
-        """The case with the loads where the robot of a state stands.
+        """The case with the loads where the robot of a state stands, if its platform can turn.
 
         Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
         """
+        if not self.mechanism.orients:
+            return self
         at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
         return replace(self, motion=self.motion_at(at))
 

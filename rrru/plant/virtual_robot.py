@@ -42,9 +42,13 @@ class VirtualRobot(DrivenRobot):
         return self.mechanism.twists_of(self.deviations) + self.axis_deviations
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan; the loads are those where the robot stands, off and sagged."""
+        """What the effects may know about a plan; the loads are those where the robot stands, off and sagged.
+
+        Where its platform cannot turn they are those at the commanded positions: there a millimetre changes them by a
+        share of a percent, elsewhere by several percent.
+        """
         motion = super().motion(plan, controller)
-        if any(LOADS.intersection(active.effect.needs) for active in self.effects):
+        if self.mechanism.orients and any(LOADS.intersection(active.effect.needs) for active in self.effects):
             course = self.course(plan, controller)
             for _ in range(_SAGS):
                 sent = course.drive, course.position_mm
