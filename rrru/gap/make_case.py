@@ -3,7 +3,6 @@
 Lengths in mm, angles in rad.
 """
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -50,8 +49,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         values = [getattr(motion, need)[used] for need in function.needs]
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
-    case = Case(mechanism, measurements, motion, used, testable, untestable, float(noise_mm), float(arm_mm))
-    return replace(case, motion_at=motion_at)
+    sizes = float(noise_mm), float(arm_mm)
+    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at)
 
 
 def _tested(library, motion, used, told):

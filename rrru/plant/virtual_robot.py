@@ -47,11 +47,10 @@ class VirtualRobot(DrivenRobot):
         Where its platform cannot turn they are those at the commanded positions: there a millimetre changes them by a
         share of a percent, elsewhere by several percent.
         """
-        motion = super().motion(plan, controller)
+        course = self.course(plan, controller)
+        motion, sent = make_motion(self.mechanism, self.masses, course), (course.drive, course.position_mm)
         if self.mechanism.orients and any(LOADS.intersection(active.effect.needs) for active in self.effects):
-            course = self.course(plan, controller)
             for _ in range(_SAGS):
-                sent = course.drive, course.position_mm
                 at = standing(self.mechanism, sent, self.posed(motion, course.position_mm))
                 motion = make_motion(self.mechanism, self.masses, course, at)
         return motion

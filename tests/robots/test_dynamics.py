@@ -15,6 +15,15 @@ _MASSES = Masses()
 _PAYLOAD_KG = 2.5
 
 
+def _at_rest(robot, actuators, points, masses=_MASSES, payload_kg=_PAYLOAD_KG):
+    """The Loads of a robot that stands at points (n, 3)."""
+    still = np.zeros_like(actuators)
+    payload = np.full(len(points), payload_kg)
+    return loads(
+        robot, masses, robot.map_at(actuators, points), actuators, (still, still), np.zeros_like(points), payload
+    )
+
+
 def _motion(n):
     generator = np.random.default_rng(2)
     return generator.uniform(-200.0, 200.0, (n, 3)), generator.uniform(-300.0, 300.0, (n, 3))
@@ -76,16 +85,7 @@ def _potential(theta, guess):
 
 def test_static_torque_is_the_potential_energys_slope(rich_poses):
     points, theta = rich_poses
-    nothing = np.zeros_like(points)
-    torque = loads(
-        _ROBOT,
-        _MASSES,
-        _ROBOT.map_at(theta, points),
-        theta,
-        (nothing, nothing),
-        nothing,
-        np.full(len(points), _PAYLOAD_KG),
-    ).drive
+    torque = _at_rest(_ROBOT, theta, points).drive
     h = 1e-5
     for leg in range(3):
         step = h * np.eye(3)[leg]
@@ -141,25 +141,8 @@ def test_legs_carry_the_platform_along_their_forearms(rich_poses):
 @pytest.mark.parametrize("payload_kg", [0.0, 4.0])
 def test_forces_grow_with_the_mass_that_hangs_on_the_platform(rich_poses, payload_kg):
     points, theta = rich_poses
-    nothing = np.zeros_like(points)
-    bare = loads(
-        _ROBOT,
-        Masses(1.0, 0.0, 0.0),
-        _ROBOT.map_at(theta, points),
-        theta,
-        (nothing, nothing),
-        nothing,
-        np.zeros(len(points)),
-    )
-    full = loads(
-        _ROBOT,
-        _MASSES,
-        _ROBOT.map_at(theta, points),
-        theta,
-        (nothing, nothing),
-        nothing,
-        np.full(len(points), payload_kg),
-    )
+    bare = _at_rest(_ROBOT, theta, points, Masses(1.0, 0.0, 0.0), payload_kg=0.0)
+    full = _at_rest(_ROBOT, theta, points, payload_kg=payload_kg)
     np.testing.assert_allclose(full.member_n, bare.member_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
     np.testing.assert_allclose(full.held_n, bare.held_n * (3.0 + 1.8 + payload_kg), rtol=1e-12)
 
@@ -167,8 +150,7 @@ def test_forces_grow_with_the_mass_that_hangs_on_the_platform(rich_poses, payloa
 def test_held_forces_carry_the_load_along_the_lines_from_elbow_to_joint(rich_poses):
     """Independent: the elbow from the definition of the drive arm, the balance of forces at the platform."""
     points, theta = rich_poses
-    nothing, payload = np.zeros_like(points), np.full(len(points), _PAYLOAD_KG)
-    force = loads(_ROBOT, _MASSES, _ROBOT.map_at(theta, points), theta, (nothing, nothing), nothing, payload).held_n
+    force = _at_rest(_ROBOT, theta, points).held_n
     total = np.zeros_like(points)
     for leg, azimuth in enumerate(_ROBOT.azimuth_rad):
         out = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
@@ -187,16 +169,7 @@ def test_gravity_points_down_in_every_robots_frame():
 @pytest.mark.parametrize("robot", [Delta(), Ptt3()], ids=["delta", "ptt3"])
 def test_legs_without_an_inner_joint_are_held_as_they_are(robot):
     actuators = robot.inverse([robot.legs.home_mm]) if robot.name == "delta" else robot.inverse([[10.0, 5.0, -250.0]])
-    position, nothing = robot.forward(actuators), np.zeros((1, 3))
-    load = loads(
-        robot,
-        _MASSES,
-        robot.map_at(actuators, position),
-        actuators,
-        (nothing, nothing),
-        nothing,
-        np.full(1, _PAYLOAD_KG),
-    )
+    load = _at_rest(robot, actuators, robot.forward(actuators))
     np.testing.assert_array_equal(load.held_n, load.member_n)
 
 
@@ -211,10 +184,7 @@ def test_bars_carry_a_hexapods_own_masses():
     own += [Lump(f"leg {k} end", 0.5, np.zeros(3)) for k in range(1, 7)]
     robot = hexapod(base, plate, 400.0, lumps=tuple(own))
     points = np.add([0.0, 0.0, 400.0], np.random.default_rng(8).uniform(-60.0, 60.0, (20, 3)))
-    legs, still = robot.inverse(points), np.zeros((20, 6))
-    load = loads(
-        robot, Masses(0.0, 0.0, 0.0), robot.map_at(legs, points), legs, (still, still), np.zeros((20, 3)), np.zeros(20)
-    )
+    load = _at_rest(robot, robot.inverse(points), points, Masses(0.0, 0.0, 0.0), payload_kg=0.0)
     for point, found in zip(points, load.member_n, strict=True):
         ends = plate + point
         lines = (ends - base) / np.linalg.norm(ends - base, axis=1, keepdims=True)

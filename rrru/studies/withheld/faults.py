@@ -83,8 +83,6 @@ KINDS = {
     "base_on_springs": Kind(_leaning_base, None),
     "speed_friction": Kind(_speed_friction, None),
 }
-# what shows only while the robot moves; all others are read at rest
-IN_MOTION = ("slow_servo", "speed_friction")
 # what is given to the robots of one model, one after the other
 ORDER = (
     *("play", NONE, "soft_servo", "base_on_springs", "slow_servo", "length", NONE, "soft_link", "speed_friction"),
@@ -127,6 +125,11 @@ class Fault:
     def scaled(self, factor):
         """The same fault, so many times as large."""
         return replace(self, sizes=tuple((factor * np.array(self.sizes)).tolist()))
+
+    def moves(self, robot):
+        """Whether it shows only while the robot moves; all others are read at rest."""
+        law = KINDS[self.kind].law
+        return bool(law and "drive_rate" in law(robot).needs)
 
     def beyond(self, robot):
         """Whether it is larger than the law of the library allows that is the right answer."""

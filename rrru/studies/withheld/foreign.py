@@ -21,7 +21,7 @@ from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
 from rrru.studies.withheld.box import draw_trajectories
-from rrru.studies.withheld.faults import IN_MOTION, KINDS, Fault, draw_fault, kinds_of
+from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
 from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.plants import PLANTS
 from rrru.studies.withheld.robots import Conditions, WithheldCampaign
@@ -33,7 +33,7 @@ _OFFSET_SD = {"rad": 0.002, "mm": 0.5}
 _DRAWS, _STEPS = 20, 2
 # a gap over the noise that is rounding
 _NOTHING = 1e-6
-# MuJoCo's robots rest where they are read unless their servos are slow: inertia is to be a hundredth of weight at most
+# so slow that inertia, of those that are read as they move, stays about a hundredth of the weight
 _MOTION = {"speed_mm_s": 40.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
 _PLAIN = {"reverse": False, "payload_kg": 0.0}
 # some 190 points: there and back, faster, loaded
@@ -128,7 +128,7 @@ class FileRobot:
         robot = PLANTS[self.plant](conditions, self.offsets, *self.acting)
         sees = Sees(conditions.model.targets)
         plan, noise_mm = self.plan(conditions), conditions.noise_mm
-        if not any(one.kind in IN_MOTION for one in self.acting):
+        if not any(one.moves(conditions.mechanism) for one in self.acting):
             plan = plan.resting(SETTLE_S)
         return WithheldCampaign(robot, plan, noise_mm, conditions.seed, self.name, sees=sees)
 

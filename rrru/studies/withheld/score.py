@@ -99,6 +99,6 @@ def true_share(robot, about, mechanism, calibrated, state):
     driven = fresh_runs(robot, about.conditions)
     if driven is None:
         return np.nan
-    case = _case(driven, about, about.library, mechanism).standing(State(calibrated, {}))
+    case = _case(driven, about, about.library, mechanism).standing(state)
     before, after = case.residual(State(calibrated, {})), case.residual(state)
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))
