@@ -10,6 +10,9 @@ It enters at the length L3, one compliance per leg, and is linear in k. The plat
 its weight, and further in proportion to a payload, which tells it from errors of the lengths; `drive_compliance` does
 so too, but with the drive's torque, so that the pattern over the workspace differs.
 
+A member that is itself driven, as a hexapod's leg, is no forearm: a spring along it does what its drive's does,
+whatever of the leg it is, and both are `drive_compliance`.
+
 Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
 leg is one two-force member from elbow to U-joint (`held_n` of `rrru.robots.dynamics.Loads`). Both are tried; `held` is
 0 or 1, or a share between.
@@ -33,6 +36,7 @@ import numpy as np
 
 from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.legs import unit_twist
 
 _SIZE = ("flexure", "mm/N", 0.0, 0.1)
 _BEND = ("bending", "rad/(N mm)", 0.0, 1e-6)
@@ -44,11 +48,23 @@ def for_robot(robot):
     members = robot.parts.members
     if not members:
         return _across_joints(robot.legs.arm_joints)
+    if all(_driven(robot, member) for member in members):
+        return None
     sizes = leg_parameters("axial spring of forearm and its joints, size assumed", _SIZE, count=len(members))
     # a joint within the leg may be held
     shapes = ({"held": 0.0}, {"held": 1.0}) if robot.parts.held_from else ({"held": 0.0},)
     parameters = ParameterSet((*sizes, _HELD))
     return Effect("link_flexure", parameters, plain_coordinates(parameters, 2e-3, shapes), _shortened, ("force_n",))
+
+
+def _driven(robot, member):
+    """Whether a drive does nothing but make a member, of these sites, longer."""
+    nothing = np.zeros(6)
+    lengthened = {site: unit_twist(0) for site in member}
+    return any(
+        all(np.array_equal(lengthened.get(s, nothing), drive.twists.get(s, nothing)) for s in {*member, *drive.twists})
+        for drive in robot.parts.drives
+    )
 
 
 def _shortened(motion, values):

@@ -1,14 +1,12 @@
 """The motion that the effects see, from what the platform is told to do. Lengths mm, angles rad, forces N, times s."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from rrru.effects.protocol import Motion
-from rrru.robots.dynamics import drive_rates, loads
-
-# fields of a Motion that are loads
-LOADS = frozenset(("force_n", "held_force_n", "drive_load", "follower_load", "across", "base_moment"))
+from rrru.effects.protocol import LOADS, Motion
+from rrru.robots.dynamics import drive_rates, load_slopes, loads
 
 
 @dataclass(frozen=True)
@@ -63,12 +61,8 @@ def make_motion(robot, masses, course, stands=None):
         path_index=np.asarray(course.path_index),
         time_s=np.asarray(course.time_s, dtype=float),
         payload_kg=payload,
-        force_n=load.member_n,
-        held_force_n=load.held_n,
-        drive_load=load.drive,
-        follower_load=load.followers,
-        across=load.across,
-        base_moment=load.base,
+        **{name: getattr(load, own) for name, own in LOADS.items()},
+        load_slopes=partial(load_slopes, robot, masses, at, nominal, inertial, carried),
         last_move=last_move(course.drive, course.path_index) if course.stops else np.full_like(rate, np.nan),
         temperature_c=np.broadcast_to(np.asarray(course.temperature_c, dtype=float), len(position)),
     )

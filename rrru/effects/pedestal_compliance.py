@@ -22,6 +22,7 @@ import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.dynamics import level_axes
 from rrru.robots.legs import WORLD
 
 # a law of a campaign's circumstances: it is tested where a configuration names it
@@ -34,7 +35,7 @@ _TYPICAL = np.repeat([1e-9, 3e-7], 2)
 
 def for_robot(robot):
     """The law, about the two axes of the robot's frame that are the most level."""
-    axes = np.sort(np.argsort(np.abs(robot.up), kind="stable")[:2])
+    axes = level_axes(robot)
     names = [(f"{kind}_{'xyz'[k]}", unit, low, high) for kind, unit, low, high in _KINDS for k in axes]
     parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, *ends, _SOURCE) for name, unit, *ends in names))
     about = np.eye(3)[axes]

@@ -1,7 +1,8 @@
 """What an effect is: a physical law that knows the motion and says what it changes, and where. mm, rad, N, s."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,15 @@ import numpy.typing as npt
 from rrru.parameters import Parameter, ParameterSet
 
 _ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+# fields of a Motion that are loads, and what these are of `rrru.robots.dynamics.Loads`
+LOADS = {
+    "force_n": "member_n",
+    "held_force_n": "held_n",
+    "drive_load": "drive",
+    "follower_load": "followers",
+    "across": "across",
+    "base_moment": "base",
+}
 
 
 @dataclass(frozen=True)
@@ -41,7 +51,7 @@ class Motion:
     that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
     how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
-    temperature_c (n,): of the robot.
+    temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.robots.dynamics`.
     """
 
     robot: Any
@@ -61,9 +71,27 @@ class Motion:
     base_moment: np.ndarray
     last_move: np.ndarray
     temperature_c: np.ndarray
+    load_slopes: Callable[[], tuple[Any, ...]]
 
     def __len__(self) -> int:
         return len(self.drive)
+
+    @cached_property
+    def slopes(self) -> tuple[Any, ...]:
+        """What `load_slopes` tells, made once."""
+        return self.load_slopes()
+
+    def under(self, extra_kg: float, *lean_rad: float) -> "Motion":
+        """The motion with so much more at the platform, of a base that leans about its level axes."""
+        weights = np.array([extra_kg, *lean_rad, *(extra_kg * lean for lean in lean_rad)])
+        if not weights.any():
+            return self
+        changed = {
+            name: getattr(self, name)
+            + sum(weight * getattr(slope, own) for weight, slope in zip(weights, self.slopes, strict=True))
+            for name, own in LOADS.items()
+        }
+        return replace(self, **changed)
 
     def at_drives(self, changes: np.ndarray) -> Contribution:
         """Contribution of changes (n, K) of the actuator values, in their units."""
@@ -242,6 +270,11 @@ class ActiveEffect:
     def contribute(self, motion: Motion) -> Contribution:
         """Changes at the points of a motion."""
         return self.effect.contribute(motion, self.effect.parameters.vector(self.values))
+
+
+def bears_load(effect: Any) -> bool:
+    """Whether an effect, or an unknown function, changes with the weight."""
+    return not LOADS.keys().isdisjoint(effect.needs)
 
 
 def together(effects: Iterable[ActiveEffect], motion: Motion) -> Contribution:

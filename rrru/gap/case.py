@@ -5,8 +5,8 @@ best one found. Lengths in mm, angles in rad.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
@@ -32,7 +32,8 @@ class Case:
     untestable: name to the reason for the other effects; noise_mm: deviation per axis; arm_mm: of
     `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none; beside_scale: factor by which
     rows of reflectors beside the robot count, so that they have the noise of the others; motion_at: from where the
-    robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`.
+    robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`; doubts: what the weight may
+    be off by, see `rrru.gap.weight`.
     """
 
     mechanism: object
@@ -46,6 +47,7 @@ class Case:
     noise: NoiseModel | None = None
     beside_scale: float = 1.0
     motion_at: Callable | None = None
+    doubts: dict = field(default_factory=dict)
 
     def __len__(self):
         return len(self.at)
@@ -150,11 +152,12 @@ class Case:
         """The case with the loads where the robot of a state stands, if its platform can turn.
 
         Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
+        What the weight changes of the loads stays as it was: a sag changes that by a share of itself.
         """
         if not self.mechanism.orients:
             return self
         at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
-        return replace(self, motion=self.motion_at(at))
+        return replace(self, motion=replace(self.motion_at(at), load_slopes=partial(getattr, self.motion, "slopes")))
 
     def without(self, dropped):
         """The case without the used points of the rows flagged in (m,)."""
@@ -172,11 +175,18 @@ class Case:
         actuators, command = self.driven
         return self.mechanism.forward(actuators, deviations, command)
 
+    def weight(self, state):
+        """What the weight of a state is off by, by name."""
+        return dict.fromkeys(self.doubts, 0.0) | state.weight
+
+    def contribution(self, state):
+        """What the effects of a state change along the motion."""
+        return sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
+
     def posed(self, state):
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
-        change = sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
         actuators, command = self.driven
-        twists = self.mechanism.twists(state.deviations) + change.twists
+        twists = self.mechanism.twists(state.deviations) + self.contribution(state).twists
         return self.mechanism.solve(actuators, command, twists), twists
 
     def left(self, state):

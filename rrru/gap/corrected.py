@@ -12,7 +12,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.gap.details import parameter_rows
-from rrru.gap.uncertainty import one_sigma_steps
+from rrru.gap.uncertainty import one_sigma_steps, weight_notes
 from rrru.robots.file_changes import Found
 from rrru.robots.to_mjcf import to_mjcf
 from rrru.robots.to_urdf import to_urdf
@@ -89,6 +89,7 @@ def corrected(attribution, section, folder):
     found, others = found_of(attribution)
     if attribution.posterior.probability_unexplained > _HALF:
         others.append("unexplained")
+    others += weight_notes(attribution)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
         text, lost = to_urdf(section["urdf"], found, folder, **chain)

@@ -23,7 +23,7 @@ from rrru.store.whole import write_text
 # a simulation takes about a tenth of a second a point: no more of them are driven, from the first on
 _MOST_DRIVEN = 300
 # what of a Motion has no row for each point
-_WHOLE = ("robot", "path_drive")
+_WHOLE = ("robot", "path_drive", "load_slopes")
 
 
 def write_corrected(diagnosis, section, masses, file):

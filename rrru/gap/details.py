@@ -10,9 +10,10 @@ from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import sites, spread
-from rrru.gap.uncertainty import coefficient_covariance, covariance_of, fitted_terms
+from rrru.gap.uncertainty import coefficient_covariance, covariance_of, fitted_terms, weight_of
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
+from rrru.gap.weight import WEIGHT
 
 _MOST_SETS = 20
 _LIKELY = 0.5
@@ -136,6 +137,7 @@ def parameter_rows(attribution):
             (term.effect, parameter.name, parameter.unit, *numbers)
             for parameter, *numbers in zip(effect.parameters, values, errors, bound.tolist(), strict=True)
         ]
+    result += [(WEIGHT, *numbers, False) for numbers in weight_of(attribution)]
     return pd.DataFrame(result, columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"))
 
 

@@ -23,6 +23,7 @@ from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
+from rrru.gap.uncertainty import weight_notes
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
@@ -115,6 +116,7 @@ def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     case = attribution.case
     yield from mastering_notes(attribution.state, case.mechanism)
     yield from bias_notes(attribution)
+    yield from weight_notes(attribution)
     if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
         worse = "the robot does not repeat, or the instrument is worse"
         yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"

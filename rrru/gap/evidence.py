@@ -12,11 +12,11 @@ of the gap per axis over sigma, the calibration's share taken out; positive coef
 Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
 
 A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
-`Linear.shape_columns`.
+`Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.gap.weight`).
 """
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from itertools import product
 
 import numpy as np
@@ -24,8 +24,9 @@ import numpy as np
 from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.noise_model import NoiseModel
-from rrru.gap.projected import Prior, Projected, gained, posterior_mean
+from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
+from rrru.gap.weight import WEIGHT, borne, gained_over_cases, over_cases
 from rrru.gap.whitened import LEVELS, Whitened
 
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
@@ -65,15 +66,12 @@ class ModelEvidence:
     @cached_property
     def none(self):
         """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
-        result = np.full(len(LEVELS), -np.inf)
-        result[self.levels] = [self._whitened.gram(level)[2] for level in self.levels]
-        return result
+        return np.array([self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(LEVELS))])
 
     @cached_property
     def _priors(self):
         """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
-        numbers = {name: self._whitened.layout[0][name] for name in self.linear.shape_columns}
-        return {name: Prior(k, np.ones(len(k)), np.full(len(k), np.inf), k < 0) for name, k in numbers.items()}
+        return {name: Prior.normal(self._whitened.layout[0][name]) for name in self.linear.shape_columns}
 
     def _prior(self, term):
         """The prior of one term's coefficients."""
@@ -99,15 +97,29 @@ class ModelEvidence:
 
     def projected(self, terms, levels):
         """The projected problem of a set of terms at discrepancy levels (indices)."""
+        key = tuple(terms), tuple(levels)
+        if key not in self._made:
+            self._made[key] = self._projected(terms, levels)
+        return self._made[key]
+
+    def _projected(self, terms, levels):
         priors = [self._prior(term) for term in terms]
         priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
-        owner = np.repeat(np.minimum(np.arange(len(priors)), len(terms)), [len(prior.index) for prior in priors])
-        index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
+        grams = partial(self._grams, levels)
+        problem = Projected.of(priors, len(terms), grams)
+        blocks = {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
+        return borne(problem, len(terms), blocks, self.linear.weight_steps, STRENGTHS[-1], grams) if blocks else problem
+
+    def _grams(self, levels, index):
+        """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
         grams = [self._whitened.gram(level) for level in levels]
-        gram, moment = (
-            np.array(part) for part in zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True)
-        )
-        return Projected(gram, moment, *rest, owner, index)
+        return map(np.array, zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True))
+
+    def _by_weight(self, term):
+        """The matrix from a term's coefficients to coordinates, and the columns that the weight makes of these's."""
+        numbers = self._whitened.layout[0][term.effect, term.shape, WEIGHT]
+        matrix = spread(self.library[term.effect].coordinates, term.legs)
+        return matrix, numbers.reshape(-1, len(matrix))
 
     def over_strengths(self, terms, strengths=None, levels=None):
         """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
@@ -120,7 +132,8 @@ class ModelEvidence:
         broad = self._broadest(terms)
         if broad is None:
             none = np.array([self._whitened.gram(level)[2] for level in levels])
-            return none[:, None] + gained(self.projected(terms, levels), combinations), combinations
+            found = gained_over_cases(self.projected(terms, levels), combinations)
+            return none[:, None] + found, combinations
         rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(rest, levels) if rest else None
@@ -131,12 +144,9 @@ class ModelEvidence:
     def _broadest(self, terms):
         """Number of the term of the most coefficients if these are many, None where no term has."""
         counts = [len(self._prior(term).index) for term in terms]
-        wide = [counts[k] if self._is_broad(term) else 0 for k, term in enumerate(terms)]
+        broad = [self.library[term.effect].coordinates.broad for term in terms]
+        wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
-
-    def _is_broad(self, term):
-        """Whether a term's coefficients are averaged over first."""
-        return self.library[term.effect].coordinates.broad
 
     def _beside(self, broad, strength, problem, strengths, levels):
         """Log evidence (levels, m) of a broad term at a strength beside other terms.
@@ -150,20 +160,20 @@ class ModelEvidence:
         if problem is None:
             return value
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
-        return value + gained(replace(problem, gram=gram, moment=moment), strengths)
+        return value + gained_over_cases(problem.on(gram, moment), strengths)
 
     def _average(self, term, strength, level):
         """The Average over the coefficients of a broad term at a strength and a level (an index)."""
         key = term, float(strength), int(level)
-        if key not in self._averages:
+        if key not in self._made:
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
-            self._averages[key] = Average.over(gram, moment, prior.index, prior.at(strength))
-        return self._averages[key]
+            self._made[key] = Average.over(gram, moment, prior.index, prior.at(strength))
+        return self._made[key]
 
     @cached_property
-    def _averages(self):
-        """Averages that have been asked for."""
+    def _made(self):
+        """Problems and averages that have been asked for."""
         return {}
 
     def independent(self, terms, levels):
@@ -209,15 +219,15 @@ class ModelEvidence:
         if broad is None:
             return self.coefficients(terms, strengths, level)[0]
         rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
-        index, found = np.zeros(0, dtype=int), np.zeros(0)
+        index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
         if rest:
             problem = self.projected(rest, [level])
             index = problem.index
-            gram, moment = self._average(terms[broad], strengths[broad], level).rest(index)
-            scale = problem.scale(np.delete(strengths, broad)[None])[0]
-            found = posterior_mean(gram + np.diag(scale**-2.0), moment, problem.positive)
+            problem = problem.on(*(p[None] for p in self._average(terms[broad], strengths[broad], level).rest(index)))
+            found, _ = over_cases(problem, np.delete(strengths, broad)[None])
         gram, moment, _ = self._whitened.gram(level)
-        own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, found)
+        others = found if problem is None or problem.mix is None else problem.mix @ found
+        own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, others)
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], own, found[before:]])
 
@@ -226,10 +236,7 @@ class ModelEvidence:
 
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
-        problem = self.projected(terms, [level])
-        moment, positive = problem.moment[0], problem.positive
-        precision = problem.gram[0] + np.diag(problem.scale(np.asarray(strengths)[None])[0] ** -2.0)
-        return posterior_mean(precision, moment, positive), np.linalg.inv(precision)
+        return over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
 
     def calibration(self, terms, level):
         """Covariance (p, p) of the calibration's deviations at known coefficients of terms, and how they follow these.

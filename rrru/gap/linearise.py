@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from rrru.effects.protocol import bears_load
 from rrru.errors import FitError
 from rrru.gap.state import Linear
 
@@ -28,6 +29,7 @@ def linearised(case, state, keys=None):
         {name: shape_columns for name, (shape_columns, _) in by_shape.items()},
         {name: steps for name, (_, steps) in by_shape.items()},
         case.of_rows(at.drive_effect),
+        *_by_weight(case, at, state, columns),
     )
 
 
@@ -53,6 +55,17 @@ def _by_shape(case, at, key, state):
             steps.append((name, value, stepped))
     nothing = np.zeros((len(case), 3, 0))
     return np.stack(columns, axis=-1) if columns else nothing, tuple(steps)
+
+
+def _by_weight(case, at, state, columns):
+    """`Linear.by_weight` of columns, and `Linear.weight_steps`."""
+    weight, made = case.weight(state), {key: [] for key in columns if bears_load(case.library[key[0]])}
+    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in case.doubts.items()]
+    for name, _, stepped, _ in steps:
+        other = state.under(weight | {name: stepped})
+        for key, one in made.items():
+            one.append(_columns(case, at, key, other) - columns[key])
+    return {key: np.concatenate(parts, axis=-1) for key, parts in made.items() if parts}, tuple(steps)
 
 
 def _columns(case, at, key, state):

@@ -13,6 +13,7 @@ from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.case import Case
 from rrru.gap.unknown import unknown_functions
+from rrru.gap.weight import doubts_of
 
 # an effect is tested where at least this share of the points has what it needs
 _ENOUGH = 0.8
@@ -50,7 +51,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     sizes = float(noise_mm), float(arm_mm)
-    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at)
+    doubts = doubts_of(motion, masses)
+    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at, doubts=doubts)
 
 
 def _tested(library, motion, used, told):

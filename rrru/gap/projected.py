@@ -1,6 +1,6 @@
 """Least squares of some coefficients with their priors, the calibration taken out, as the evidence needs it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +10,18 @@ from rrru.gap import evidence_kernels as kernels
 
 
 class Prior(NamedTuple):
-    """Prior of k coefficients: their columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
+    """Prior of k coefficients: columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
 
     index: np.ndarray
     size: np.ndarray
     largest: np.ndarray
     positive: np.ndarray
+
+    @classmethod
+    def normal(cls, index):
+        """Of columns of unit deviation, which no strength scales."""
+        nothing = np.zeros(len(index))
+        return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
 
     def at(self, strength):
         """Sizes at a strength."""
@@ -26,9 +32,10 @@ class Prior(NamedTuple):
 class Projected:
     """Least squares of k coefficients with their priors, the calibration taken out.
 
-    Those of the terms come first, those of their shapes, owned by nobody, last. gram (levels, k, k), moment (levels,
-    k); size, largest, positive (k,): of the prior; owner (k,): number of the term, the terms' count for nobody; index
-    (k,): of the columns.
+    Those of the terms come first, then those of their shapes, last those of the weight, both owned by nobody. gram
+    (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
+    term, the terms' count for nobody; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
+    these, None where they are the same; weights: how many coefficients are the weight's.
     """
 
     gram: np.ndarray
@@ -36,8 +43,27 @@ class Projected:
     size: np.ndarray
     largest: np.ndarray
     positive: np.ndarray
+    about: np.ndarray
     owner: np.ndarray
     index: np.ndarray
+    mix: np.ndarray | None = None
+    weights: int = 0
+
+    @classmethod
+    def of(cls, priors, count, grams):
+        """Of the Priors of so many terms, and after them of their shapes.
+
+        grams: from numbers (k,) of columns to their Gram matrices (levels, k, k) and moments (levels, k).
+        """
+        owner = np.repeat(np.minimum(np.arange(len(priors)), count), [len(prior.index) for prior in priors])
+        index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
+        return cls(*grams(index), *rest, np.zeros(len(index)), owner, index)
+
+    def on(self, grams, moments):
+        """The problem on other Gram matrices (levels, r, r) and moments (levels, r) of its columns."""
+        if self.mix is None:
+            return replace(self, gram=grams, moment=moments)
+        return replace(self, gram=self.mix.T @ grams @ self.mix, moment=moments @ self.mix)
 
     def scale(self, strengths):
         """Prior standard deviations (m, k) at strengths (m, terms)."""
@@ -49,13 +75,21 @@ def gained(problem, strengths):
     """Log evidence (levels, m) of a Projected problem at strengths (m, terms) over that of none of its terms."""
     scale = np.ascontiguousarray(problem.scale(strengths))
     gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
-    return kernels.log_evidence(gram, moment, scale, problem.positive)
+    if not problem.about.any():
+        return kernels.log_evidence(gram, moment, scale, problem.positive)
+    explained = gram @ problem.about
+    at_means = (moment - 0.5 * explained) @ problem.about
+    return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
 
 
-def posterior_mean(precision, moment, positive):
-    """The mean (k,) of normal coefficients, or where that has negative positive ones their most probable point."""
+def posterior_mean(gram, moment, scale, positive, about):
+    """The mean (k,) of normal coefficients, or where that has negative positive ones their most probable point.
+
+    gram (k, k), moment (k,); scale, positive, about (k,): of the prior.
+    """
+    precision, moment = gram + np.diag(scale**-2.0), moment - gram @ about
     mean = np.linalg.solve(precision, moment)
-    return _not_negative(precision, moment, positive) if (mean[positive] < 0.0).any() else mean
+    return about + (_not_negative(precision, moment, positive) if (mean[positive] < 0.0).any() else mean)
 
 
 def _not_negative(precision, moment, positive):

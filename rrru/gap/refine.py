@@ -4,9 +4,11 @@ from contextlib import suppress
 
 import numpy as np
 
+from rrru.effects.protocol import bears_load
 from rrru.errors import FitError
 from rrru.gap.state import State
 from rrru.gap.terms import spread
+from rrru.gap.weight import LEAST, MOST, WEIGHT
 
 _STEPS, _HALVINGS = 6, 5
 # relative gain in the sum of squares below which the search has ended
@@ -42,17 +44,17 @@ def _descent(case, state, hypothesis, level):
     """Gauss-Newton on a renewed linearisation, steps halved where worse: cost, state, covariance, whether none was."""
     keys = [(term.effect, term.shape) for term in hypothesis.terms]
     library, strengths = case.library, hypothesis.strengths[level]
-    state = State(
-        state.deviations,
-        {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys},
-        {key[0]: state.shape(library, key) for key in keys},
-    )
+    shapes = {key[0]: state.shape(library, key) for key in keys}
+    if any(bears_load(library[name]) for name, _ in keys):
+        shapes[WEIGHT] = case.weight(state)
+    numbers = {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys}
+    state = State(state.deviations, numbers, shapes)
     cost, covariance, straight = _cost(case, state), None, True
     for _ in range(_STEPS):
         linear = case.linearise(state, keys)
         evidence = case.evidence(linear)
         mean, covariance = evidence.coefficients(hypothesis.terms, strengths, level)
-        target = _target(linear, state, hypothesis, mean, library)
+        target = _target(case, linear, state, hypothesis, mean)
         last = cost
         for halving in range(_HALVINGS):
             trial = _between(state, target, 0.5**halving)
@@ -70,9 +72,9 @@ def _descent(case, state, hypothesis, level):
     return cost, state, covariance[:count, :count], straight
 
 
-def _target(linear, state, hypothesis, mean, library):
+def _target(case, linear, state, hypothesis, mean):
     """The state that the linearisation asks for: the terms' coefficients, their shapes, the calibration beside them."""
-    effects, start = {}, 0
+    effects, start, library = {}, 0, case.library
     for term in hypothesis.terms:
         matrix = spread(library[term.effect].coordinates, term.legs)
         effects[term.effect, term.shape] = matrix @ mean[start : start + matrix.shape[1]]
@@ -87,6 +89,15 @@ def _target(linear, state, hypothesis, mean, library):
             shapes[term.effect] = dict(shapes[term.effect]) | {name: moved}
             rest = rest - share * linear.shape_columns[term.effect][..., k]
             start += 1
+    if state.weight:
+        shares = np.clip(mean[start:], -_MOST_SHAPE_STEPS, _MOST_SHAPE_STEPS)
+        for (name, value, stepped, _), share in zip(linear.weight_steps, shares.tolist(), strict=True):
+            bounds = LEAST * case.doubts[name], MOST * case.doubts[name]
+            shapes[WEIGHT] = shapes[WEIGHT] | {name: float(np.clip(value + share * (stepped - value), *bounds))}
+        for key, numbers in effects.items():
+            if key in linear.by_weight:
+                each = linear.by_weight[key].reshape(*rest.shape, len(shares), -1)
+                rest = rest - (each @ numbers) @ shares
     change, *_ = np.linalg.lstsq(linear.base.reshape(rest.size, -1), rest.ravel(), rcond=None)
     return State(state.deviations + change, effects, shapes)
 

@@ -144,8 +144,8 @@ share_closed_high      float? upper end, 95 %, 0 to 1; below 0 where the correct
     where there is no gap
 
 ## gap_parameters | tables/gap_parameters.parquet | campaign effect parameter
-The corrected simulator: parameters of the effects in the verdict, and the errors (effect: calibration) fitted with
-them.
+The corrected simulator: parameters of the effects in the verdict, the errors (effect: calibration) fitted with them,
+and, where one of them bears loads, what the weight is off by (effect: weight).
 --
 campaign effect
 parameter              str    name of the parameter

@@ -1,20 +1,33 @@
 """A corrected sim, and the sim linearised about it. Lengths in mm, angles in rad."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+
+from rrru.effects.protocol import bears_load
+from rrru.gap.weight import WEIGHT
 
 
 @dataclass(frozen=True)
 class State:
     """A corrected sim: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
 
-    shape_values: effect to the values of its shape's parameters where they have been fitted further.
+    shape_values: effect to the values of its shape's parameters where they have been fitted further; "weight" to what
+    the weight is off by.
     """
 
     deviations: np.ndarray
     effects: dict
     shape_values: dict = field(default_factory=dict)
+
+    @property
+    def weight(self):
+        """What the weight is off by, by name, empty where that was not fitted; see `rrru.gap.weight`."""
+        return self.shape_values.get(WEIGHT, {})
+
+    def under(self, weight):
+        """The state with another weight."""
+        return replace(self, shape_values=self.shape_values | {WEIGHT: weight})
 
     def shape(self, library, key):
         """Values of the shape's parameters of one effect (name, shape) by name."""
@@ -29,7 +42,8 @@ class State:
         coordinates = self.effects[key] if coordinates is None else coordinates
         effect = library[key[0]]
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
-        return effect.contribute(motion, values)
+        borne = motion.under(*self.weight.values()) if self.weight and bears_load(effect) else motion
+        return effect.contribute(borne, values)
 
 
 @dataclass(frozen=True)
@@ -40,7 +54,9 @@ class Linear:
     mechanism's deviations; columns: (effect, shape) to the derivative (m, 3, c) by the effect's coordinates;
     shape_columns: effect of the state to what its shape's parameters may be wrong by, (m, 3, q), each column one
     standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
-    derivative by the actuator values.
+    derivative by the actuator values; by_weight: (effect, shape) of what bears loads to what a step of each of q
+    numbers of the weight makes of its columns, (m, 3, q c); weight_steps: these numbers, each (name, value, stepped
+    value, prior mean of so many steps).
     """
 
     data: np.ndarray
@@ -49,3 +65,5 @@ class Linear:
     shape_columns: dict
     shape_steps: dict
     drive: np.ndarray
+    by_weight: dict = field(default_factory=dict)
+    weight_steps: tuple = ()

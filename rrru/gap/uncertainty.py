@@ -9,6 +9,9 @@ import numpy as np
 
 from rrru.gap.terms import spread
 
+# standard errors from which on the weight is told to be off
+_TOLD = 3.0
+
 
 def fitted_terms(attribution):
     """The terms whose coefficients the state holds, in the order of its covariance."""
@@ -24,6 +27,29 @@ def coefficient_covariance(attribution):
     # the state was fitted with other choices of legs
     strengths = attribution.hypothesis.strengths_of(terms, level)
     return attribution.evidence.coefficients(terms, strengths, level)[1][:count, :count]
+
+
+def weight_of(attribution):
+    """What the weight is off by: name, unit, value and standard error of each number, nothing where none was fitted."""
+    terms, level, linear = fitted_terms(attribution), attribution.level, attribution.evidence.linear
+    weight = attribution.state.weight
+    if not weight or not attribution.evidence.projected(terms, [level]).weights:
+        return []
+    strengths = attribution.hypothesis.strengths_of(terms, level)
+    _, covariance = attribution.evidence.coefficients(terms, strengths, level)
+    errors = np.sqrt(np.diag(covariance)[-len(weight) :])
+    return [
+        (name, "kg" if name.endswith("kg") else "rad", weight[name], float(abs(stepped - value) * error))
+        for (name, value, stepped, _), error in zip(linear.weight_steps, errors, strict=True)
+    ]
+
+
+def weight_notes(attribution):
+    """Sentences on what the weight is surely off by."""
+    for name, unit, value, error in weight_of(attribution):
+        if abs(value) > _TOLD * error:
+            what = "more at the platform" if unit == "kg" else f"that the base leans about {name[-1]}"
+            yield f"weight not as told: {value:.3g} +- {error:.2g} {unit} {what}"
 
 
 def covariance_of(attribution):

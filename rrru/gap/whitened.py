@@ -12,6 +12,7 @@ import numpy as np
 from rrru.campaign.noise import along_runs
 from rrru.gap.noise_model import NoiseModel, lengths
 from rrru.gap.terms import EACH, SAME, per_leg, spread
+from rrru.gap.weight import WEIGHT
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
@@ -50,6 +51,7 @@ class Whitened:
         linear = self.linear
         blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
         blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
+        blocks += [((*key, WEIGHT), columns.shape[-1]) for key, columns in linear.by_weight.items()]
         ends = np.cumsum([0, *(size for _, size in blocks)])
         numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
         made = [np.zeros((ends[-1], 0))]
@@ -65,7 +67,8 @@ class Whitened:
     def _together(self):
         """Columns of calibration and effects, and the data, (m, 3, k), by the runs' cosines; waves (m,)."""
         linear = self.linear
-        blocks = (linear.base, *linear.columns.values(), *linear.shape_columns.values(), linear.data[..., None])
+        beside = *linear.shape_columns.values(), *linear.by_weight.values()
+        blocks = linear.base, *linear.columns.values(), *beside, linear.data[..., None]
         return along_runs(np.concatenate(blocks, axis=-1), self.run)
 
     @cached_property

@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from rrru.effects.library import active_effects
-from rrru.effects.motion import LOADS, make_motion, standing
-from rrru.effects.protocol import together
+from rrru.effects.motion import make_motion, standing
+from rrru.effects.protocol import bears_load, together
 from rrru.errors import ConfigError
 from rrru.plant.driven import DrivenRobot
 from rrru.robots.dynamics import Masses
@@ -49,7 +49,7 @@ class VirtualRobot(DrivenRobot):
         """
         course = self.course(plan, controller)
         motion, sent = make_motion(self.mechanism, self.masses, course), (course.drive, course.position_mm)
-        if self.mechanism.orients and any(LOADS.intersection(active.effect.needs) for active in self.effects):
+        if self.mechanism.orients and any(bears_load(active.effect) for active in self.effects):
             for _ in range(_SAGS):
                 at = standing(self.mechanism, sent, self.posed(motion, course.position_mm))
                 motion = make_motion(self.mechanism, self.masses, course, at)

@@ -142,6 +142,7 @@ class Delta(Tripod):
         columns = [turned, cosine * self.radial - sine * up, np.zeros(3), self.radial]
         return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
 
-    def own_load(self, masses, motion, _poses):
+    def own_load(self, masses, motion, _poses, gravity_mm_s2):
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
-        return arm_load(masses, self.l1_mm, motion[0], motion[2])
+        pulls = -np.cos(motion[0]) * gravity_mm_s2[2] - np.sin(motion[0]) * (self.radial @ gravity_mm_s2)
+        return arm_load(masses, self.l1_mm, pulls, motion[2])

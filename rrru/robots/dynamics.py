@@ -15,11 +15,11 @@ d_i with the force
     F_i = W . dx/db_i + (m_a + m_f / 2) (g . d_i - b_i'')
 
 Gravity points along +z in the 3-RRRU's frame and along -z in the others'. The platform's translation is the only motion
-of the loads at the platform; a forearm's own rotation is left out. Lengths mm, angles rad, forces N, torques N mm,
-masses kg, times s.
+of the loads at the platform; a forearm's own rotation is left out. On a base that leans by a small turn w the weight is
+g - w x g in the robot's frame. Lengths mm, angles rad, forces N, torques N mm, masses kg, times s.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -63,9 +63,17 @@ def gravity(robot):
     return -GRAVITY_MM_S2 * np.asarray(robot.up)
 
 
-def arm_load(masses, arm_mm, theta_rad, acceleration):
-    """Torques (n, k) in N mm on drives of arms that stand level at theta_rad = 0, of their masses and half forearms."""
-    weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * GRAVITY_MM_S2 * arm_mm * np.cos(theta_rad)
+def level_axes(robot):
+    """Numbers (2,) of the axes of a robot's frame that are the most level."""
+    return np.sort(np.argsort(np.abs(robot.up), kind="stable")[:2])
+
+
+def arm_load(masses, arm_mm, pulls, acceleration):
+    """Torques (n, k) in N mm of their own masses and half forearms on drives that turn level arms.
+
+    pulls (n, k): gravity in mm/s^2 along the way of the arms' ends; acceleration (n, k): of the drives.
+    """
+    weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * arm_mm * pulls
     inertia = (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm_mm**2
     return (weight - inertia * acceleration) / PER_NEWTON
 
@@ -86,6 +94,9 @@ class Loads:
     across: np.ndarray
     base: np.ndarray
 
+    def __add__(self, other):
+        return Loads(*(getattr(self, one.name) + getattr(other, one.name) for one in fields(Loads)))
+
 
 def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payload_kg):
     """Loads of a motion; at: TwistMap of its poses at actuators (n, K); drive_motion: rates and accelerations (n, K) of
@@ -93,32 +104,90 @@ def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payloa
 
     NaN where a pose cannot be reached.
     """
-    force = _platform_load(robot, masses, acceleration_mm_s2, payload_kg)
-    member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
+    force = carried_kg(robot, masses, payload_kg)[:, None] * (gravity(robot) - acceleration_mm_s2) / PER_NEWTON
     motion = np.asarray(actuators, dtype=float), *drive_motion
-    member = member + robot.own_member_forces(motion, at.poses)
+    return _of_platform(robot, at, force) + _of_parts(robot, masses, at, motion, gravity(robot))
+
+
+def load_slopes(robot, masses, at, actuators, acceleration_mm_s2, payload_kg):
+    """Derivatives of `loads`: by the platform's mass in kg, by the lean of the base about each level axis, and by
+    mass and each of these leans.
+
+    Exact but for the square of the lean.
+    """
+    mass, still = carried_kg(robot, masses, payload_kg)[:, None], np.zeros(np.shape(actuators))
+    motion = np.asarray(actuators, dtype=float), still, still
+    leaning = [-np.cross(axis, gravity(robot)) for axis in np.eye(3)[level_axes(robot)]]
+    by_mass = _of_platform(robot, at, (gravity(robot) - acceleration_mm_s2) / PER_NEWTON)
+    per_kg = [_of_platform(robot, at, np.ones_like(mass) * one / PER_NEWTON) for one in leaning]
+    by_lean = [
+        _of_platform(robot, at, mass * one / PER_NEWTON) + _of_parts(robot, masses, at, motion, one) for one in leaning
+    ]
+    return by_mass, *by_lean, *per_kg
+
+
+def carried_kg(robot, masses, payload_kg):
+    """Masses (n,) at the platform: its own, payload_kg (n,) and its half of the forearms."""
+    return masses.platform_kg + np.asarray(payload_kg, dtype=float) + 0.5 * len(robot.parts.members) * masses.forearm_kg
+
+
+def _of_platform(robot, at, force):
+    """The Loads of forces (n, 3) in N at the platform."""
+    member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
     held = _held(robot, at, force) if robot.parts.held_from else member
-    own = robot.own_load(masses, motion, at.poses)
-    driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force) + own
+    driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force)
+    return _with_followers(robot, driven, member, held, _across(robot, at, force), np.cross(at.point_mm, force))
+
+
+def _of_parts(robot, masses, at, motion, gravity_mm_s2):
+    """The Loads of all that moves but for the platform.
+
+    motion: values, rates and accelerations (n, K) of the drives.
+    """
+    member = robot.own_member_forces(motion, at.poses, gravity_mm_s2)
+    driven = robot.own_load(masses, motion, at.poses, gravity_mm_s2)
+    count, sizes = len(motion[0]), (len(robot.parts.members), len(robot.legs.driven_kinds))
+    member, driven = (np.broadcast_to(one, (count, size)) for one, size in zip((member, driven), sizes, strict=True))
+    held = np.zeros((count, 3)) if robot.parts.held_from else member
+    base = robot.own_base_moment(motion, at.poses, gravity_mm_s2)
+    return _with_followers(robot, driven, member, held, _own_across(robot, at, motion, gravity_mm_s2), base)
+
+
+def _with_followers(robot, driven, member, held, across, base):
+    """The Loads with loads (n, D) on all driven values."""
     numbers = {joint.name: joint.drive for joint in robot.legs.joints}
     followers = [numbers[one.site] for one in robot.parts.followers]
-    across = _across(robot, at, force, motion)
-    base = np.cross(at.point_mm, force) + robot.own_base_moment(motion, at.poses)
     return Loads(member, held, robot.legs.per_actuator(driven), driven[:, followers], across, base)
 
 
-def _across(robot, at, force, motion):
-    """Moments (n, J, 3) across the axes of an arm's turning joints under forces (n, 3) of the platform and its own."""
+def _across(robot, at, force):
+    """Moments (n, J, 3) across the axes of an arm's turning joints under forces (n, 3) of the platform."""
     names = robot.legs.arm_joints
     if not names:
         return np.zeros((len(at), 0, 3))
-    turns, places = (
-        np.stack(parts, axis=1) for parts in zip(*(at.frames[robot.legs.site_numbers[n]] for n in names), strict=True)
-    )
+    turns, places = _joint_frames(robot, at)
     moment = np.cross(at.point_mm[:, None] - places, force[:, None]) * _carrying(robot.legs, at.poses, names)
-    moment = moment + robot.own_moments(motion, at.poses, places)
-    axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in names])
-    own = np.einsum("njab,nja->njb", turns, moment)
+    return _across_axes(robot, turns, moment)
+
+
+def _own_across(robot, at, motion, gravity_mm_s2):
+    """The same under an arm's own masses."""
+    if not robot.legs.arm_joints:
+        return np.zeros((len(at), 0, 3))
+    turns, places = _joint_frames(robot, at)
+    return _across_axes(robot, turns, robot.own_moments(motion, at.poses, gravity_mm_s2, places))
+
+
+def _joint_frames(robot, at):
+    """Turns (n, J, 3, 3) and places (n, J, 3) of an arm's turning joints."""
+    frames = (at.frames[robot.legs.site_numbers[name]] for name in robot.legs.arm_joints)
+    return tuple(np.stack(parts, axis=1) for parts in zip(*frames, strict=True))
+
+
+def _across_axes(robot, turns, moment):
+    """What of moments (n, J, 3) about an arm's turning joints is across their axes, in their frames."""
+    axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in robot.legs.arm_joints])
+    own = np.einsum("njab,nja->njb", turns, np.broadcast_to(moment, turns.shape[:3]))
     return own - (own * axes).sum(axis=-1, keepdims=True) * axes
 
 
@@ -152,9 +221,3 @@ def _held(robot, at, force):
     line = np.stack([at.frames[numbers[far]][1] - at.frames[numbers[near]][1] for near, far in pairs], axis=1)
     line /= np.linalg.norm(line, axis=-1, keepdims=True)
     return -np.linalg.solve(line.transpose(0, 2, 1), force[..., None])[..., 0]
-
-
-def _platform_load(robot, masses, acceleration_mm_s2, payload_kg):
-    """Weight and inertia force (n, 3) in N of platform, payload and the platform's half of the forearms."""
-    mass = masses.platform_kg + np.asarray(payload_kg, dtype=float) + 0.5 * len(robot.parts.members) * masses.forearm_kg
-    return mass[:, None] * (gravity(robot) - acceleration_mm_s2) / PER_NEWTON

@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 from rrru.errors import ConfigError
 from rrru.robots import geometric_numbers
 from rrru.robots.drive_step import bar_lengths, drives_from_home, end_of, followed, near_or_followed
-from rrru.robots.dynamics import gravity
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
 from rrru.robots.lumps import base_moment, driven_loads, member_forces, moments
@@ -198,21 +197,21 @@ class GeneralRobot(Robot):
             return bar_lengths(self.legs, self.drive_range, place, twists)
         return drives_from_home(self, (position, wanted), twists, deviations is not None)
 
-    def own_load(self, _masses, motion, poses):
+    def own_load(self, _masses, motion, poses, gravity_mm_s2):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""
-        return driven_loads(self, motion, poses, gravity(self)) if self.lumps else 0.0
+        return driven_loads(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
 
-    def own_member_forces(self, motion, poses):
+    def own_member_forces(self, motion, poses, gravity_mm_s2):
         """Forces (n, members) in N of the robot's point masses on its members, compression positive."""
-        return member_forces(self, motion, poses, gravity(self)) if self.lumps else 0.0
+        return member_forces(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
 
-    def own_moments(self, motion, poses, at_mm):
+    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
         """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
-        return moments(self, motion, poses, gravity(self), at_mm) if self.lumps else 0.0
+        return moments(self, motion, poses, gravity_mm_s2, at_mm) if self.lumps else 0.0
 
-    def own_base_moment(self, motion, poses):
+    def own_base_moment(self, motion, poses, gravity_mm_s2):
         """Moments (n, 3) in N mm of the robot's point masses about the origin."""
-        return base_moment(self, motion, poses, gravity(self)) if self.lumps else 0.0
+        return base_moment(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
 
     @property
     def workspace_lines(self):

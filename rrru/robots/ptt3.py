@@ -28,7 +28,7 @@ import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.parameters import LEGS
-from rrru.robots.dynamics import PER_NEWTON, gravity
+from rrru.robots.dynamics import PER_NEWTON
 from rrru.robots.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.robots.three_legs import Deviation, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
@@ -161,9 +161,9 @@ class Ptt3(Tripod):
         """Unit directions (3 legs, 3) in which the sliders count up."""
         return self._directions(self.numbers(deviations))[2]
 
-    def own_load(self, masses, motion, _poses):
+    def own_load(self, masses, motion, _poses, gravity_mm_s2):
         """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.robots.dynamics`."""
-        along = self.rails() @ gravity(self)
+        along = self.rails() @ gravity_mm_s2
         return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - motion[2]) / PER_NEWTON
 
     def jacobian(self, position_mm, slider_mm, deviations=None):

@@ -196,22 +196,22 @@ class Robot(ABC):
         at = self.map_at(actuators, position_mm)
         return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
 
-    def own_load(self, masses, motion, poses):
+    def own_load(self, masses, motion, poses, gravity_mm_s2):
         """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here.
 
-        motion: values, rates and accelerations (n, K) of the drives.
+        motion: values, rates and accelerations (n, K) of the drives; gravity_mm_s2 (3,): in the robot's frame.
         """
         return 0.0
 
-    def own_member_forces(self, motion, poses):
+    def own_member_forces(self, motion, poses, gravity_mm_s2):
         """Forces (n, members) in N on the members, compression positive, by all but the platform's load; none here."""
         return 0.0
 
-    def own_moments(self, motion, poses, at_mm):
+    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
         """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
         return 0.0
 
-    def own_base_moment(self, motion, poses):
+    def own_base_moment(self, motion, poses, gravity_mm_s2):
         """Moments (n, 3) in N mm about the origin of all that moves but for the platform; none here."""
         return 0.0
 

@@ -222,9 +222,12 @@ class Rrru3(ThreeLegs):
         """Angles (n, 12) of joints 2 to 5 of every leg near positions (n, 3), of the nominal robot there."""
         return self.passive_angles(position_mm, self.inverse(position_mm)).reshape(-1, 12)
 
-    def own_load(self, masses, motion, _poses):
+    def own_load(self, masses, motion, _poses, gravity_mm_s2):
         """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
-        return arm_load(masses, self.L1_mm, motion[0], motion[2])
+        cosine, sine = self.azimuth_cos_sin
+        outward, down = gravity_mm_s2[0] * cosine + gravity_mm_s2[1] * sine, gravity_mm_s2[2]
+        pulls = np.cos(motion[0]) * down - np.sin(motion[0]) * outward
+        return arm_load(masses, self.L1_mm, pulls, motion[2])
 
     def constraint_moments(self, position_mm, theta_rad, deviations=None):
         """Unit directions (n, 3 legs, 3) about which each leg keeps the platform from turning.

@@ -25,11 +25,16 @@ _POINTS, _ROUGH, _FINE = 16, 14, 8
 _SIZES = np.random.default_rng(9).uniform(0.3, 3.0, _ROUGH)
 
 
-def _effect(typical, positive=False, broad=False, most=np.inf):
+# prior mean of a step of the weight, which "other" bears
+_ABOUT = -1.3
+
+
+def _effect(typical, positive=False, broad=False, most=np.inf, needs=()):
     typical = np.asarray(typical, dtype=float)
     none = np.zeros(len(typical), dtype=int)
     return SimpleNamespace(
-        coordinates=Coordinates(typical, none, np.full(len(typical), positive), None, most=most, broad=broad)
+        coordinates=Coordinates(typical, none, np.full(len(typical), positive), None, most=most, broad=broad),
+        needs=needs,
     )
 
 
@@ -37,7 +42,7 @@ LIBRARY = {
     "rough": _effect(_SIZES, broad=True),
     "fine": _effect(np.ones(_FINE), broad=True),
     "free": _effect([0.3, 2.0]),
-    "other": _effect([1.0, 1.0, 1.5]),
+    "other": _effect([1.0, 1.0, 1.5], needs=("drive_load",)),
     "pull": _effect([0.7], positive=True),
 }
 ROUGH, FINE, FREE, OTHER, PULL = (Term(name) for name in LIBRARY)
@@ -48,10 +53,12 @@ def _evidence(seed, with_law=False, smooth=False):
     generator, shape = np.random.default_rng(seed), (_POINTS, 3)
     columns = {(name, 0): generator.normal(size=(*shape, len(e.coordinates))) for name, e in LIBRARY.items()}
     laws = {"free": 0.03 * generator.normal(size=(*shape, 1))} if with_law else {}
+    weight = {("other", 0): 0.2 * generator.normal(size=(*shape, 3))} if with_law else {}
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape) + 0.1 * columns["pull", 0][..., 0]
-    linear, run = Linear(data, base, columns, laws, {}, None), np.ones(_POINTS, dtype=int)
-    return ModelEvidence(LIBRARY, linear, run, NoiseModel.white(NOISE_MM), smooth)
+    steps = (("a number", 1.3, 2.3, _ABOUT),)
+    linear = Linear(data, base, columns, laws, {}, None, weight, steps)
+    return ModelEvidence(LIBRARY, linear, np.ones(_POINTS, dtype=int), NoiseModel.white(NOISE_MM), smooth)
 
 
 @dataclass(frozen=True)
@@ -63,6 +70,8 @@ class Dense:
     columns: np.ndarray
     size: np.ndarray
     owner: np.ndarray
+    about: np.ndarray
+    weight: np.ndarray
 
     @classmethod
     def of(cls, evidence, terms, strengths):
@@ -85,8 +94,15 @@ class Dense:
                 columns.append(own)
                 sizes.extend([1.0] * own.shape[1])
                 owner.extend([len(terms)] * own.shape[1])
+        weight = [False] * len(sizes)
+        if OTHER in terms and linear.by_weight:
+            columns.append(_by_weight(evidence, terms)[:, None] / NOISE_MM)
+            sizes.append(1.0)
+            owner.append(len(terms))
+            weight.append(True)
         data = linear.data.ravel() / NOISE_MM
-        return cls(data, base, np.concatenate(columns, axis=1), np.array(sizes), np.array(owner))
+        told = (np.array(one) for one in (sizes, owner, np.multiply(weight, _ABOUT), weight))
+        return cls(data, base, np.concatenate(columns, axis=1), *told)
 
     @property
     def likelihood(self):
@@ -94,21 +110,35 @@ class Dense:
         solve = np.linalg.inv(np.eye(len(self.data)) + (self.columns * self.size**2) @ self.columns.T)
         inner = self.base.T @ solve @ self.base
         projector = solve - solve @ self.base @ np.linalg.inv(inner) @ self.base.T @ solve
-        value = np.linalg.slogdet(solve)[1] - np.linalg.slogdet(inner)[1] - self.data @ projector @ self.data
+        left = self.data - self.columns @ self.about
+        value = np.linalg.slogdet(solve)[1] - np.linalg.slogdet(inner)[1] - left @ projector @ left
         return 0.5 * value
+
+    @property
+    def averaged(self):
+        """Log likelihood averaged over a weight that is as told, a tenth as doubtful, and one that is not."""
+        told = replace(self, size=np.where(self.weight, 0.1 * self.size, self.size))
+        return logsumexp([told.likelihood, self.likelihood], b=[0.5, 0.5])
 
     @property
     def _design(self):
         """Columns and data with the prior as more rows."""
         left = np.zeros((len(self.size), self.base.shape[1]))
         design = np.block([[self.base, self.columns], [left, np.diag(1.0 / self.size)]])
-        return design, np.concatenate([self.data, np.zeros(len(self.size))])
+        return design, np.concatenate([self.data, self.about / self.size])
 
     @property
     def mean(self):
         """Coefficients (k,) by least squares of the whole."""
         design, target = self._design
         return np.linalg.lstsq(design, target, rcond=None)[0][self.base.shape[1] :]
+
+    @property
+    def covariance(self):
+        """Covariance (k, k) of the coefficients, the calibration's deviations being free."""
+        design, _ = self._design
+        count = self.base.shape[1]
+        return np.linalg.inv(design.T @ design)[count:, count:]
 
     def bounded_mean(self, positive):
         """Coefficients (k,) by bounded least squares."""
@@ -121,6 +151,14 @@ class Dense:
         made = self.columns @ np.where(chosen, self.mean, 0.0)
         left = made - self.base @ np.linalg.lstsq(self.base, made, rcond=None)[0]
         return np.sqrt((left**2).mean())
+
+
+def _by_weight(evidence, terms):
+    """What a step of the weight makes (3n,) of "other" as large as it is beside the others, the broadest left out."""
+    rest, linear = [term for term in terms if term != ROUGH], evidence.linear
+    known = replace(evidence, linear=replace(linear, by_weight={}))
+    dense = Dense.of(known, rest, [STRENGTHS[-1]] * len(rest))
+    return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[dense.owner == rest.index(OTHER)]
 
 
 _SETS = [
@@ -142,7 +180,7 @@ def test_scores_equal_a_dense_marginal_likelihood(terms, with_law):
     grids = _GRIDS[: len(terms)]
     found, combinations = evidence.over_strengths(terms, grids)
     assert [tuple(one) for one in combinations] == list(product(*grids)) and found.shape == (1, len(combinations))
-    expected = [Dense.of(evidence, terms, one).likelihood for one in combinations]
+    expected = [Dense.of(evidence, terms, one).averaged for one in combinations]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
 
 
@@ -161,8 +199,12 @@ def test_alone_it_is_averaged_over_all_strengths_and_levels():
 def test_a_broad_term_is_what_the_same_term_is_that_is_not(terms):
     """At every level of a smooth discrepancy: being averaged over first changes nothing."""
     broad = _evidence(3, with_law=True, smooth=True)
+    # what the weight changes is taken from what is found beside the broad term
+    broad = replace(broad, linear=replace(broad.linear, by_weight={}))
     rough = LIBRARY["rough"].coordinates
-    plain = replace(broad, library=LIBRARY | {"rough": SimpleNamespace(coordinates=replace(rough, broad=False))})
+    plain = replace(
+        broad, library=LIBRARY | {"rough": SimpleNamespace(coordinates=replace(rough, broad=False), needs=())}
+    )
     grids = _GRIDS[: len(terms)]
     np.testing.assert_allclose(broad.over_strengths(terms, grids)[0], plain.over_strengths(terms, grids)[0], rtol=1e-9)
 
@@ -204,6 +246,8 @@ def test_beside_a_positive_coefficient_half_its_prior_is_left(terms, sign):
 @pytest.mark.parametrize("with_law", [False, True], ids=["", "doubted"])
 def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_law):
     evidence = _evidence(5, with_law)
+    # the weight's share of it has a test of its own
+    evidence = replace(evidence, linear=replace(evidence.linear, by_weight={}))
     strengths = np.array([3.0, 0.5, 10.0])[: len(terms)]
     dense = Dense.of(evidence, terms, strengths)
     found = evidence._mean(terms, strengths, 0)
@@ -216,6 +260,24 @@ def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_
         chosen = np.array([*(term.effect in names for term in terms), True])[dense.owner]
         expected = dense.explained(chosen) if names & hypothesis.effects else 0.0
         assert evidence.explained(hypothesis, names) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("terms", [(OTHER,), (FREE, OTHER)])
+def test_under_an_unknown_weight_coefficients_are_a_mixtures(terms):
+    """Means and covariance of both cases by their probabilities, each by least squares of the whole."""
+    evidence, strengths = _evidence(6, with_law=True), [3.0, 10.0][: len(terms)]
+    wide = Dense.of(evidence, terms, strengths)
+    cases = [replace(wide, size=np.where(wide.weight, share * wide.size, wide.size)) for share in (0.1, 1.0)]
+    chance = np.exp([one.likelihood - logsumexp([case.likelihood for case in cases]) for one in cases])
+    expected = chance @ [one.mean for one in cases]
+    spread = sum(
+        p * (one.covariance + np.outer(one.mean - expected, one.mean - expected))
+        for p, one in zip(chance, cases, strict=True)
+    )
+    mean, covariance = evidence.coefficients(terms, strengths, 0)
+    np.testing.assert_allclose(mean, expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(covariance, spread, rtol=1e-6, atol=1e-12)
+    assert chance.min() > 0.0 and wide.weight[-1]
 
 
 @pytest.mark.parametrize("terms", [(ROUGH, PULL), (PULL, FREE, ROUGH), (PULL, ROUGH, OTHER)])

@@ -68,7 +68,7 @@ def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     verdict = found.verdict
     assert verdict["effects"] == name and verdict["leg"] == 0 and verdict["noise_from"] == "fitted"
     assert verdict["share_closed"] > 0.85 and verdict["gap_after_rms_mm"] < 0.5 * NOISE_RMS_MM < verdict["gap_rms_mm"]
-    fitted = found.tables["gap_parameters"].query("effect != 'calibration'").set_index("parameter")
+    fitted = found.tables["gap_parameters"].query("effect == @name").set_index("parameter")
     truth = pd.Series(effect.effect.parameters.mapping(effect.effect.parameters.vector(effect.values)))
     known = fitted["standard_error"].notna()
     assert known.sum() >= len(effect.effect.coordinates)

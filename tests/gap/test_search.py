@@ -143,7 +143,7 @@ class FakeCompliance:
     name: str = "own_weight"
     parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
     coordinates: Coordinates = EFFECTS["drive_compliance"].coordinates
-    needs: tuple = ()
+    needs: tuple = ("drive_load",)
 
     def contribute(self, motion, values):
         """Changes (n, 3) of the drive angles."""

@@ -1,14 +1,19 @@
 """Rates and loads against exact derivatives, potential energy and the energy balance."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
-from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, gravity, loads
+from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, drive_rates, gravity, level_axes, load_slopes, loads
 from rrru.robots.hexapod import hexapod
 from rrru.robots.lumps import Lump
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
+from tests.places import DATA
 
 _ROBOT = Rrru3()
 _MASSES = Masses()
@@ -22,6 +27,12 @@ def _at_rest(robot, actuators, points, masses=_MASSES, payload_kg=_PAYLOAD_KG):
     return loads(
         robot, masses, robot.map_at(actuators, points), actuators, (still, still), np.zeros_like(points), payload
     )
+
+
+class _Leaning(Rrru3):
+    """A 3-RRRU in whose frame up is not an axis."""
+
+    up = tuple(Rotation.from_rotvec([-0.02, 0.01, 0.0]).apply([0.0, 0.0, -1.0]).tolist())
 
 
 def _motion(n):
@@ -74,22 +85,26 @@ def test_unknown_motion_gives_unknown_rates(rich_poses):
     assert np.isfinite(rate[others]).all() and np.isfinite(second[others]).all()
 
 
-def _potential(theta, guess):
+def _potential(theta, guess, up=_ROBOT.up):
     """Potential energy (n,) in N mm: the lumped masses' heights from the forward kinematics; z points down."""
     position = _ROBOT.forward(theta, guess_mm=guess)
     platform = _MASSES.platform_kg + _PAYLOAD_KG + 1.5 * _MASSES.forearm_kg
-    elbow = 400.0 * np.sin(theta)
-    height = -platform * position[:, 2] - (0.5 * _MASSES.forearm_kg * elbow + _MASSES.arm_kg * 0.5 * elbow).sum(axis=1)
+    cosine, sine = _ROBOT.azimuth_cos_sin
+    elbow = 400.0 * np.stack([np.cos(theta) * cosine, np.cos(theta) * sine, np.sin(theta)], axis=-1)
+    masses = 0.5 * _MASSES.forearm_kg + 0.5 * _MASSES.arm_kg
+    height = (platform * position + masses * elbow.sum(axis=1)) @ np.array(up)
     return height * GRAVITY_MM_S2 / 1000.0
 
 
-def test_static_torque_is_the_potential_energys_slope(rich_poses):
+@pytest.mark.parametrize("robot", [_ROBOT, _Leaning()], ids=["level", "leaning"])
+def test_static_torque_is_the_potential_energys_slope(rich_poses, robot):
     points, theta = rich_poses
-    torque = _at_rest(_ROBOT, theta, points).drive
+    torque = _at_rest(robot, theta, points).drive
     h = 1e-5
     for leg in range(3):
         step = h * np.eye(3)[leg]
-        slope = (_potential(theta + step, points) - _potential(theta - step, points)) / (2.0 * h)
+        ends = (_potential(theta + sign * step, points, robot.up) for sign in (1.0, -1.0))
+        slope = (next(ends) - next(ends)) / (2.0 * h)
         np.testing.assert_allclose(torque[:, leg], -slope, rtol=1e-5, atol=1e-2)
 
 
@@ -193,3 +208,38 @@ def test_bars_carry_a_hexapods_own_masses():
         places, masses = np.vstack([own[0].at_mm + point, ends]), np.array([4.0, *[0.5] * 6])
         total = np.concatenate([masses.sum() * weight, (masses[:, None] * np.cross(places, weight)).sum(axis=0)])
         np.testing.assert_allclose(found, np.linalg.solve(wrenches, -total), rtol=1e-5, atol=1e-4)
+
+
+def _file_robot(name, platform):
+    return make_mechanism(name, {"mjcf": str(DATA / "models" / f"{name}.xml"), "platform": platform})
+
+
+def _leaning(robot, lean_rad):
+    """The robot of a file on a base that is turned by lean_rad (2,) about the level axes."""
+    turn = np.zeros(3)
+    turn[level_axes(robot)] = lean_rad
+    return replace(robot, up=tuple(Rotation.from_rotvec(-turn).apply(robot.up).tolist()))
+
+
+@pytest.mark.parametrize(("name", "platform"), [("hexapod", "plate"), ("arm6", "tool0"), ("delta", "plate")])
+def test_loads_under_another_weight_are_those_of_a_robot_that_leans_and_carries_more(name, platform):
+    robot, extra, lean = _file_robot(name, platform), 0.7, np.array([0.004, -0.003])
+    generator = np.random.default_rng(4)
+    home = np.asarray(robot.legs.home_drives)
+    drives = home + generator.uniform(-0.02, 0.02, (6, len(home))) * np.where(
+        np.array(robot.parts.units) == "mm", 200, 1
+    )
+    points = robot.forward(drives)
+    told = _at_rest(robot, drives, points)
+    slopes = load_slopes(
+        robot, _MASSES, robot.map_at(drives, points), drives, np.zeros((6, 3)), np.full(6, _PAYLOAD_KG)
+    )
+    true = _at_rest(_leaning(robot, lean), drives, points, payload_kg=_PAYLOAD_KG + extra)
+    weights = np.array([extra, *lean, *(extra * lean)])
+    for one in fields(told):
+        before, after = getattr(told, one.name), getattr(true, one.name)
+        found = before + sum(w * getattr(slope, one.name) for w, slope in zip(weights, slopes, strict=True))
+        # the weight's length stays, that of its tangent does not
+        scale = max(np.abs(after).max(initial=0.0), 1e-9)
+        np.testing.assert_allclose(found, after, rtol=0.0, atol=0.5 * (lean**2).sum() * 2.0 * scale)
+        assert not after.size or np.abs(after - before).max() > 1e-3 * scale

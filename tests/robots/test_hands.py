@@ -13,7 +13,7 @@ from rrru.errors import ConfigError
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
 from rrru.robots.catalogue import make_mechanism
-from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
+from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, gravity
 from rrru.robots.geometric_numbers import Reads
 from rrru.robots.readings import Readings, lacking
 from tests.places import ROOT
@@ -197,7 +197,7 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
     turned = {"chest", "chest_turned"}
     assert turned == {one.site for one in robot.parts.followers} and turned <= set(robot.legs.arm_joints)
     poses = robot.solve(DRIVES[:, order], _own())
-    load = robot.own_load(None, (DRIVES[:, order], 0.0 * DRIVES, 0.0 * DRIVES), poses)
+    load = robot.own_load(None, (DRIVES[:, order], 0.0 * DRIVES, 0.0 * DRIVES), poses, gravity(robot))
     drives = robot.legs.per_actuator(load)
     np.testing.assert_allclose(drives, _motion().drive_load[:, order], rtol=1e-5, atol=0.1)
     assert sum(lump.mass_kg for lump in robot.lumps) == pytest.approx(sum(mass for _, (mass, _) in two_arms.masses()))
