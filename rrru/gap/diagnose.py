@@ -1,7 +1,7 @@
 """The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -86,6 +86,7 @@ def diagnose(
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
+    case = replace(case, doubts=settings.doubts(case.doubts))
     least = POINTS_PER_PARAMETER * len(nominal.parameters)
     if len(case) < least:
         whose = f"campaign {robot.campaign}: " if robot.campaign else ""

@@ -60,7 +60,8 @@ def _by_shape(case, at, key, state):
 def _by_weight(case, at, state, columns):
     """`Linear.by_weight` of columns, and `Linear.weight_steps`."""
     weight, made = case.weight(state), {key: [] for key in columns if bears_load(case.library[key[0]])}
-    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in case.doubts.items()]
+    doubts = {name: doubt for name, doubt in case.doubts.items() if doubt}
+    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in doubts.items()]
     for name, _, stepped, _ in steps:
         other = state.under(weight | {name: stepped})
         for key, one in made.items():

@@ -45,7 +45,7 @@ def _descent(case, state, hypothesis, level):
     keys = [(term.effect, term.shape) for term in hypothesis.terms]
     library, strengths = case.library, hypothesis.strengths[level]
     shapes = {key[0]: state.shape(library, key) for key in keys}
-    if any(bears_load(library[name]) for name, _ in keys):
+    if any(case.doubts.values()) and any(bears_load(library[name]) for name, _ in keys):
         shapes[WEIGHT] = case.weight(state)
     numbers = {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys}
     state = State(state.deviations, numbers, shapes)

@@ -6,6 +6,7 @@ import numpy as np
 
 from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
+from rrru.gap.weight import WEIGHT, weight_names
 from rrru.robots.catalogue import MECHANISMS
 
 
@@ -65,11 +66,26 @@ class GapSettings:
         for name, values in self.known.items():
             if name in result:
                 result[name] = _with_known(result[name], values)
+            elif name == WEIGHT:
+                _check_weight(robot, values)
             elif name not in self.effects:
                 raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
         # legs are of one design, the joints of an arm are not
         alike = robot.legs.parallel
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
+
+    def doubts(self, doubts):
+        """What the weight may be off by, by name: nothing where it is known."""
+        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in doubts.items()}
+
+
+def _check_weight(robot, values):
+    """Raise ConfigError where not the numbers of a robot's weight are known, or where they are not zero."""
+    allowed = weight_names(robot)
+    if unknown := [name for name in values if name not in allowed]:
+        raise ConfigError(f"gap.known: weight has no {unknown[0]!r}; allowed: {', '.join(allowed)}")
+    if off := [name for name, value in values.items() if value]:
+        raise ConfigError(f"gap.known: weight.{off[0]} must be 0, as it was told; a mass is stated with the campaign")
 
 
 def _with_known(effect, values):

@@ -28,15 +28,24 @@ _CASES = ((0.5, 0.1), (0.5, 1.0))
 _SHARE, _LEAN_RAD = 0.3, float(np.radians(1.0))
 # standard deviations that it may be off by: to nearly nothing, and to four times what was told
 LEAST, MOST = -3.0, 10.0
+# such a share of these is nothing
+_STAYS = 1e-4
+# strengths lie so far apart that the next one to a size may be this share of it
+_NEXT = 0.5
+
+
+def weight_names(robot):
+    """Names of what the weight may be off by: mass at the platform, turns of the base about the level axes."""
+    return ("extra_kg", *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
 
 
 def doubts_of(motion, masses):
-    """Standard deviations by name of what the weight along a Motion may be off by, empty where nothing has weight."""
+    """Standard deviations by name of what the weight along a Motion may be off by, zero where nothing has weight."""
     robot = motion.robot
     own = sum(lump.mass_kg for lump in getattr(robot, "lumps", ()) if lump.joint == PLATFORM)
     told = own + float(carried_kg(robot, masses, np.nan_to_num(motion.payload_kg)).max(initial=0.0))
-    leans = {f"lean_{'xyz'[axis]}": _LEAN_RAD for axis in level_axes(robot)}
-    return {"extra_kg": _SHARE * told} | leans if told else {}
+    doubts = _SHARE * told, *(2 * [_LEAN_RAD if told else 0.0])
+    return dict(zip(weight_names(robot), doubts, strict=True))
 
 
 def borne(problem, count, blocks, steps, strength, grams):
@@ -65,20 +74,33 @@ def borne(problem, count, blocks, steps, strength, grams):
         "index": index,
     }
     joined = {name: np.concatenate([getattr(problem, name), values]) for name, values in more.items()}
-    return replace(problem, mix=mix, weights=len(means), **joined).on(*grams(joined["index"]))
+    sizes = np.abs(found / problem.size)
+    at_least = [float(np.sqrt((sizes[problem.owner == k] ** 2).mean())) if k in blocks else 0.0 for k in range(count)]
+    whole = replace(problem, mix=mix, weights=len(means), at_least=np.array(at_least), **joined)
+    return whole.on(*grams(joined["index"]))
 
 
 def gained_over_cases(problem, strengths):
-    """`gained` of a Projected problem, averaged over both cases of the weight."""
-    return np.logaddexp.reduce([log + gained(one, strengths) for log, one in _cases(problem)])
+    """`gained` of a Projected problem at strengths (m, terms), averaged over both cases of the weight."""
+    if not problem.weights:
+        return gained(problem, strengths)
+    free, result = _free(problem, strengths), np.empty((len(problem.gram), len(strengths)))
+    for freely, some in ((True, free), (False, ~free)):
+        if some.any():
+            found = [log + gained(one, strengths[some]) for log, one in _cases(problem, freely)]
+            result[:, some] = np.logaddexp.reduce(found)
+    return result
 
 
 def over_cases(problem, strengths):
     """Mean (k,) and covariance (k, k) of the coefficients of a Projected problem of one level at strengths (1, terms).
 
-    Of a mixture of both cases of the weight; the covariance does not know of positive coefficients.
+    Of a mixture of both cases of the weight, which is always free: the strengths are raised to where it is. The
+    covariance does not know of positive coefficients.
     """
-    cases = _cases(problem)
+    cases = ((0.0, problem),)
+    if problem.weights:
+        strengths, cases = np.maximum(strengths, problem.at_least), _cases(problem, True)
     log = np.array([chance + gained(one, strengths)[0, 0] for chance, one in cases]) if cases[1:] else np.zeros(1)
     share, means, spreads = np.exp(log - np.logaddexp.reduce(log)), [], []
     for _, one in cases:
@@ -90,11 +112,22 @@ def over_cases(problem, strengths):
     return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _cases(problem):
-    """Logarithms of the probabilities of the cases, and the problem in each; one where it has no weight."""
-    if not problem.weights:
-        return ((0.0, problem),)
+def _free(problem, strengths):
+    """Which strengths (m, terms) leave a problem's weight free.
+
+    Under a prior too narrow for the coefficients the weight, whose columns are as large as these, would stand for them.
+    """
+    return (strengths >= _NEXT * problem.at_least).all(axis=1)
+
+
+def _cases(problem, free):
+    """Logarithms of the probabilities of the cases, and the problem in each; one, in which the weight stays, where it
+    is not free.
+    """
     weight = np.arange(len(problem.size)) >= len(problem.size) - problem.weights
+    if not free:
+        stays = {"size": np.where(weight, _STAYS, problem.size), "about": np.zeros(len(weight))}
+        return ((0.0, replace(problem, **stays)),)
     return tuple(
         (float(np.log(chance)), replace(problem, size=np.where(weight, share * problem.size, problem.size)))
         for chance, share in _CASES

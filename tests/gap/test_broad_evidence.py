@@ -95,8 +95,10 @@ class Dense:
                 sizes.extend([1.0] * own.shape[1])
                 owner.extend([len(terms)] * own.shape[1])
         weight = [False] * len(sizes)
-        if OTHER in terms and linear.by_weight:
-            columns.append(_by_weight(evidence, terms)[:, None] / NOISE_MM)
+        acting, at_least = _by_weight(evidence, terms) if OTHER in terms and linear.by_weight else (None, np.inf)
+        # half the strength of what was found is the nearest one that is tried
+        if OTHER in terms and strengths[terms.index(OTHER)] >= 0.5 * at_least:
+            columns.append(acting[:, None] / NOISE_MM)
             sizes.append(1.0)
             owner.append(len(terms))
             weight.append(True)
@@ -154,11 +156,15 @@ class Dense:
 
 
 def _by_weight(evidence, terms):
-    """What a step of the weight makes (3n,) of "other" as large as it is beside the others, the broadest left out."""
+    """What a step of the weight makes (3n,) of "other" as large as it is beside the others, the broadest left out, and
+    the strength under which it is that large.
+    """
     rest, linear = [term for term in terms if term != ROUGH], evidence.linear
     known = replace(evidence, linear=replace(linear, by_weight={}))
     dense = Dense.of(known, rest, [STRENGTHS[-1]] * len(rest))
-    return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[dense.owner == rest.index(OTHER)]
+    own = dense.owner == rest.index(OTHER)
+    at_least = np.sqrt(((dense.mean / dense.size)[own] ** 2).mean()) * STRENGTHS[-1]
+    return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[own], at_least
 
 
 _SETS = [
@@ -265,7 +271,7 @@ def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_
 @pytest.mark.parametrize("terms", [(OTHER,), (FREE, OTHER)])
 def test_under_an_unknown_weight_coefficients_are_a_mixtures(terms):
     """Means and covariance of both cases by their probabilities, each by least squares of the whole."""
-    evidence, strengths = _evidence(6, with_law=True), [3.0, 10.0][: len(terms)]
+    evidence, strengths = _evidence(6, with_law=True), {1: [300.0], 2: [3.0, 300.0]}[len(terms)]
     wide = Dense.of(evidence, terms, strengths)
     cases = [replace(wide, size=np.where(wide.weight, share * wide.size, wide.size)) for share in (0.1, 1.0)]
     chance = np.exp([one.likelihood - logsumexp([case.likelihood for case in cases]) for one in cases])

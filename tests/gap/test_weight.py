@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rrru.errors import ConfigError
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
 from rrru.seeds import stream
@@ -15,7 +16,7 @@ _FILE, _SOFT = "hexapod_file", (0.03, 0.012, 0.045, 0.02, 0.035, 0.025)
 _OFF = {"extra_kg": 1.2, "lean_x": 0.025, "lean_y": -0.02}
 
 
-def _found(more):
+def _found(more, settings=None):
     """Verdict and `gap_parameters` by effect and parameter of a hexapod with soft legs."""
     known = conditions(_FILE)
     fault = Fault("soft_servo_under_a_load", _SOFT, more)
@@ -23,7 +24,7 @@ def _found(more):
     robot = FileRobot("a hexapod", _FILE, "own", paths, (0.2, -0.1, 0.3, 0.1, -0.4, 0.2), (fault,))
     measurements = robot.measured(known)
     told = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
-    result = diagnose(measurements, told, GapSettings(), details=False)
+    result = diagnose(measurements, told, settings or GapSettings(), details=False)
     return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"])
 
 
@@ -57,3 +58,18 @@ def test_a_weight_that_is_as_told_stays_so():
     weight = numbers.loc["weight"]
     assert verdict["effects"] == "drive_compliance" and "weight not" not in verdict["notes"]
     assert (weight["value"].abs() < 3.0 * weight["standard_error"]).all()
+
+
+def test_a_weight_that_is_known_is_not_fitted():
+    known = dict.fromkeys(_OFF, 0.0)
+    verdict, numbers = _found({}, GapSettings(known={"weight": known}))
+    assert verdict["effects"] == "drive_compliance" and "weight" not in numbers.index.get_level_values("effect")
+    _, free = _found({})
+    sizes = [one.loc["drive_compliance", "standard_error"] for one in (numbers, free)]
+    assert (sizes[0] < sizes[1]).all()
+
+
+@pytest.mark.parametrize("wrong", [{"lean_z": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as told"])
+def test_of_the_weight_only_that_it_is_as_told_can_be_known(wrong):
+    with pytest.raises(ConfigError, match=r"gap\.known: weight"):
+        GapSettings(known={"weight": wrong}).library(conditions(_FILE).mechanism)
