@@ -7,7 +7,7 @@ If hypothesis A holds with its fitted numbers, the data that it makes differ fro
 nats. Further points add to the sums of squares and products that I is made of; what I grows by is their worth.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,6 +47,8 @@ def worth(attribution, truth, imitator, planned):
     (hypothesis, level), (rival, rival_level) = truth, imitator
     case, evidence = attribution.case, attribution.evidence
     terms = hypothesis.terms + rival.terms
+    # what the weight may be off by is the same in both answers
+    planned = replace(planned, doubts={})
     there = planned.linearise(attribution.calibrated, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
