@@ -62,9 +62,13 @@ def borne(problem, count, blocks, steps, strength, grams):
     found = np.where(problem.positive, np.maximum(found, 0.0), found)
     acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
     index = np.concatenate([numbers.ravel() for _, numbers in blocks.values()])
-    makes = np.concatenate([np.kron(np.eye(len(means)), acting[k][:, None]) for k in blocks])
-    nothing = np.zeros((len(found), len(means)))
-    mix = np.block([[np.eye(len(found)), nothing], [np.zeros((len(index), len(found))), makes]])
+    mix = np.zeros((len(found) + len(index), len(found) + len(means)))
+    np.fill_diagonal(mix[: len(found)], 1.0)
+    row = len(found)
+    for coordinates in acting.values():
+        for number in range(len(means)):
+            mix[row : row + len(coordinates), len(found) + number] = coordinates
+            row += len(coordinates)
     more = {
         "size": np.ones(len(means)),
         "largest": np.full(len(means), np.inf),
@@ -74,9 +78,10 @@ def borne(problem, count, blocks, steps, strength, grams):
         "index": index,
     }
     joined = {name: np.concatenate([getattr(problem, name), values]) for name, values in more.items()}
-    sizes = np.abs(found / problem.size)
-    at_least = [float(np.sqrt((sizes[problem.owner == k] ** 2).mean())) if k in blocks else 0.0 for k in range(count)]
-    whole = replace(problem, mix=mix, weights=len(means), at_least=np.array(at_least), **joined)
+    at_least, squares = np.zeros(count), (found / problem.size) ** 2
+    for k in blocks:
+        at_least[k] = np.sqrt(squares[problem.owner == k].mean())
+    whole = replace(problem, mix=mix, weights=len(means), at_least=at_least, **joined)
     return whole.on(*grams(joined["index"]))
 
 
