@@ -9,6 +9,10 @@ from rrru.campaign.plan import connect
 
 # points of the path from one commanded point to the next, and of a transfer between runs with its ends
 STEPS, _TRANSFER_STEPS = 8, 30
+# of splines through points: where a drive turns back has to be known to a fraction of its play
+DEGREE = 5
+# of the drives where the tool hardly moves, both in shares of their extents
+_DRIVES_WAY = 0.1
 # a path through points turns by more than a right angle at fewer of them; of poses in any order it is three of four
 _MOST_TURNS = 0.5
 # an interval at a run's end that is this much slower than the next leads to rest
@@ -27,6 +31,29 @@ def drive_rates(measurements, actuators):
     stop = stops(measurements)
     first = np.diff(stop, prepend=-1) > 0
     return tuple(values[stop] for values in rates(measurements[first], actuators[first]))
+
+
+def smooth_drives(measurements, path, path_index, degree=DEGREE):
+    """Actuator values (N, K) along the path of `driven_path`: in each run a spline through the measured points.
+
+    path (N, K) is what they are from run to run and where the points follow no path, path_index (n,) its rows at the
+    points; degree: odd, of the splines.
+
+    # ASSUME where the tool passes smoothly through a run's points its drives do so, too.
+    """
+    if not follows_path(rows.command(measurements), measurements["run"].to_numpy()):
+        return path
+    first = np.diff(stops(measurements), prepend=-1) > 0
+    index, run, result = path_index[first], measurements["run"].to_numpy()[first], path.copy()
+    tool, drives = rows.command(measurements)[first], path[index]
+    reach, span = np.ptp(tool, axis=0).max(), np.ptp(drives, axis=0)
+    # a tool that only turns has no way, but its drives have one
+    turned = _chords(drives / np.where(span > 0.0, span, 1.0))
+    way = np.maximum(_chords(tool), _DRIVES_WAY * reach * turned)
+    for piece in _runs(run):
+        own, _ = _smooth(drives[piece], way[piece.start : piece.stop - 1], degree)
+        result[index[piece][0] : index[piece][-1] + 1] = own
+    return result
 
 
 def stops(measurements):
@@ -51,9 +78,10 @@ def _path_through(measurements):
     position, run = rows.command(measurements), measurements["run"].to_numpy()
     named = measurements.reindex(columns=("time_s", "payload_kg", "temperature_c"))
     told = {name: named[name].to_numpy(dtype=float) for name in named}
-    pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
+    pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
-    path, index = connect(*zip(*(_smooth(position[piece]) for piece in pieces), strict=True), _TRANSFER_STEPS)
+    parts = [position[piece] for piece in pieces]
+    path, index = connect(*zip(*(_smooth(one, _chords(one)) for one in parts), strict=True), _TRANSFER_STEPS)
     told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, told | {"path_index": index}
 
@@ -66,7 +94,7 @@ def rates(measurements, values):
     run, time = measurements["run"].to_numpy(), measurements["time_s"].to_numpy(dtype=float)
     if not follows_path(rows.command(measurements), run):
         return np.full_like(values, np.nan), np.full_like(values, np.nan)
-    pieces = [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
+    pieces = _runs(run)
     derivatives = [_derivatives(values[piece], time[piece]) for piece in pieces]
     return tuple(np.concatenate(parts) for parts in zip(*derivatives, strict=True))
 
@@ -78,6 +106,11 @@ def follows_path(position_mm, run):
     step, same = np.diff(position_mm, axis=0), run[1:] == run[:-1]
     turns = (np.einsum("na,na->n", step[1:], step[:-1]) < 0.0)[same[1:] & same[:-1]]
     return not len(turns) or turns.mean() <= _MOST_TURNS
+
+
+def _runs(run):
+    """Slices of the rows of each run, from the rows' run numbers (n,)."""
+    return [slice(*ends) for ends in pairwise([*np.flatnonzero(starts_of_runs(run)), len(run)])]
 
 
 def starts_of_runs(run):
@@ -103,20 +136,26 @@ def _derivatives(points, time):
     return spline(time, 1), acceleration
 
 
-def _smooth(points):
-    """Points (N, 3) of a smooth path through the points (k, 3) of one run and the rows (k,) of these in it."""
+def _chords(points):
+    """Distances (k - 1,) from each of points (k, j) to the next."""
+    return np.linalg.norm(np.diff(points, axis=0), axis=1)
+
+
+def _smooth(points, way, degree=DEGREE):
+    """Points (N, j) of a smooth path through the points (k, j) of one run and the rows (k,) of these in it.
+
+    way (k - 1,): how far it is from each to the next.
+    """
     from scipy.interpolate import make_interp_spline
 
     at = np.arange(len(points)) * STEPS
     if len(points) == 1:
         return points, at
-    chord = np.linalg.norm(np.diff(points, axis=0), axis=1)
     # points of no distance still follow one another
-    length = np.concatenate([[0.0], np.cumsum(np.maximum(chord, 1e-6 * max(chord.max(), 1e-6)))])
+    length = np.concatenate([[0.0], np.cumsum(np.maximum(way, 1e-6 * max(way.max(), 1e-6)))])
     fine = np.interp(np.arange(at[-1] + 1), at, length)
     if len(points) == 2:
         return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]), at
-    # of fifth degree, since where a drive turns back has to be known to a fraction of its play
-    path = make_interp_spline(length, points, k=min(5, len(points) - 1 - len(points) % 2))(fine)
+    path = make_interp_spline(length, points, k=min(degree, len(points) - 1 - len(points) % 2))(fine)
     path[at] = points
     return path, at

@@ -8,7 +8,15 @@ from functools import partial
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import STEPS, drive_rates, driven_path, follows_path, starts_of_runs, stops
+from rrru.campaign.driven_path import (
+    STEPS,
+    drive_rates,
+    driven_path,
+    follows_path,
+    smooth_drives,
+    starts_of_runs,
+    stops,
+)
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
 from rrru.gap.case import Case
@@ -21,6 +29,8 @@ _ENOUGH = 0.8
 _MOST_BROAD = 0.5
 # nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
 _STANDS = {"rad": 1e-8, "mm": 1e-6}
+# of the splines of another interpolation: as far as the two are apart is as far as either may be off
+_OTHER_DEGREE = 3
 _NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
@@ -40,7 +50,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     stop = stops(measurements)
     used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
     if follows_path(motion.position_mm, measurements["run"].to_numpy()):
-        used &= ~at_reversals(motion)
+        used &= ~at_reversals(motion, smooth_drives(measurements, motion.path_drive, motion.path_index, _OTHER_DEGREE))
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
@@ -96,19 +106,33 @@ def _fitted(effect, motion):
     return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
 
 
-def at_reversals(motion):
-    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell."""
-    path, result = motion.path_drive, np.zeros(len(motion.drive), dtype=bool)
+def at_reversals(motion, other_path):
+    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell.
+
+    other_path: (N, K) actuator values along the path by another interpolation. As far as the two are apart between a
+    point and its neighbours, neither tells where a drive reverses.
+    """
+    result = np.zeros(len(motion.drive), dtype=bool)
+    stations = np.unique(motion.path_index)
+    apart = np.maximum.reduceat(np.abs(motion.path_drive - other_path), stations)
+    apart = np.maximum(apart, np.concatenate([np.zeros_like(apart[:1]), apart[:-1]]))
+    apart = apart[np.searchsorted(stations, motion.path_index)]
     for leg, unit in enumerate(motion.robot.parts.units):
-        step = np.diff(path[:, leg])
-        # a drive that stands still does not turn back
-        moving = np.flatnonzero(~(np.abs(step) < _STANDS[unit]))
-        reversals = moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
-        if len(reversals):
-            nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
-            close = np.abs(nearest - motion.path_index) <= STEPS
-            result |= close & (np.abs(path[nearest, leg] - motion.drive[:, leg]) < _NEAR_REVERSAL[unit])
+        for path in (motion.path_drive[:, leg], other_path[:, leg]):
+            reversals = _reversals(path, _STANDS[unit])
+            if len(reversals):
+                nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
+                close = np.abs(nearest - motion.path_index) <= STEPS
+                way = np.abs(path[nearest] - motion.drive[:, leg])
+                result |= close & (way < _NEAR_REVERSAL[unit] + apart[:, leg])
     return result
+
+
+def _reversals(path, stands):
+    """Rows of a path (N,) of one drive at which it turns back; by less than `stands` it does not move."""
+    step = np.diff(path)
+    moving = np.flatnonzero(~(np.abs(step) < stands))
+    return moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
 
 
 def _course(measurements, mechanism, actuators):
@@ -116,9 +140,10 @@ def _course(measurements, mechanism, actuators):
     path, told = driven_path(measurements)
     if mechanism.orients:
         told["drive_motion"] = drive_rates(measurements, actuators)
-        # positions do not tell the orientation between the points: drives are taken to move evenly
+        # positions do not tell the orientation between the points
         rows_of_path = np.arange(len(path))
         path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
+        path_drive = smooth_drives(measurements, path_drive, told["path_index"])
     else:
         path_drive = mechanism.inverse(path)
     lost = ~np.isfinite(path_drive).all(axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import starts_of_runs
+from rrru.campaign.driven_path import smooth_drives, starts_of_runs
 from rrru.errors import FitError
 from rrru.gap.calibrate import calibrate
 from rrru.gap.make_case import at_reversals
@@ -25,6 +25,12 @@ def _exact(case, state):
     return case.mechanism.measured(*case.posed(state))[case.used]
 
 
+def _doubtful(case):
+    """Rows (n,) at reversals of a campaign's case."""
+    cubic = smooth_drives(case.measurements, case.motion.path_drive, case.motion.path_index, 3)
+    return at_reversals(case.motion, cubic)
+
+
 @pytest.fixture(scope="module")
 def case():
     return case_of(measure())
@@ -34,7 +40,7 @@ def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
     run = case.measurements["run"].to_numpy()
     starts = starts_of_runs(case.measurements["run"].to_numpy())
     assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
-    np.testing.assert_array_equal(case.used, ~starts & ~at_reversals(case.motion))
+    np.testing.assert_array_equal(case.used, ~starts & ~_doubtful(case))
     assert len(case) == case.used.sum() == len(case.points) == len(case.run) == case.count
 
 
@@ -47,7 +53,7 @@ def test_points_that_are_lost_or_marked_are_not_used():
     frame.loc[60:70, "status"] = "near_singularity"
     near = slice(60, 71)
     kept = case_of(frame).used[near]
-    doubtful = starts_of_runs(frame["run"].to_numpy()) | at_reversals(case_of(frame).motion)
+    doubtful = starts_of_runs(frame["run"].to_numpy()) | _doubtful(case_of(frame))
     assert kept.any() and kept.sum() == (~doubtful)[near].sum()
 
 
@@ -152,7 +158,23 @@ def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_tw
         path[:, 0] = path[:, 2] = 0.001 * steps
         index = np.arange(0, 97, 8)
         motion = SimpleNamespace(robot=ROBOT, path_drive=path, path_index=index, drive=path[index])
-        assert np.flatnonzero(at_reversals(motion)).tolist() == doubtful
+        assert np.flatnonzero(at_reversals(motion, path)).tolist() == doubtful
+
+
+def test_where_two_interpolations_are_apart_none_tells_where_a_drive_turns_back():
+    """One crest lies half a step beside a point, by another path a quarter: both points beside it are in doubt."""
+    steps, index = np.arange(0, 97), np.arange(0, 97, 8)
+    rising = 0.001 * steps
+
+    def path_of(shift):
+        return np.stack([rising, 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0), rising], axis=1)
+
+    path, other = path_of(4.0), path_of(4.0)
+    motion = SimpleNamespace(robot=ROBOT, path_drive=path, path_index=index, drive=path[index])
+    assert not at_reversals(motion, other).any()
+    between = (steps > 24) & (steps < 32)
+    other[between] = path_of(2.0)[between]
+    assert np.flatnonzero(at_reversals(motion, other)).tolist() == [3, 4]
 
 
 def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
