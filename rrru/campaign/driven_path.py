@@ -19,10 +19,10 @@ _MOST_TURNS = 0.5
 _SLOWER = 0.9
 
 
-def driven_path(measurements):
+def driven_path(measurements, degree=DEGREE):
     """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
     stop = stops(measurements)
-    path, told = _path_through(measurements[np.diff(stop, prepend=-1) > 0])
+    path, told = _path_through(measurements[np.diff(stop, prepend=-1) > 0], degree)
     return path, {name: values[stop] for name, values in told.items()}
 
 
@@ -64,12 +64,12 @@ def stops(measurements):
     return np.cumsum(np.concatenate([[False], (np.nan_to_num(told[1:]) != np.nan_to_num(told[:-1])).any(axis=1)]))
 
 
-def _path_through(measurements):
+def _path_through(measurements, degree):
     """The path (N, 3) of everything that is driven, transfers included, and what a robot was told to do on it.
 
-    That is by name, of the n rows of a measurement table, all of them in the order driven: position_mm, velocity_mm_s,
-    acceleration_mm_s2 (n, 3), time_s, payload_kg, temperature_c and path_index, their places on the path (n,); NaN
-    where nobody knows.
+    degree: odd, of the splines through a run's points. What it was told is by name, of the n rows of a measurement
+    table, all of them in the order driven: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg,
+    temperature_c and path_index, their places on the path (n,); NaN where nobody knows.
 
     # ASSUME the robot passes smoothly through a run's commanded points and rests where it slows down at an end. Speeds
     and accelerations come from the times; where a run has no increasing times, or its points follow no path, they are
@@ -81,7 +81,7 @@ def _path_through(measurements):
     pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
     parts = [position[piece] for piece in pieces]
-    path, index = connect(*zip(*(_smooth(one, _chords(one)) for one in parts), strict=True), _TRANSFER_STEPS)
+    path, index = connect(*zip(*(_smooth(one, _chords(one), degree) for one in parts), strict=True), _TRANSFER_STEPS)
     told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, told | {"path_index": index}
 
@@ -141,7 +141,7 @@ def _chords(points):
     return np.linalg.norm(np.diff(points, axis=0), axis=1)
 
 
-def _smooth(points, way, degree=DEGREE):
+def _smooth(points, way, degree):
     """Points (N, j) of a smooth path through the points (k, j) of one run and the rows (k,) of these in it.
 
     way (k - 1,): how far it is from each to the next.

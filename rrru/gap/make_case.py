@@ -9,6 +9,7 @@ import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import (
+    DEGREE,
     STEPS,
     drive_rates,
     driven_path,
@@ -50,7 +51,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     stop = stops(measurements)
     used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
     if follows_path(motion.position_mm, measurements["run"].to_numpy()):
-        used &= ~at_reversals(motion, smooth_drives(measurements, motion.path_drive, motion.path_index, _OTHER_DEGREE))
+        used &= ~at_reversals(motion, _path_drive(measurements, mechanism, actuators, _OTHER_DEGREE))
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
@@ -137,20 +138,28 @@ def _reversals(path, stands):
 
 def _course(measurements, mechanism, actuators):
     """What the robot was told to do; at the measured points with the table's own actuator values."""
-    path, told = driven_path(measurements)
+    _, told = driven_path(measurements)
     if mechanism.orients:
         told["drive_motion"] = drive_rates(measurements, actuators)
+    at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
+    path_drive = _path_drive(measurements, mechanism, actuators)
+    return Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+
+
+def _path_drive(measurements, mechanism, actuators, degree=DEGREE):
+    """Actuator values (N, K) along all that is driven, by splines of an odd degree through the points of each run."""
+    path, told = driven_path(measurements, degree)
+    index = told["path_index"]
+    if mechanism.orients:
         # positions do not tell the orientation between the points
-        rows_of_path = np.arange(len(path))
-        path_drive = np.stack([np.interp(rows_of_path, told["path_index"], one) for one in actuators.T], axis=1)
-        path_drive = smooth_drives(measurements, path_drive, told["path_index"])
+        evenly = np.stack([np.interp(np.arange(len(path)), index, one) for one in actuators.T], axis=1)
+        result = smooth_drives(measurements, evenly, index, degree)
     else:
-        path_drive = mechanism.inverse(path)
-    lost = ~np.isfinite(path_drive).all(axis=1)
+        result = mechanism.inverse(path)
+    lost = ~np.isfinite(result).all(axis=1)
     if lost.any():
         # what is out of reach stays where it was last
         good = np.flatnonzero(~lost)
-        path_drive = path_drive[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
-    path_drive[told["path_index"]] = actuators
-    at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
-    return Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+        result = result[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
+    result[index] = actuators
+    return result

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import smooth_drives, starts_of_runs
+from rrru.campaign.driven_path import driven_path, starts_of_runs
 from rrru.errors import FitError
 from rrru.gap.calibrate import calibrate
 from rrru.gap.make_case import at_reversals
@@ -27,8 +27,10 @@ def _exact(case, state):
 
 def _doubtful(case):
     """Rows (n,) at reversals of a campaign's case."""
-    cubic = smooth_drives(case.measurements, case.motion.path_drive, case.motion.path_index, 3)
-    return at_reversals(case.motion, cubic)
+    cubic, _ = driven_path(case.measurements, 3)
+    other = SIM.inverse(cubic)
+    other[case.motion.path_index] = case.motion.drive
+    return at_reversals(case.motion, other)
 
 
 @pytest.fixture(scope="module")
