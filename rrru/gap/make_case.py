@@ -30,8 +30,8 @@ _ENOUGH = 0.8
 _MOST_BROAD = 0.5
 # nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
 _STANDS = {"rad": 1e-8, "mm": 1e-6}
-# of the splines of another interpolation: as far as the two are apart is as far as either may be off
-_OTHER_DEGREE = 3
+# of the splines of a finer interpolation: as far as the two are apart is as far as the coarser one may be off
+_FINER_DEGREE = 7
 _NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
@@ -51,7 +51,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     stop = stops(measurements)
     used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
     if follows_path(motion.position_mm, measurements["run"].to_numpy()):
-        used &= ~at_reversals(motion, _path_drive(measurements, mechanism, actuators, _OTHER_DEGREE))
+        used &= ~at_reversals(motion, _path_drive(measurements, mechanism, actuators, _FINER_DEGREE))
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")

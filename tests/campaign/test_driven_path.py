@@ -27,7 +27,7 @@ def _evenly(drives, index):
     return np.stack([np.interp(np.arange(index[-1] + 1), index, one) for one in drives.T], axis=1)
 
 
-@pytest.mark.parametrize("degree", [3, 5])
+@pytest.mark.parametrize("degree", [3, 5, 7])
 def test_drives_between_points_are_those_of_a_smooth_motion(degree):
     at = np.linspace(0.0, 9.0, _COUNT)
     frame, drives = _campaign(at, np.stack([10.0 * at, 0.0 * at, 0.0 * at], axis=1))

@@ -27,8 +27,8 @@ def _exact(case, state):
 
 def _doubtful(case):
     """Rows (n,) at reversals of a campaign's case."""
-    cubic, _ = driven_path(case.measurements, 3)
-    other = SIM.inverse(cubic)
+    finer, _ = driven_path(case.measurements, 7)
+    other = SIM.inverse(finer)
     other[case.motion.path_index] = case.motion.drive
     return at_reversals(case.motion, other)
 
