@@ -43,7 +43,7 @@ def for_robot(robot):
     shapes = tuple({"transition": force, "held": share} for share in held for force in (0.2, 0.7, 2.0))
     parameters = ParameterSet((*sizes, *_SHAPE))
     coordinates = plain_coordinates(parameters, 0.05, shapes)
-    return Effect("joint_clearance", parameters, coordinates, _sides, ("force_n",))
+    return Effect("joint_clearance", parameters, coordinates, _sides, ("force_n",), switches=True)
 
 
 def _sides(motion, values):

@@ -234,7 +234,7 @@ class Effect:
     values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
     law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
-    calibration that leaves it out is wrong.
+    calibration that leaves it out is wrong; switches: whether the law knows no more of a load than its sign.
     """
 
     name: str
@@ -246,6 +246,7 @@ class Effect:
     along_drives: Callable[[Motion], list[np.ndarray]] | None = None
     with_waves: Callable[..., "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
+    switches: bool = False
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""
@@ -273,8 +274,13 @@ class ActiveEffect:
 
 
 def bears_load(effect: Any) -> bool:
-    """Whether an effect, or an unknown function, changes with the weight."""
+    """Whether an effect, or an unknown function, changes with the loads."""
     return not LOADS.keys().isdisjoint(effect.needs)
+
+
+def gives_way(effect: Any) -> bool:
+    """Whether an effect, or an unknown function, grows with the loads, so that it tells the weight."""
+    return bears_load(effect) and not getattr(effect, "switches", False)
 
 
 def together(effects: Iterable[ActiveEffect], motion: Motion) -> Contribution:

@@ -90,18 +90,26 @@ def _parts(evidence, hypothesis, level, basis, generator, count):
     if not hypothesis.terms:
         return {}
     mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
-    size, turned = np.linalg.eigh(covariance)
-    shaken = turned * np.sqrt(np.maximum(size, 0.0))
+    # numbers of very different sizes
+    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
+    shaken = unit[:, None] * turned * np.sqrt(np.maximum(size, 0.0))
     drawn = mean[:, None] + shaken @ generator.standard_normal((len(mean), count))
     result, start = {}, 0
-    made = signatures(evidence.library, evidence.linear, hypothesis.terms)
+    linear = evidence.linear
+    made = signatures(evidence.library, linear, hypothesis.terms)
     for term, columns in zip(hypothesis.terms, made, strict=True):
         coordinates = evidence.library[term.effect].coordinates
         matrix = spread(coordinates, term.legs)
         own = drawn[start : start + matrix.shape[1]]
         own = np.where((matrix.T @ coordinates.positive > 0)[:, None], np.maximum(own, 0.0), own)
-        start += matrix.shape[1]
         part = columns.reshape(-1, columns.shape[-1]) @ own
+        if (term.effect, term.shape) in linear.by_weight:
+            each = linear.by_weight[term.effect, term.shape].reshape(len(part), -1, len(matrix))
+            # to first order, as both were found
+            acting = matrix @ evidence.found(hypothesis.terms)[start : start + matrix.shape[1]]
+            part = part + np.einsum("nqc,c->nq", each, acting) @ drawn[len(mean) - each.shape[1] :]
+        start += matrix.shape[1]
         name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect
         result[name] = result.get(name, 0.0) + part - basis @ (basis.T @ part)
     return result

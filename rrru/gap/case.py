@@ -32,8 +32,8 @@ class Case:
     untestable: name to the reason for the other effects; noise_mm: deviation per axis; arm_mm: of
     `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none; beside_scale: factor by which
     rows of reflectors beside the robot count, so that they have the noise of the others; motion_at: from where the
-    robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`; doubts: what the weight may
-    be off by, see `rrru.gap.weight`.
+    robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`; doubts,
+    bounds: what the weight may be off by, see `rrru.gap.weight`.
     """
 
     mechanism: object
@@ -48,6 +48,7 @@ class Case:
     beside_scale: float = 1.0
     motion_at: Callable | None = None
     doubts: dict = field(default_factory=dict)
+    bounds: dict = field(default_factory=dict)
 
     def __len__(self):
         return len(self.at)

@@ -137,7 +137,8 @@ def parameter_rows(attribution):
             (term.effect, parameter.name, parameter.unit, *numbers)
             for parameter, *numbers in zip(effect.parameters, values, errors, bound.tolist(), strict=True)
         ]
-    result += [(WEIGHT, *numbers, False) for numbers in weight_of(attribution)]
+    bounds = attribution.case.bounds
+    result += [(WEIGHT, name, *rest, rest[1] in bounds[name]) for name, *rest in weight_of(attribution)]
     return pd.DataFrame(result, columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"))
 
 

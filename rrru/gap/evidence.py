@@ -26,7 +26,7 @@ from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
-from rrru.gap.weight import WEIGHT, borne, gained_over_cases, over_cases
+from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, over_cases
 from rrru.gap.whitened import LEVELS, Whitened
 
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
@@ -102,13 +102,27 @@ class ModelEvidence:
             self._made[key] = self._projected(terms, levels)
         return self._made[key]
 
-    def _projected(self, terms, levels):
+    def found(self, terms):
+        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
+        key = tuple(terms)
+        if key not in self._made:
+            # whatever levels are asked for, it is one weight
+            first = Projected.of(self._priors_of(terms), len(terms), partial(self._grams, self.levels[:1]))
+            self._made[key] = as_found(first, len(terms), STRENGTHS[-1])
+        return self._made[key]
+
+    def _priors_of(self, terms):
+        """Priors of terms and after them of their shapes."""
         priors = [self._prior(term) for term in terms]
-        priors += [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
+        return priors + [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
+
+    def _projected(self, terms, levels):
         grams = partial(self._grams, levels)
-        problem = Projected.of(priors, len(terms), grams)
+        problem = Projected.of(self._priors_of(terms), len(terms), grams)
         blocks = {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
-        return borne(problem, len(terms), blocks, self.linear.weight_steps, STRENGTHS[-1], grams) if blocks else problem
+        if not blocks:
+            return problem
+        return borne(problem, len(terms), blocks, self.linear.weight_steps, self.found(terms), grams)
 
     def _grams(self, levels, index):
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.effects.protocol import bears_load
+from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
 from rrru.gap.state import Linear
 
@@ -59,7 +59,7 @@ def _by_shape(case, at, key, state):
 
 def _by_weight(case, at, state, columns):
     """`Linear.by_weight` of columns, and `Linear.weight_steps`."""
-    weight, made = case.weight(state), {key: [] for key in columns if bears_load(case.library[key[0]])}
+    weight, made = case.weight(state), {key: [] for key in columns if gives_way(case.library[key[0]])}
     doubts = {name: doubt for name, doubt in case.doubts.items() if doubt}
     steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in doubts.items()]
     for name, _, stepped, _ in steps:

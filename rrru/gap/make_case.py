@@ -62,8 +62,9 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
             testable[name] = function
     sizes = float(noise_mm), float(arm_mm)
-    doubts = doubts_of(motion, masses)
-    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at, doubts=doubts)
+    doubts, bounds = doubts_of(motion, masses)
+    of_weight = {"doubts": doubts, "bounds": bounds}
+    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at, **of_weight)
 
 
 def _tested(library, motion, used, told):

@@ -4,11 +4,11 @@ from contextlib import suppress
 
 import numpy as np
 
-from rrru.effects.protocol import bears_load
+from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
 from rrru.gap.state import State
 from rrru.gap.terms import spread
-from rrru.gap.weight import LEAST, MOST, WEIGHT
+from rrru.gap.weight import WEIGHT
 
 _STEPS, _HALVINGS = 6, 5
 # relative gain in the sum of squares below which the search has ended
@@ -45,7 +45,7 @@ def _descent(case, state, hypothesis, level):
     keys = [(term.effect, term.shape) for term in hypothesis.terms]
     library, strengths = case.library, hypothesis.strengths[level]
     shapes = {key[0]: state.shape(library, key) for key in keys}
-    if any(case.doubts.values()) and any(bears_load(library[name]) for name, _ in keys):
+    if any(case.doubts.values()) and any(gives_way(library[name]) for name, _ in keys):
         shapes[WEIGHT] = case.weight(state)
     numbers = {key: state.effects.get(key, np.zeros(len(library[key[0]].coordinates))) for key in keys}
     state = State(state.deviations, numbers, shapes)
@@ -92,8 +92,8 @@ def _target(case, linear, state, hypothesis, mean):
     if state.weight:
         shares = np.clip(mean[start:], -_MOST_SHAPE_STEPS, _MOST_SHAPE_STEPS)
         for (name, value, stepped, _), share in zip(linear.weight_steps, shares.tolist(), strict=True):
-            bounds = LEAST * case.doubts[name], MOST * case.doubts[name]
-            shapes[WEIGHT] = shapes[WEIGHT] | {name: float(np.clip(value + share * (stepped - value), *bounds))}
+            moved = float(np.clip(value + share * (stepped - value), *case.bounds[name]))
+            shapes[WEIGHT] = shapes[WEIGHT] | {name: moved}
         for key, numbers in effects.items():
             if key in linear.by_weight:
                 each = linear.by_weight[key].reshape(*rest.shape, len(shares), -1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
-from rrru.gap.weight import WEIGHT, weight_names
+from rrru.gap.weight import WEIGHT
 from rrru.robots.catalogue import MECHANISMS
 
 
@@ -67,7 +67,7 @@ class GapSettings:
             if name in result:
                 result[name] = _with_known(result[name], values)
             elif name == WEIGHT:
-                _check_weight(robot, values)
+                _check_weight(values)
             elif name not in self.effects:
                 raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
         # legs are of one design, the joints of an arm are not
@@ -79,9 +79,12 @@ class GapSettings:
         return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in doubts.items()}
 
 
-def _check_weight(robot, values):
-    """Raise ConfigError where not the numbers of a robot's weight are known, or where they are not zero."""
-    allowed = weight_names(robot)
+def _check_weight(values):
+    """Raise ConfigError where not the numbers of the weight are known, or where they are not zero.
+
+    Leans about all axes are allowed: robots of one configuration may stand upright or hang on a wall.
+    """
+    allowed = ("extra_kg", *(f"lean_{axis}" for axis in "xyz"))
     if unknown := [name for name in values if name not in allowed]:
         raise ConfigError(f"gap.known: weight has no {unknown[0]!r}; allowed: {', '.join(allowed)}")
     if off := [name for name, value in values.items() if value]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rrru.effects.protocol import bears_load
+from rrru.effects.protocol import gives_way
 from rrru.gap.weight import WEIGHT
 
 
@@ -42,7 +42,7 @@ class State:
         coordinates = self.effects[key] if coordinates is None else coordinates
         effect = library[key[0]]
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
-        borne = motion.under(*self.weight.values()) if self.weight and bears_load(effect) else motion
+        borne = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
         return effect.contribute(borne, values)
 
 

@@ -2,7 +2,7 @@
 
 What gives way does so under loads that are linear in the mass m at the platform and in the lean w of the base
 (`rrru.robots.dynamics.load_slopes`). What both may be off by is fitted together with everything else, wherever an
-effect that bears loads acts:
+effect acts that gives way:
 
     dm ~ N(0, (share m)^2),    w_x, w_y ~ N(0, lean^2)
 
@@ -10,7 +10,8 @@ It is one weight for all effects, and no effect itself: where nothing gives way 
 over two cases: the weight is as it was told, or it is not.
 
 ASSUME even odds: masses come from a scale or a drawing, good to 3 %, and the robot stands level within a tenth of a
-degree; or masses are guessed within 30 %, and it leans by a degree.
+degree; or masses are guessed within 30 % (of what hangs at the platform; at least by a tenth of all that moves, as
+much as an arm is made to carry), and it leans by a degree.
 """
 
 from dataclasses import replace
@@ -25,9 +26,9 @@ from rrru.robots.lumps import PLATFORM
 WEIGHT = "weight"
 # probabilities that the weight is as told and that it is not, each with its share of the standard deviations below
 _CASES = ((0.5, 0.1), (0.5, 1.0))
-_SHARE, _LEAN_RAD = 0.3, float(np.radians(1.0))
-# standard deviations that it may be off by: to nearly nothing, and to four times what was told
-LEAST, MOST = -3.0, 10.0
+_SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
+# share of the told mass that may be missing, and standard deviations that anything may be off by
+_MISSING, _MOST = 0.9, 10.0
 # such a share of these is nothing
 _STAYS = 1e-4
 # strengths lie so far apart that the next one to a size may be this share of it
@@ -40,26 +41,35 @@ def weight_names(robot):
 
 
 def doubts_of(motion, masses):
-    """Standard deviations by name of what the weight along a Motion may be off by, zero where nothing has weight."""
-    robot = motion.robot
-    own = sum(lump.mass_kg for lump in getattr(robot, "lumps", ()) if lump.joint == PLATFORM)
-    told = own + float(carried_kg(robot, masses, np.nan_to_num(motion.payload_kg)).max(initial=0.0))
-    doubts = _SHARE * told, *(2 * [_LEAN_RAD if told else 0.0])
-    return dict(zip(weight_names(robot), doubts, strict=True))
+    """What the weight along a Motion may be off by: standard deviations and bounds (low, high) by name.
+
+    All zero where nothing has weight.
+    """
+    robot, lumps = motion.robot, getattr(motion.robot, "lumps", ())
+    own = sum(lump.mass_kg for lump in lumps if lump.joint == PLATFORM)
+    told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
+    extra = max(_SHARE * float(told.max(initial=0.0)), _OF_ALL * sum(lump.mass_kg for lump in lumps))
+    doubts = extra, *(2 * [_LEAN_RAD if extra else 0.0])
+    bounds = [(-_MOST * doubt, _MOST * doubt) for doubt in doubts]
+    bounds[0] = -_MISSING * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
+    return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (doubts, bounds))
 
 
-def borne(problem, count, blocks, steps, strength, grams):
+def as_found(problem, count, strength):
+    """Coefficients (k,) of a Projected problem of one level and so many terms under priors of a strength."""
+    scale = problem.scale(np.full((1, count), strength))[0]
+    return posterior_mean(problem.gram[0], problem.moment[0], scale, problem.positive, problem.about)
+
+
+def borne(problem, count, blocks, steps, found, grams):
     """The Projected problem of so many terms with what the weight may be as further coefficients.
 
-    blocks: by number of a term that bears loads the matrix (c, k) of its own k coefficients' coordinates, and the
+    blocks: by number of a term that gives way the matrix (c, k) of its own k coefficients' coordinates, and the
     numbers (q, c) of the columns that a step of each of q numbers of the weight makes of its columns; steps: of the
-    weight, see `rrru.gap.state.Linear`; strength: of the priors under which the coefficients are found that such a step
-    changes; grams: as in `Projected.of`.
+    weight, see `rrru.gap.state.Linear`; found (k,): the coefficients that such a step changes, the same at all levels;
+    grams: as in `Projected.of`.
     """
     means = np.array([step[-1] for step in steps])
-    scale = problem.scale(np.full((1, count), strength))[0]
-    found = np.linalg.solve(problem.gram[0] + np.diag(scale**-2.0), problem.moment[0])
-    found = np.where(problem.positive, np.maximum(found, 0.0), found)
     acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
     index = np.concatenate([numbers.ravel() for _, numbers in blocks.values()])
     mix = np.zeros((len(found) + len(index), len(found) + len(means)))
@@ -89,11 +99,12 @@ def gained_over_cases(problem, strengths):
     """`gained` of a Projected problem at strengths (m, terms), averaged over both cases of the weight."""
     if not problem.weights:
         return gained(problem, strengths)
-    free, result = _free(problem, strengths), np.empty((len(problem.gram), len(strengths)))
-    for freely, some in ((True, free), (False, ~free)):
-        if some.any():
-            found = [log + gained(one, strengths[some]) for log, one in _cases(problem, freely)]
-            result[:, some] = np.logaddexp.reduce(found)
+    # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
+    least = np.maximum(strengths, _NEXT * problem.at_least)
+    result = np.logaddexp.reduce([log + gained(one, least) for log, one in _cases(problem)])
+    bound = (least > strengths).any(axis=1)
+    if bound.any():
+        result[:, bound] += gained(_stays(problem), strengths[bound]) - gained(_stays(problem), least[bound])
     return result
 
 
@@ -105,7 +116,7 @@ def over_cases(problem, strengths):
     """
     cases = ((0.0, problem),)
     if problem.weights:
-        strengths, cases = np.maximum(strengths, problem.at_least), _cases(problem, True)
+        strengths, cases = np.maximum(strengths, problem.at_least), _cases(problem)
     log = np.array([chance + gained(one, strengths)[0, 0] for chance, one in cases]) if cases[1:] else np.zeros(1)
     share, means, spreads = np.exp(log - np.logaddexp.reduce(log)), [], []
     for _, one in cases:
@@ -117,23 +128,24 @@ def over_cases(problem, strengths):
     return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _free(problem, strengths):
-    """Which strengths (m, terms) leave a problem's weight free.
-
-    Under a prior too narrow for the coefficients the weight, whose columns are as large as these, would stand for them.
-    """
-    return (strengths >= _NEXT * problem.at_least).all(axis=1)
-
-
-def _cases(problem, free):
-    """Logarithms of the probabilities of the cases, and the problem in each; one, in which the weight stays, where it
-    is not free.
-    """
-    weight = np.arange(len(problem.size)) >= len(problem.size) - problem.weights
-    if not free:
-        stays = {"size": np.where(weight, _STAYS, problem.size), "about": np.zeros(len(weight))}
-        return ((0.0, replace(problem, **stays)),)
+def _cases(problem):
+    """Logarithms of the probabilities of both cases, and the problem in each."""
+    weight = _of_weight(problem)
     return tuple(
         (float(np.log(chance)), replace(problem, size=np.where(weight, share * problem.size, problem.size)))
         for chance, share in _CASES
     )
+
+
+def _stays(problem):
+    """The problem with the weight as it is.
+
+    Under a prior too narrow for the coefficients the weight, whose columns are as large as these, would stand for them.
+    """
+    weight = _of_weight(problem)
+    return replace(problem, size=np.where(weight, _STAYS, problem.size), about=np.zeros(len(weight)))
+
+
+def _of_weight(problem):
+    """Which coefficients (k,) are the weight's."""
+    return np.arange(len(problem.size)) >= len(problem.size) - problem.weights

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 
 from rrru.effects.protocol import Coordinates
 from rrru.gap.averages import Average, averaged_mean
@@ -95,10 +95,8 @@ class Dense:
                 sizes.extend([1.0] * own.shape[1])
                 owner.extend([len(terms)] * own.shape[1])
         weight = [False] * len(sizes)
-        acting, at_least = _by_weight(evidence, terms) if OTHER in terms and linear.by_weight else (None, np.inf)
-        # half the strength of what was found is the nearest one that is tried
-        if OTHER in terms and strengths[terms.index(OTHER)] >= 0.5 * at_least:
-            columns.append(acting[:, None] / NOISE_MM)
+        if OTHER in terms and linear.by_weight:
+            columns.append(_by_weight(evidence, terms)[0][:, None] / NOISE_MM)
             sizes.append(1.0)
             owner.append(len(terms))
             weight.append(True)
@@ -121,6 +119,12 @@ class Dense:
         """Log likelihood averaged over a weight that is as told, a tenth as doubtful, and one that is not."""
         told = replace(self, size=np.where(self.weight, 0.1 * self.size, self.size))
         return logsumexp([told.likelihood, self.likelihood], b=[0.5, 0.5])
+
+    @property
+    def as_it_is(self):
+        """Log likelihood under a weight that is just that of the linearisation."""
+        nothing = np.zeros(len(self.about))
+        return replace(self, size=np.where(self.weight, 1e-4 * self.size, self.size), about=nothing).likelihood
 
     @property
     def _design(self):
@@ -187,7 +191,48 @@ def test_scores_equal_a_dense_marginal_likelihood(terms, with_law):
     found, combinations = evidence.over_strengths(terms, grids)
     assert [tuple(one) for one in combinations] == list(product(*grids)) and found.shape == (1, len(combinations))
     expected = [Dense.of(evidence, terms, one).averaged for one in combinations]
+    if with_law and OTHER in terms:
+        # half the strength of what was found is the nearest one that is tried
+        number, least = terms.index(OTHER), 0.5 * _by_weight(evidence, terms)[1]
+        raised = [(*one[:number], max(one[number], least), *one[number + 1 :]) for one in combinations]
+        dense = [[Dense.of(evidence, terms, one) for one in pair] for pair in zip(combinations, raised, strict=True)]
+        expected = [least.averaged + given.as_it_is - least.as_it_is for given, least in dense]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("size", [3.0, 8.0, 20.0, 60.0])
+@pytest.mark.parametrize("off", [0.0, 1.5, -2.5])
+def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, off):
+    """One coefficient c and one number w of the weight: what they make, c (A + w B), integrated over both."""
+    generator, shape = np.random.default_rng(3), (_POINTS, 3)
+    a, b = generator.normal(size=(2, *shape, 1))
+    b = 0.2 * (a + b)
+    data = size * NOISE_MM * a[..., 0] + NOISE_MM * generator.normal(size=shape)
+    base, steps = generator.normal(size=(*shape, 3)), (("a number", off, off + 1.0, -off),)
+    library = {"one": _effect([1.0], needs=("drive_load",))}
+    linear = Linear(data, base, {("one", 0): a}, {}, {}, None, {("one", 0): b}, steps)
+    evidence = ModelEvidence(library, linear, np.ones(_POINTS, dtype=int), NoiseModel.white(NOISE_MM), False)
+    found, grid = evidence.over_strengths((Term("one"),))
+    basis, _ = np.linalg.qr(base.reshape(-1, 3))
+    a, b, data = (one.reshape(-1, 1) - basis @ (basis.T @ one.reshape(-1, 1)) for one in (a, b, data))
+    unit = NOISE_MM * np.sqrt(len(a) / (a**2).sum())
+    w = np.linspace(-6.0, 6.0, 24_001)
+    # for each w the integral over c is that of a normal number
+    slope = [(a.T @ data).item() / NOISE_MM**2, (b.T @ data).item() / NOISE_MM**2]
+    gram = np.array([(x.T @ y).item() for x, y in ((a, a), (a, b), (b, b))]) / NOISE_MM**2
+    moment, square = slope[0] + w * slope[1], gram[0] + 2.0 * w * gram[1] + w**2 * gram[2]
+    told = logsumexp([norm.logpdf(w, -off, 0.1), norm.logpdf(w, -off, 1.0)], axis=0, b=0.5)
+    exact = []
+    for (strength,) in grid:
+        wide = 1.0 + square * (strength * unit) ** 2
+        given = 0.5 * moment**2 * (strength * unit) ** 2 / wide - 0.5 * np.log(wide)
+        exact.append(logsumexp(given + told) + np.log(w[1] - w[0]))
+    gained = found[0] - evidence.none[0]
+    assert abs(logsumexp(gained) - logsumexp(exact)) < 0.3
+    likely = np.array(exact) > max(exact) - 2.0
+    np.testing.assert_allclose(gained[likely], np.array(exact)[likely], atol=0.3)
+    # what is not likely stays so
+    assert (gained[~likely] < max(exact) - 1.0).all()
 
 
 def test_alone_it_is_averaged_over_all_strengths_and_levels():

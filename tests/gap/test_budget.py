@@ -6,7 +6,8 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from tests.gap.campaigns import NOISE_MM, SIM, diagnosed, measure, strong
+from rrru.gap.settings import GapSettings
+from tests.gap.campaigns import FAST, FORWARD, NOISE_MM, REVERSE, SIM, active, diagnosed, measure, plan_of, strong
 
 
 def _budget(frame, noise_mm=NOISE_MM):
@@ -82,3 +83,17 @@ def test_what_nothing_predicts_is_unexplained():
     driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
     total = (least_squares(Residuals(SIM, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
     assert budget.loc["unexplained", "rms_mm"] ** 2 > 0.5 * total
+
+
+def test_whoever_does_not_know_the_weight_still_knows_what_gives_way_in_all():
+    """Of one load a compliance is told no better than the mass; what it makes of the gap is."""
+    frame = measure((active("drive_compliance", [8e-8, 6e-8, 9e-8]),), plan=plan_of((FORWARD, REVERSE, FAST)))
+    known = {"weight": {"extra_kg": 0.0, "lean_x": 0.0, "lean_y": 0.0}}
+    shares, errors = [], []
+    for settings in (GapSettings(draws=400), GapSettings(draws=400, known=known)):
+        tables = diagnosed(frame, details=True, settings=settings).tables
+        own = tables["gap_budget"].set_index("part").loc["drive_compliance"]
+        shares.append(own["share_high"] - own["share_low"])
+        errors.append(tables["gap_parameters"].query("effect == 'drive_compliance'")["standard_error"].mean())
+    assert errors[0] > 5.0 * errors[1]
+    assert shares[0] < 1.5 * shares[1]

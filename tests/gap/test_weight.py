@@ -1,15 +1,26 @@
 """A load that nobody told of and a base that leans: what gives way is named, its numbers hold, and the user is told."""
 
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+import yaml
 
+from rrru.effects.protocol import bears_load, gives_way
 from rrru.errors import ConfigError
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
+from rrru.gap.settings import GapSettings, check
+from rrru.gap.weight import doubts_of
+from rrru.gap.whitened import LEVELS
+from rrru.gap.worth import worth
+from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies.withheld.box import draw_trajectories
 from rrru.studies.withheld.faults import Fault
 from rrru.studies.withheld.foreign import FileRobot
+from tests.gap.campaigns import ROBOT, active, measure
 from tests.studies.withheld.files import conditions
 
 _FILE, _SOFT = "hexapod_file", (0.03, 0.012, 0.045, 0.02, 0.035, 0.025)
@@ -25,7 +36,7 @@ def _found(more, settings=None):
     measurements = robot.measured(known)
     told = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
     result = diagnose(measurements, told, settings or GapSettings(), details=False)
-    return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"])
+    return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"]), result.attribution
 
 
 @pytest.fixture(scope="module")
@@ -34,8 +45,16 @@ def misled():
     return _found({"load_kg": _OFF["extra_kg"], "tilt_x_rad": _OFF["lean_x"], "tilt_y_rad": _OFF["lean_y"]})
 
 
+def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
+    *_, attribution = misled
+    nothing = replace(attribution.hypothesis, terms=(), strengths=np.zeros((len(LEVELS), 0)))
+    answers = (attribution.hypothesis, attribution.level), (nothing, attribution.level)
+    now, runs = worth(attribution, *answers, attribution.case)
+    assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
+
+
 def test_the_springs_are_named_and_within_their_errors(misled):
-    verdict, numbers = misled
+    verdict, numbers, _ = misled
     assert verdict["effects"] == "drive_compliance"
     own = numbers.loc["drive_compliance"]
     off = (own["value"] - np.array(_SOFT)) / own["standard_error"]
@@ -45,7 +64,7 @@ def test_the_springs_are_named_and_within_their_errors(misled):
 
 
 def test_what_the_weight_is_off_by_is_found_and_told(misled):
-    verdict, numbers = misled
+    verdict, numbers, _ = misled
     weight = numbers.loc["weight"]
     off = (weight["value"] - list(_OFF.values())) / weight["standard_error"]
     assert list(weight.index) == list(_OFF) and (off**2).sum() < 16.3
@@ -54,7 +73,7 @@ def test_what_the_weight_is_off_by_is_found_and_told(misled):
 
 
 def test_a_weight_that_is_as_told_stays_so():
-    verdict, numbers = _found({})
+    verdict, numbers, _ = _found({})
     weight = numbers.loc["weight"]
     assert verdict["effects"] == "drive_compliance" and "weight not" not in verdict["notes"]
     assert (weight["value"].abs() < 3.0 * weight["standard_error"]).all()
@@ -62,14 +81,45 @@ def test_a_weight_that_is_as_told_stays_so():
 
 def test_a_weight_that_is_known_is_not_fitted():
     known = dict.fromkeys(_OFF, 0.0)
-    verdict, numbers = _found({}, GapSettings(known={"weight": known}))
+    verdict, numbers, _ = _found({}, GapSettings(known={"weight": known}))
     assert verdict["effects"] == "drive_compliance" and "weight" not in numbers.index.get_level_values("effect")
-    _, free = _found({})
+    _, free, _ = _found({})
     sizes = [one.loc["drive_compliance", "standard_error"] for one in (numbers, free)]
     assert (sizes[0] < sizes[1]).all()
 
 
-@pytest.mark.parametrize("wrong", [{"lean_z": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as told"])
+@pytest.mark.parametrize("wrong", [{"lean": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as told"])
 def test_of_the_weight_only_that_it_is_as_told_can_be_known(wrong):
     with pytest.raises(ConfigError, match=r"gap\.known: weight"):
         GapSettings(known={"weight": wrong}).library(conditions(_FILE).mechanism)
+
+
+def test_leans_about_all_axes_may_be_known_for_robots_of_one_configuration_stand_or_hang():
+    known = {"weight": dict.fromkeys(("extra_kg", "lean_x", "lean_y", "lean_z"), 0.0)}
+    config = yaml.safe_load(Path("config.yaml").read_text())
+    check({"gap": config["gap"] | {"known": known}, "seed": 1})
+    GapSettings(known=known).library(conditions(_FILE).mechanism)
+
+
+def test_a_weight_may_lean_either_way_and_no_platform_is_lighter_than_nothing():
+    masses = Masses(platform_kg=3.0, arm_kg=1.0, forearm_kg=0.0)
+    doubts, bounds = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses)
+    assert doubts["extra_kg"] == pytest.approx(0.3 * 23.0) and -3.0 < bounds["extra_kg"][0] < -2.0
+    assert all(bounds[lean][0] == -bounds[lean][1] for lean in ("lean_x", "lean_y"))
+    nothing, _ = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    assert not any(nothing.values())
+
+
+def test_an_arm_that_was_told_no_tool_may_carry_one():
+    arm = conditions("arm6_file").mechanism
+    doubts, _ = doubts_of(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    assert doubts["extra_kg"] == pytest.approx(0.1 * sum(lump.mass_kg for lump in arm.lumps)) and doubts["lean_x"] > 0.0
+
+
+def test_where_a_joint_is_loose_the_weight_is_not_found():
+    loose = active("joint_clearance", [0.3, 0.25, 0.35])
+    assert bears_load(loose.effect) and not gives_way(loose.effect)
+    measurements = measure((loose,), seed=3)
+    result = diagnose(measurements, MeasuredRobot(ROBOT, Masses(3.0, 1.0, 0.5), 0.02), GapSettings(), details=False)
+    assert result.verdict["effects"] == "joint_clearance" and not result.attribution.state.weight
+    assert "weight not" not in result.verdict["notes"]
