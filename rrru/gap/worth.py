@@ -48,10 +48,8 @@ def worth(attribution, truth, imitator, planned):
     case, evidence = attribution.case, attribution.evidence
     terms = hypothesis.terms + rival.terms
     # what the weight is off by is the same in both answers
-    planned, calibrated = replace(planned, doubts={}), attribution.calibrated
-    if attribution.state.weight:
-        calibrated = calibrated.under(attribution.state.weight)
-    there = planned.linearise(calibrated, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
+    planned = replace(planned, doubts={})
+    there = planned.linearise(attribution.state, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
