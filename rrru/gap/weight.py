@@ -102,9 +102,10 @@ def gained_over_cases(problem, strengths):
     # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
     least = np.maximum(strengths, _NEXT * problem.at_least)
     result = np.logaddexp.reduce([log + gained(one, least) for log, one in _cases(problem)])
-    bound = (least > strengths).any(axis=1)
-    if bound.any():
-        result[:, bound] += gained(_stays(problem), strengths[bound]) - gained(_stays(problem), least[bound])
+    narrow = (least > strengths).any(axis=1)
+    if narrow.any():
+        cost = np.minimum(result[:, narrow] - gained(_stays(problem), least[narrow]), 0.0)
+        result[:, narrow] = gained(_stays(problem), strengths[narrow]) + cost
     return result
 
 
