@@ -20,6 +20,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
 from rrru.gap.state import State
 from rrru.gap.unknown import UNKNOWN
+from rrru.gap.weight import WEIGHT
 from rrru.robots.robot import Robot
 from rrru.studies import setup
 from rrru.studies.real.arms import NO_MASSES, Studied, nominal_robot
@@ -34,7 +35,8 @@ class Model:
     """A studied series as far as it carries: its measurements and robot, and the numbers found.
 
     arm_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations (p,): of the
-    calibration alone and beside the causes; effects: these by name, with values by parameter.
+    calibration alone and beside the causes; effects: these by name, with values by parameter; weight: what it is off by,
+    which these were found with.
     """
 
     series: Series
@@ -45,6 +47,7 @@ class Model:
     geometry: np.ndarray
     deviations: np.ndarray
     effects: Mapping[str, tuple[Effect, np.ndarray]]
+    weight: Mapping[str, float]
 
 
 def told(studied: Studied) -> dict[str, Any]:
@@ -62,6 +65,7 @@ def told(studied: Studied) -> dict[str, Any]:
         "geometry": studied.step("b").state.deviations.tolist(),
         "deviations": state.deviations.tolist(),
         "effects": effects,
+        "weight": dict(state.weight),
     }
 
 
@@ -79,7 +83,9 @@ def model(
         effect = library[name].with_waves(one["waves"]) if one["waves"] else library[name]
         effects[name] = effect, np.array(one["values"])
     deviations = (np.array(numbers[key]) for key in ("geometry", "deviations"))
-    return Model(series, measurements, robot, numbers["arm_mm"], numbers["noise_mm"], *deviations, effects)
+    return Model(
+        series, measurements, robot, numbers["arm_mm"], numbers["noise_mm"], *deviations, effects, numbers["weight"]
+    )
 
 
 def carried(models: Sequence[Model]) -> pd.DataFrame:
@@ -102,7 +108,7 @@ def _row(first: Model, second: Model) -> dict:
     models = {
         "frames_rms_mm": State(0.0 * first.geometry, {}),
         "geometry_rms_mm": State(first.geometry, {}),
-        "causes_rms_mm": State(first.deviations, values),
+        "causes_rms_mm": State(first.deviations, values, {WEIGHT: first.weight}),
     }
     left = {name: _left_mm(case, state) for name, state in models.items()}
     return {"campaign": second.series.name, "carried_from": first.series.name, **left}
