@@ -35,8 +35,8 @@ class Model:
     """A studied series as far as it carries: its measurements and robot, and the numbers found.
 
     arm_mm: of orientations, NaN where none were read; noise_mm: per axis; geometry (p,), deviations (p,): of the
-    calibration alone and beside the causes; effects: these by name, with values by parameter; weight: what it is off by,
-    which these were found with.
+    calibration alone and beside the causes; effects: these by name, with values by parameter;
+    weight: what it is off by, which these were found with.
     """
 
     series: Series
