@@ -23,6 +23,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from rrru.robots.legs import cross
+
 GRAVITY_MM_S2 = 9806.65
 # kg mm / s^2 in a newton
 PER_NEWTON = 1000.0
@@ -117,7 +119,7 @@ def load_slopes(robot, masses, at, actuators, acceleration_mm_s2, payload_kg):
     """
     mass, still = carried_kg(robot, masses, payload_kg)[:, None], np.zeros(np.shape(actuators))
     motion = np.asarray(actuators, dtype=float), still, still
-    leaning = [-np.cross(axis, gravity(robot)) for axis in np.eye(3)[level_axes(robot)]]
+    leaning = [-cross(axis, gravity(robot)) for axis in np.eye(3)[level_axes(robot)]]
     by_mass = _of_platform(robot, at, (gravity(robot) - acceleration_mm_s2) / PER_NEWTON)
     per_kg = [_of_platform(robot, at, np.ones_like(mass) * one / PER_NEWTON) for one in leaning]
     by_lean = [
@@ -133,10 +135,10 @@ def carried_kg(robot, masses, payload_kg):
 
 def _of_platform(robot, at, force):
     """The Loads of forces (n, 3) in N at the platform."""
-    member = _along_members(robot, at, np.concatenate([force, np.cross(at.point_mm, force)], axis=1))
+    member = _along_members(robot, at, np.concatenate([force, cross(at.point_mm, force)], axis=1))
     held = _held(robot, at, force) if robot.parts.held_from else member
     driven = np.einsum("nak,na->nk", at.point @ at.driven_counts, force)
-    return _with_followers(robot, driven, member, held, _across(robot, at, force), np.cross(at.point_mm, force))
+    return _with_followers(robot, driven, member, held, _across(robot, at, force), cross(at.point_mm, force))
 
 
 def _of_parts(robot, masses, at, motion, gravity_mm_s2):
@@ -166,7 +168,7 @@ def _across(robot, at, force):
     if not names:
         return np.zeros((len(at), 0, 3))
     turns, places = _joint_frames(robot, at)
-    moment = np.cross(at.point_mm[:, None] - places, force[:, None]) * _carrying(robot.legs, at.poses, names)
+    moment = cross(at.point_mm[:, None] - places, force[:, None]) * _carrying(robot.legs, at.poses, names)
     return _across_axes(robot, turns, moment)
 
 

@@ -237,9 +237,18 @@ def unit_twist(component, factor=1.0):
     return result
 
 
+def cross(first, second):
+    """Cross products (.., 3) of vectors (.., 3): `np.cross` takes longer to look at them than to multiply."""
+    result = np.empty(np.broadcast_shapes(np.shape(first), np.shape(second)))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        result[..., k] = first[..., i] * second[..., j] - first[..., j] * second[..., i]
+    return result
+
+
 def turn_about(axis, angle_rad):
     """Rotation matrices (..., 3, 3) about a unit axis (3,) by angles (...,)."""
     x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = np.asarray(angle_rad, dtype=float)[..., None, None]
-    return _NO_TURN + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    return _NO_TURN + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew)

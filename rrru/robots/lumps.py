@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.robots.legs import turn_about
+from rrru.robots.legs import cross, turn_about
 from rrru.robots.walk import Twists, bar_ends, value_of
 
 # steps of the differences: in time, and of a driven value in rad or mm
@@ -116,7 +116,7 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     for k, name in enumerate(robot.legs.arm_joints):
         carried = [lump.joint in (*behind[name], PLATFORM) for lump in robot.lumps]
         lever = place[:, carried] - at_mm[:, k, None]
-        result[:, k] = np.cross(lever, force[:, carried]).sum(axis=1)
+        result[:, k] = cross(lever, force[:, carried]).sum(axis=1)
     return result
 
 
@@ -124,7 +124,7 @@ def base_moment(robot, motion, poses, gravity_mm_s2):
     """Moments (n, 3) in N mm of a robot's masses about its origin; motion, poses as in `driven_loads`."""
     robot, motion = _uncoupled(robot, motion)
     force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
-    return np.cross(place, force).sum(axis=1)
+    return cross(place, force).sum(axis=1)
 
 
 def _behind(legs):

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from rrru.robots.legs import cross
+
 
 def lower_intersection(centres_mm, radii_mm):
     """Lower, in z, of the two points (..., 3) that three spheres share; NaN where there is none.
@@ -25,8 +27,7 @@ def lower_intersection(centres_mm, radii_mm):
         x = (d**2 + squares[..., 0] - squares[..., 1]) / (2.0 * d)
         y = (i**2 + j**2 + squares[..., 0] - squares[..., 2] - 2.0 * i * x) / (2.0 * j)
         height = np.sqrt(squares[..., 0] - x**2 - y**2)
-        # the cross product: `np.cross` takes longer to look at its arguments than to multiply
-        normal = along[..., [1, 2, 0]] * across[..., [2, 0, 1]] - along[..., [2, 0, 1]] * across[..., [1, 2, 0]]
+        normal = cross(along, across)
         # centres in an upright plane have no lower side
         down = np.where(normal[..., 2:] == 0.0, np.nan, -np.sign(normal[..., 2:]))
         return first + x[..., None] * along + y[..., None] * across + down * height[..., None] * normal

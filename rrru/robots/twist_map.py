@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.legs import TOOL, WORLD
+from rrru.robots.legs import TOOL, WORLD, cross
 from rrru.robots.walk import Twists, bar_ends
 from rrru.robots.wrenches import by_group, frame_along, screw
 
@@ -92,11 +92,11 @@ class TwistMap:
             return turn
         vector = self._twists.values[:, number, 3:]
         angle = np.linalg.norm(vector, axis=1)[:, None, None]
-        cross = np.cross(vector[:, None, :], _EYE).transpose(0, 2, 1)
+        skew = cross(vector[:, None, :], _EYE).transpose(0, 2, 1)
         safe = np.maximum(angle, 1e-4)
         first = np.where(angle < 1e-4, 0.5, (1.0 - np.cos(safe)) / safe**2)
         second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
-        return turn @ (_EYE + first * cross + second * cross @ cross)
+        return turn @ (_EYE + first * skew + second * skew @ skew)
 
     def counts(self, site):
         """Constraints that twists at a site change: list of (rows of A, counts (n, r, 6)); none for world and tool."""
@@ -107,7 +107,7 @@ class TwistMap:
         if site == WORLD:
             point = self._in_world(self.point_mm[:, :, None])
             own = self._own(self.closure.legs.site_numbers[WORLD], _EYE)
-            turning = np.cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ own
+            turning = cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ own
             return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
         if site == TOOL:
             turn = self._in_world(self.poses.turn)
@@ -212,7 +212,7 @@ def _factors(closure, ways, poses, actuators, twists):
 def _about(wrenches, place):
     """Wrenches (n, r, 6) at the origin as wrenches about places (n, 3)."""
     force = wrenches[:, :, :3]
-    return np.concatenate([force, wrenches[:, :, 3:] + np.cross(force, place[:, None, :])], axis=2)
+    return np.concatenate([force, wrenches[:, :, 3:] + cross(force, place[:, None, :])], axis=2)
 
 
 def _orthonormal(rows):

@@ -8,6 +8,7 @@ is the same for all. Screws and twists are at the world's origin, the velocity f
 import numpy as np
 
 from rrru.robots.closure_kernel import ARM_MM
+from rrru.robots.legs import cross
 from rrru.robots.walk import Twists, bar_ends, walks
 
 # passive motions that a leg's singular values, lengths counted in the arm, tell from none
@@ -35,23 +36,23 @@ def groups_of(legs):
 def screw(joint, axis, place):
     """Screw (n, 6) of a joint with axes (n, 3) through places (n, 3)."""
     turning = joint.kind == "R"
-    return np.concatenate([np.cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
+    return np.concatenate([cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
 
 
 def line_wrench(near, far):
     """Wrench (n, 6) of unit force along the lines from near to far, both (n, 3): force and moment about the origin."""
     line = far - near
     line = line / np.linalg.norm(line, axis=1, keepdims=True)
-    return np.concatenate([line, np.cross(near, line)], axis=1)
+    return np.concatenate([line, cross(near, line)], axis=1)
 
 
 def frame_along(lines):
     """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
     x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
     helper = np.eye(3)[np.abs(x).argmin(axis=1)]
-    y = np.cross(helper, x)
+    y = cross(helper, x)
     y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y, np.cross(x, y)], axis=2)
+    return np.stack([x, y, cross(x, y)], axis=2)
 
 
 def group_screws(legs, group, ways, spare=frozenset()):
