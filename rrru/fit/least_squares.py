@@ -137,8 +137,9 @@ def _search(
         start,
         jac=lambda q: residuals.jacobian(origin + directions @ q).reshape(-1, len(directions)) @ directions,
         x_scale=scale,
-        xtol=1e-12,
-        ftol=1e-14,
+        xtol=1e-10,
+        # rounding of the sum of squares is not far below
+        ftol=1e-12,
         gtol=1e-12,
         **options,
     )

@@ -62,7 +62,19 @@ class ReadingMap(TwistMap):
             return self._about(self._own(self._world, _EYE))
         if site == TOOL:
             return self._about(self._own(self._tool, self._in_world(self.poses.turn)))
-        return sum((self.turn[:, :, rows] @ one for rows, one in self.counts(site)), np.zeros((len(self), 3, 6)))
+        if site in self.closure.legs.reflectors:
+            return np.zeros((len(self), 3, 6))
+        return self._of_site(site, self._turned)
+
+    @cached_property
+    def _turned(self):
+        """`_swept` of the platform's turn."""
+        return self._swept(self.turn)
+
+    def columns(self, directions):
+        """Derivative (m, 3, p) of what is read by p parameters with directions (sites, 6, p) at the sites."""
+        shifts = self._columns(directions, self._moved, self.response)
+        return self._with_turns(shifts, lambda: self._columns(directions, self._turned, self.turning))
 
     def _about(self, axes):
         """Turns (n, 3, 6) per twist whose rotation turns about axes (3, 3) or (n, 3, 3), and whose shift does not."""

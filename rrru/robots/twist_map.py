@@ -66,14 +66,28 @@ class TwistMap:
         return zip(self.closure.legs.legs, self._ways, self._wrenches, self.closure.rows, strict=True)
 
     @cached_property
-    def _at_sites(self):
-        """By site's number its constraints: pairs of rows of A and what they count (n, r, 6) of the site's twist."""
-        result = {}
-        for leg, way, one, rows in self._legs:
-            for number, (turn, place) in self._frames(leg, way).items():
-                own = self._own(number, turn)
-                result.setdefault(number, []).append((rows, _in_site(one, turn, place, own)))
-        return result
+    def _sites(self):
+        """Of every site of every leg: its number and the leg's, and of all their turns, places and own axes (s, n, ..).
+
+        A site of several legs is there as often.
+        """
+        made = ((leg, self._frames(*one[:2])) for leg, one in enumerate(self._legs))
+        frames = [(number, leg, *frame) for leg, own in made for number, frame in own.items()]
+        numbers, legs, turns, places = zip(*frames, strict=True)
+        own = [self._own(number, turn) for number, turn in zip(numbers, turns, strict=True)]
+        return np.array(numbers), np.array(legs), np.stack(turns), np.stack(places), np.stack(own)
+
+    def _swept(self, motion):
+        """Motion (s, n, 3, 6) per twist at each of `_sites`, in its frame, from motion (n, 3, rows) per constraint."""
+        _, legs, turns, places, own = self._sites
+        each = np.stack([motion[:, :, rows] @ one for *_, one, rows in self._legs])[legs]
+        force, moment = each[..., :3], each[..., 3:]
+        return np.concatenate([force @ turns, (moment + cross(force, places[:, :, None])) @ own], axis=3)
+
+    @cached_property
+    def _moved(self):
+        """`_swept` of the measured point."""
+        return self._swept(self.point)
 
     def _frames(self, leg, way):
         """Turn (n, 3, 3) and place (n, 3) of every site of a leg, by the site's number."""
@@ -98,10 +112,6 @@ class TwistMap:
         second = np.where(angle < 1e-4, 1.0 / 6.0, (safe - np.sin(safe)) / safe**3)
         return turn @ (_EYE + first * skew + second * skew @ skew)
 
-    def counts(self, site):
-        """Constraints that twists at a site change: list of (rows of A, counts (n, r, 6)); none for world and tool."""
-        return self._at_sites.get(self.closure.legs.site_numbers[site], [])
-
     def response(self, site):
         """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
         if site == WORLD:
@@ -114,7 +124,11 @@ class TwistMap:
             return np.concatenate([turn, np.zeros_like(turn)], axis=2)
         if site in self.closure.legs.reflectors:
             return np.zeros((len(self), 3, 6))
-        return sum(self.point[:, :, rows] @ counts for rows, counts in self.counts(site))
+        return self._of_site(site, self._moved)
+
+    def _of_site(self, site, swept):
+        """Motion (n, 3, 6) per twist at a site of legs, of those of all of them."""
+        return swept[self._sites[0] == self.closure.legs.site_numbers[site]].sum(axis=0)
 
     def effect(self, site):
         """Change (m, 3, 6) of what is read per twist at a site, in the site's frame: here `response`."""
@@ -137,12 +151,19 @@ class TwistMap:
 
     def columns(self, directions):
         """Derivative (m, 3, p) of what is read by p parameters with directions (sites, 6, p) at the sites."""
-        result, numbers = np.zeros((len(self.rows), 3, directions.shape[2])), self.closure.legs.site_numbers
-        for name in self.closure.legs.sites:
-            one = directions[numbers[name]]
-            used = one.any(axis=0)
-            if used.any():
-                result[..., used] += self.effect(name) @ one[:, used]
+        return self._columns(directions, self._moved, self.response)
+
+    def _columns(self, directions, swept, response):
+        """Derivative (n, 3, p) of what is `_swept` at sites of legs, and at the others has a response (n, 3, 6)."""
+        numbers = self._sites[0]
+        active = directions.any(axis=(1, 2))
+        used = active[numbers]
+        along = swept[used].transpose(1, 2, 0, 3).reshape(3 * len(self), -1)
+        result = (along @ directions[numbers[used]].reshape(along.shape[1], -1)).reshape(len(self), 3, -1)
+        for name in (WORLD, TOOL, *self.closure.legs.reflectors):
+            number = self.closure.legs.site_numbers[name]
+            if active[number]:
+                result += response(name) @ directions[number]
         return result
 
     @property
@@ -238,9 +259,3 @@ def _spread(part, rows, n):
     result = np.full((n, *part.shape[1:]), np.nan)
     result[rows] = part
     return result
-
-
-def _in_site(wrenches, turn, place, own):
-    """Wrenches (n, r, 6) at the origin as they count shift and rotation (n, r, 6) of a frame."""
-    about = _about(wrenches, place)
-    return np.concatenate([about[:, :, :3] @ turn, about[:, :, 3:] @ own], axis=2)
