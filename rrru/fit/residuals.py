@@ -48,7 +48,9 @@ class Residuals:
     @last_kept
     def model(self, deviations: np.ndarray) -> np.ndarray:
         """Model positions (n, 3) in mm of the tool under deviations (p,)."""
-        return self.mechanism.forward(self.actuators, deviations, self.nominal_mm)
+        if self.mechanism.closed_form:
+            return self.mechanism.forward(self.actuators, deviations, self.nominal_mm)
+        return self.mechanism.measured(*self._poses(deviations))
 
     @cached_property
     def _nominal_poses(self) -> Poses:
@@ -69,7 +71,7 @@ class Residuals:
 
     def jacobian(self, deviations: np.ndarray) -> np.ndarray:
         """Derivative (m, 3, p) of the residual by the deviations."""
-        if self.readings is None:
+        if self.readings is None and self.mechanism.closed_form:
             return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
         poses, twists = self._poses(deviations)
         at = self.mechanism.map(self.actuators, poses, twists, self.readings)

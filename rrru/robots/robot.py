@@ -41,6 +41,8 @@ class Robot(ABC):
     tool_mm = (0.0, 0.0, 0.0)
     # whether its drives can orient its platform beside moving it
     orients = False
+    # whether positions and their slopes are found without poses
+    closed_form = False
     # grid lines over its longest reach in a picture of its workspace
     workspace_lines = 130
 

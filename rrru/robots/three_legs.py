@@ -68,6 +68,7 @@ class ThreeLegs(Robot):
     SOURCE = ""
     COLUMN_SITES = ()
     SEARCHED = "tied"
+    closed_form = True
 
     def __post_init__(self):
         for key in (*self.DIMENSIONS, "angle_limit_rad", "length_limit_mm"):
