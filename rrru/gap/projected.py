@@ -35,7 +35,7 @@ class Projected:
     Those of the terms come first, then those of their shapes, last those of the weight, both owned by nobody. gram
     (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
     term, the terms' count for nobody; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
-    these, None where they are the same; weights: how many coefficients are the weight's,
+    these, None where they are the same; weights: of the weight's coefficients whether each is a lean, no mass,
     and at_least (terms,): strengths under which the terms are as large as found.
     """
 
@@ -48,7 +48,7 @@ class Projected:
     owner: np.ndarray
     index: np.ndarray
     mix: np.ndarray | None = None
-    weights: int = 0
+    weights: tuple[bool, ...] = ()
     at_least: np.ndarray | None = None
 
     @classmethod

@@ -69,7 +69,7 @@ class GapSettings:
             elif name == WEIGHT:
                 _check_weight(values)
             elif name not in self.effects:
-                raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join(result)}")
+                raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join((*result, WEIGHT))}")
         # legs are of one design, the joints of an arm are not
         alike = robot.legs.parallel
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}

@@ -7,14 +7,15 @@ effect acts that gives way:
     dm ~ N(0, (share m)^2),    w_x, w_y ~ N(0, lean^2)
 
 It is one weight for all effects, and no effect itself: where nothing gives way it changes nothing. Evidence is averaged
-over two cases: the weight is as it was told, or it is not.
+over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
 
-ASSUME even odds: masses come from a scale or a drawing, good to 3 %, and the robot stands level within a tenth of a
-degree; or masses are guessed within 30 % (of what hangs at the platform; at least by a tenth of all that moves, as
-much as an arm is made to carry), and it leans by a degree.
+ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
+at the platform; at least by a tenth of all that moves, as much as an arm is made to carry); the robot stands level
+within a tenth of a degree, or it leans by a degree.
 """
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -22,9 +23,9 @@ from rrru.gap.projected import gained, posterior_mean
 from rrru.robots.dynamics import carried_kg, level_axes
 from rrru.robots.lumps import PLATFORM
 
-# its name beside effects
-WEIGHT = "weight"
-# probabilities that the weight is as told and that it is not, each with its share of the standard deviations below
+# its name beside effects, and that of its mass
+WEIGHT, _EXTRA = "weight", "extra_kg"
+# probabilities that a mass, or a lean, is as told and that it is not, with their shares of the standard deviations below
 _CASES = ((0.5, 0.1), (0.5, 1.0))
 _SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
 # share of the told mass that may be missing, and standard deviations that anything may be off by
@@ -37,7 +38,7 @@ _NEXT = 0.5
 
 def weight_names(robot):
     """Names of what the weight may be off by: mass at the platform, turns of the base about the level axes."""
-    return ("extra_kg", *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
+    return (_EXTRA, *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
 
 
 def doubts_of(motion, masses):
@@ -91,12 +92,12 @@ def borne(problem, count, blocks, steps, found, grams):
     at_least, squares = np.zeros(count), (found / problem.size) ** 2
     for k in blocks:
         at_least[k] = np.sqrt(squares[problem.owner == k].mean())
-    whole = replace(problem, mix=mix, weights=len(means), at_least=at_least, **joined)
+    whole = replace(problem, mix=mix, weights=tuple(step[0] != _EXTRA for step in steps), at_least=at_least, **joined)
     return whole.on(*grams(joined["index"]))
 
 
 def gained_over_cases(problem, strengths):
-    """`gained` of a Projected problem at strengths (m, terms), averaged over both cases of the weight."""
+    """`gained` of a Projected problem at strengths (m, terms), averaged over the cases of the weight."""
     if not problem.weights:
         return gained(problem, strengths)
     # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
@@ -112,7 +113,7 @@ def gained_over_cases(problem, strengths):
 def over_cases(problem, strengths):
     """Mean (k,) and covariance (k, k) of the coefficients of a Projected problem of one level at strengths (1, terms).
 
-    Of a mixture of both cases of the weight, which is always free: the strengths are raised to where it is. The
+    Of a mixture of the cases of the weight, which is always free: the strengths are raised to where it is. The
     covariance does not know of positive coefficients.
     """
     cases = ((0.0, problem),)
@@ -130,12 +131,13 @@ def over_cases(problem, strengths):
 
 
 def _cases(problem):
-    """Logarithms of the probabilities of both cases, and the problem in each."""
-    weight = _of_weight(problem)
-    return tuple(
-        (float(np.log(chance)), replace(problem, size=np.where(weight, share * problem.size, problem.size)))
-        for chance, share in _CASES
-    )
+    """Logarithms of the probabilities of all cases, and the problem in each."""
+    kinds, result = sorted(set(problem.weights)), []
+    for cases in product(_CASES, repeat=len(kinds)):
+        shares, size = {kind: share for kind, (_, share) in zip(kinds, cases, strict=True)}, problem.size.copy()
+        size[_of_weight(problem)] *= [shares[kind] for kind in problem.weights]
+        result.append((float(sum(np.log(chance) for chance, _ in cases)), replace(problem, size=size)))
+    return result
 
 
 def _stays(problem):
@@ -149,4 +151,4 @@ def _stays(problem):
 
 def _of_weight(problem):
     """Which coefficients (k,) are the weight's."""
-    return np.arange(len(problem.size)) >= len(problem.size) - problem.weights
+    return np.arange(len(problem.size)) >= len(problem.size) - len(problem.weights)
