@@ -25,7 +25,7 @@ from rrru.robots.lumps import PLATFORM
 
 # its name beside effects, and that of its mass
 WEIGHT, _EXTRA = "weight", "extra_kg"
-# probabilities that a mass, or a lean, is as told and that it is not, with their shares of the standard deviations below
+# chances that a mass, or a lean, is as told and that it is not, each with its share of the standard deviations below
 _CASES = ((0.5, 0.1), (0.5, 1.0))
 _SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
 # share of the told mass that may be missing, and standard deviations that anything may be off by
