@@ -103,11 +103,14 @@ class ModelEvidence:
         return self._made[key]
 
     def found(self, terms):
-        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
+        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with.
+
+        And whether each is told from zero.
+        """
         key = tuple(terms)
         if key not in self._made:
             # whatever levels are asked for, it is one weight
-            first = Projected.of(self._priors_of(terms), len(terms), partial(self._grams, self.levels[:1]))
+            first = self._bare(terms, partial(self._grams, self.levels[:1]))
             self._made[key] = as_found(first, len(terms), STRENGTHS[-1])
         return self._made[key]
 
@@ -118,11 +121,18 @@ class ModelEvidence:
 
     def _projected(self, terms, levels):
         grams = partial(self._grams, levels)
-        problem = Projected.of(self._priors_of(terms), len(terms), grams)
-        blocks = {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
+        problem, blocks = self._bare(terms, grams), self._blocks(terms)
         if not blocks:
             return problem
-        return borne(problem, len(terms), blocks, self.linear.weight_steps, self.found(terms), grams)
+        return borne(problem, len(terms), blocks, self.linear.weight_steps, self.found(terms)[0], grams)
+
+    def _bare(self, terms, grams):
+        """The Projected problem of terms without the weight."""
+        return Projected.of(self._priors_of(terms), len(terms), grams)
+
+    def _blocks(self, terms):
+        """`_by_weight` of the terms that give way, by their number."""
+        return {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
 
     def _grams(self, levels, index):
         """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
@@ -251,6 +261,19 @@ class ModelEvidence:
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
         return over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
+
+    def weight_errors(self, terms, strengths, level):
+        """Standard errors (q,) of the weight's numbers, in their steps, at strengths of a set of terms and a level.
+
+        They are told by what is itself told from zero. What was found of a spring that bears next to nothing is
+        anything, and would deny that it ever bears more.
+        """
+        steps, grams, (found, told) = self.linear.weight_steps, partial(self._grams, [level]), self.found(terms)
+        sure = borne(
+            self._bare(terms, grams), len(terms), self._blocks(terms), steps, np.where(told, found, 0.0), grams
+        )
+        _, covariance = over_cases(sure, np.asarray(strengths)[None])
+        return np.sqrt(np.diag(covariance)[-len(steps) :])
 
     def calibration(self, terms, level):
         """Covariance (p, p) of the calibration's deviations at known coefficients of terms, and how they follow these.

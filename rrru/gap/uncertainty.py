@@ -36,8 +36,7 @@ def weight_of(attribution):
     if not weight or not attribution.evidence.projected(terms, [level]).weights:
         return []
     strengths = attribution.hypothesis.strengths_of(terms, level)
-    _, covariance = attribution.evidence.coefficients(terms, strengths, level)
-    errors = np.sqrt(np.diag(covariance)[-len(linear.weight_steps) :])
+    errors = attribution.evidence.weight_errors(terms, strengths, level)
     return [
         (name, "kg" if name.endswith("kg") else "rad", weight[name], float(abs(stepped - value) * error))
         for (name, value, stepped, _), error in zip(linear.weight_steps, errors, strict=True)

@@ -32,6 +32,8 @@ _SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
 _MISSING, _MOST = 0.9, 10.0
 # such a share of these is nothing
 _STAYS = 1e-4
+# standard errors that tell a coefficient from zero
+_TOLD = 2.0
 # strengths lie so far apart that the next one to a size may be this share of it
 _NEXT = 0.5
 
@@ -57,9 +59,14 @@ def doubts_of(motion, masses):
 
 
 def as_found(problem, count, strength):
-    """Coefficients (k,) of a Projected problem of one level and so many terms under priors of a strength."""
+    """Coefficients (k,) of a Projected problem of one level and so many terms under priors of a strength.
+
+    And whether each is told from zero.
+    """
     scale = problem.scale(np.full((1, count), strength))[0]
-    return posterior_mean(problem.gram[0], problem.moment[0], scale, problem.positive, problem.about)
+    mean = posterior_mean(problem.gram[0], problem.moment[0], scale, problem.positive, problem.about)
+    error = np.sqrt(np.diag(np.linalg.inv(problem.gram[0] + np.diag(scale**-2.0))))
+    return mean, np.abs(mean) > _TOLD * error
 
 
 def borne(problem, count, blocks, steps, found, grams):
