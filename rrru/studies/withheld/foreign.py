@@ -172,7 +172,7 @@ def draw(member, conditions):
     """The robot of a Member, see `rrru.studies.withheld.chunks`, and its measurements.
 
     A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, or that nobody's robot has, is
-    drawn again; raises the last of these errors where none can be driven.
+    drawn again, and with it the trajectories; raises the last of these errors where none can be driven.
     """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
     offsets = [_OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
@@ -189,6 +189,7 @@ def draw(member, conditions):
             return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
         except (SimulationError, UnreachableError) as error:
             failed = error
+        robot = replace(robot, trajectories=draw_trajectories(generator, conditions))
     raise failed
 
 
