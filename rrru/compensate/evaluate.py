@@ -1,11 +1,13 @@
 """Errors of every trajectory under every calibration: by its model, and driven again. Lengths in mm, angles in rad."""
 
+import logging
 from fnmatch import fnmatchcase
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.errors import SimulationError, UnreachableError
 from rrru.fit.campaign_fit import deviation_vector
 
 GROUPS = {"all_lines": "line_*", "all": "*"}
@@ -20,14 +22,18 @@ def under_calibrations(measurements, mechanism, parameters, drive=None):
     """Rows of `errors` before any calibration and under every one of a `parameters` frame.
 
     drive: makes measurements with a controller, positions (n, 3) to actuator values; None where the robot is not at
-    hand and every calibration is judged by its model alone.
+    hand and every calibration is judged by its model alone. A calibration under whose commands it loses its pose has no
+    rows of that mode, and a line of output says so.
     """
     frames = [before(rows.at_tool(measurements, mechanism))]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):
         deviations = deviation_vector(parameters, calibration, method, mechanism)
         parts = {"model": model_residual(measurements, mechanism, deviations)}
         if drive is not None:
-            parts["closed_loop"] = closed_loop(drive, mechanism, deviations)
+            try:
+                parts["closed_loop"] = closed_loop(drive, mechanism, deviations)
+            except (SimulationError, UnreachableError) as error:
+                logging.warning("closed loop left out, %s by %s: %s", calibration, method, error)
         frames += [part.assign(calibration=calibration, method=method, mode=mode) for mode, part in parts.items()]
     return pd.concat(frames, ignore_index=True)
 

@@ -9,7 +9,7 @@ from rrru.campaign.noise import repeat_noise
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral, line_groups
 from rrru.compensate import evaluate
-from rrru.errors import ConfigError, FitError
+from rrru.errors import ConfigError, FitError, UnreachableError
 from rrru.fit.campaign_fit import CalibrationSettings, deviation_vector, fit_sets, tables
 from rrru.plant.virtual_robot import VirtualRobot
 
@@ -53,6 +53,24 @@ def test_calibrated_commands_land_on_target(campaign):
     assert truth == pytest.approx(2.1)
     with pytest.raises(FitError, match="no calibration 'both' by 'least_squares'"):
         deviation_vector(frame, "both", "least_squares", robot.mechanism)
+
+
+def test_a_calibration_that_cannot_be_driven_leaves_the_others_their_rows(campaign, caplog):
+    robot, plan, measurements = campaign
+    fits = fit_sets(measurements, robot.mechanism, _SETTINGS, noise_mm=0.01)
+    frame = tables("c", fits, robot.mechanism.identifiable(_ERRORS))["parameters"]
+    driven = iter([False, *[True] * 10])
+
+    def drive(controller):
+        if not next(driven):
+            raise UnreachableError("point 3 is out of reach")
+        return robot.run(plan, 0.0, np.random.default_rng(1), controller)[0]
+
+    errors = evaluate.under_calibrations(measurements, robot.mechanism, frame, drive)
+    modes = errors.groupby(["calibration", "method"], sort=False)["mode"].unique()
+    without = [key for key, one in modes.items() if "model" in one and "closed_loop" not in one]
+    assert len(without) == 1 and sum("closed_loop" in one for one in modes) == len(modes) - 2
+    assert "point 3 is out of reach" in caplog.text and without[0][0] in caplog.text
 
 
 def test_a_campaign_without_any_set_is_refused(campaign):

@@ -34,6 +34,14 @@ _LIMITS = {
     "temperature_c": (lambda v: (v >= -60) & (v <= 100), "-60 to 100 degrees C"),
     **dict.fromkeys(NOISE, (lambda v: (v > 0) & (v <= 100), "above 0 and up to 100 mm")),
 }
+# the unit of other columns, and units that a header may state in its place
+_OTHER_UNITS = {
+    "time_s": ("s", ("ms", "us", "µs", "min", "h")),
+    "speed_mm_s": ("mm/s", ("m/s", "cm/s", "mm/min", "m/min", "in/s", "%")),
+    "payload_kg": ("kg", ("g", "t", "lb", "lbs", "n")),
+    "temperature_c": ("degrees C", ("f", "°f", "k")),
+}
+_IN_BRACKETS = re.compile(r".*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 
 
 def known_columns(mechanism):
@@ -44,7 +52,7 @@ def known_columns(mechanism):
 def resolve(spec, cells, mechanism, problems):
     """{our name: the file's name} of the columns that a file's Cells have, and those that nobody declared.
 
-    Missing columns, repeated ones and, unless `extra_columns` is "ignore", undeclared ones are noted.
+    Missing columns, repeated ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
     """
     drives, names = mechanism.parts.columns, cells.names
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -55,6 +63,11 @@ def resolve(spec, cells, mechanism, problems):
     wanted = {ours: spec.columns.get(ours, means.get(ours, ours)) for ours in known_columns(mechanism)}
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
     extra = [name for name in names if name not in (*found.values(), *cells.unused)]
+    for ours, (unit, others) in _OTHER_UNITS.items():
+        stated = _IN_BRACKETS.fullmatch(found.get(ours, ""))
+        if stated and stated[1].lower() in others:
+            allowed = f"{unit}: convert the column, and its name"
+            problems.add("unit", column=found[ours], value=f"the unit {stated[1]}", allowed=allowed)
     # drive values tell where the robot was sent as well
     sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():

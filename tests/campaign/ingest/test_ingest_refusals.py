@@ -543,3 +543,17 @@ def test_a_kind_of_problem_lists_twenty_and_counts_the_rest(tmp_path):
     problems = problems_of(FIELD.assign(time_s="late"), tmp_path)
     assert [p["row"] for p in problems] == [*range(1, 21), None]
     assert problems[-1]["value"] == "222 problems of this kind, of which the first 20 are listed"
+
+
+@pytest.mark.parametrize(
+    ("ours", "header", "unit"),
+    [("time_s", "Zeit [ms]", "s"), ("speed_mm_s", "speed (m/s)", "mm/s"), ("payload_kg", "Nutzlast [g]", "kg")],
+)
+def test_another_unit_in_a_header_is_not_read_as_ours(ours, header, unit, tmp_path):
+    frame = FIELD.assign(**{ours: FIELD.get(ours, 1.0)}).rename(columns={ours: header})
+    path = tmp_path / "units.csv"
+    frame.to_csv(path, index=False)
+    spec = IngestSpec(str(path), columns={ours: header})
+    with pytest.raises(IngestError, match=f"{unit}: convert the column") as raised:
+        ingest(spec, ROBOT)
+    assert header in str(raised.value)
