@@ -17,6 +17,8 @@ _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
 # more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs
 _LISTED, _WORTH, _SURE = 3, 0.05, 0.9
+# a share beyond this is none: effects that imitate each other make a little more than the whole
+_MOST_SHARE = 1.5
 
 
 def answer(campaign, verdict, tables, drives=()):
@@ -138,8 +140,11 @@ def _missed(facts):
 
 def _causes(facts):
     """What makes the gap, and how sure that is."""
-    said = [_cause(effect, "" if number else " of that") for number, effect in enumerate(facts["effects"])]
-    if sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + _WORTH:
+    told = _shares_told(facts)
+    said = [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(facts["effects"])]
+    if not told and said:
+        said.append("The gap is so small beside the noise that its shares cannot be told.")
+    elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + _WORTH:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
         share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
@@ -154,9 +159,18 @@ def _causes(facts):
     return said
 
 
-def _cause(effect, follow):
-    """One effect: its share, name, leg, sizes and meaning."""
-    share = f"{percent(effect['share'])}{follow} is" if effect["share"] is not None else "Also there is"
+def _shares_told(facts):
+    """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
+    shares = [effect["share"] or 0.0 for effect in facts["effects"]]
+    shares.append(_scatter_share(facts))
+    return facts["gap_rms_mm"] > 0.0 and max(shares) <= _MOST_SHARE
+
+
+def _cause(effect, follow, told):
+    """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
+    share = "Also there is"
+    if effect["share"] is not None:
+        share = f"{percent(effect['share'])}{follow} is" if told else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
@@ -176,10 +190,17 @@ def _sizes(parameters):
 
 def _scatter(facts):
     """What does not repeat, where it matters."""
-    share = sum(part["share"] for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
+    share = _scatter_share(facts)
     if share < _WORTH:
         return []
+    if not _shares_told(facts):
+        return ["Some of it does not repeat from pass to pass: no model can take that away."]
     return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
+
+
+def _scatter_share(facts):
+    """Share of the gap that does not repeat."""
+    return sum(part["share"] for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
 
 
 def _left(facts):

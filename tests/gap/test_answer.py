@@ -81,6 +81,16 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         assert words in said
 
 
+@pytest.mark.parametrize(("factor", "gap"), [(12.0, 0.02), (1.0, 0.0)])
+def test_of_a_gap_that_is_small_beside_the_noise_sizes_are_told_and_no_shares(factor, gap):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    shares = budget[["share", "share_low", "share_high"]] * (factor if gap else 0.0)
+    said = " ".join(answered(budget.assign(**shares), gap_rms_mm=gap)["sentences"])
+    size = budget.set_index("part").loc["link_flexure", "rms_mm"]
+    assert "%" not in said and "so small beside the noise" in said
+    assert f"{answer.rounded(size)} mm is link flexure" in said
+
+
 @pytest.mark.parametrize(
     ("separates", "left_open", "decided"),
     [
