@@ -10,8 +10,8 @@ It is one weight for all effects, and no effect itself: where nothing gives way 
 over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
 
 ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
-at the platform; at least by a tenth of all that moves, as much as an arm is made to carry); the robot stands level
-within a tenth of a degree, or it leans by a degree.
+at the platform; where nothing was told there, by a tenth of all that moves, as an arm is made to carry); the robot
+stands level within a tenth of a degree, or it leans by a degree.
 """
 
 from dataclasses import replace
@@ -51,7 +51,7 @@ def doubts_of(motion, masses):
     robot, lumps = motion.robot, getattr(motion.robot, "lumps", ())
     own = sum(lump.mass_kg for lump in lumps if lump.joint == PLATFORM)
     told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
-    extra = max(_SHARE * float(told.max(initial=0.0)), _OF_ALL * sum(lump.mass_kg for lump in lumps))
+    extra = _SHARE * float(told.max(initial=0.0)) or _OF_ALL * sum(lump.mass_kg for lump in lumps)
     doubts = extra, *(2 * [_LEAN_RAD if extra else 0.0])
     bounds = [(-_MOST * doubt, _MOST * doubt) for doubt in doubts]
     bounds[0] = -_MISSING * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
