@@ -158,8 +158,10 @@ class TwistMap:
         numbers = self._sites[0]
         active = directions.any(axis=(1, 2))
         used = active[numbers]
-        along = swept[used].transpose(1, 2, 0, 3).reshape(3 * len(self), -1)
-        result = (along @ directions[numbers[used]].reshape(along.shape[1], -1)).reshape(len(self), 3, -1)
+        count, parameters = 6 * np.count_nonzero(used), directions.shape[2]
+        along = swept[used].transpose(1, 2, 0, 3).reshape(3 * len(self), count)
+        result = along @ directions[numbers[used]].reshape(count, parameters)
+        result = result.reshape(len(self), 3, parameters)
         for name in (WORLD, TOOL, *self.closure.legs.reflectors):
             number = self.closure.legs.site_numbers[name]
             if active[number]:
