@@ -120,11 +120,14 @@ class ModelEvidence:
         return priors + [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
 
     def _projected(self, terms, levels):
-        grams = partial(self._grams, levels)
-        problem, blocks = self._bare(terms, grams), self._blocks(terms)
-        if not blocks:
-            return problem
-        return borne(problem, len(terms), blocks, self.linear.weight_steps, self.found(terms)[0], grams)
+        if not self._blocks(terms):
+            return self._bare(terms, partial(self._grams, levels))
+        return self._borne(terms, levels, self.found(terms)[0])
+
+    def _borne(self, terms, levels, found):
+        """The Projected problem of terms and of the weight, whose columns are made with coefficients found (k,)."""
+        grams, blocks = partial(self._grams, levels), self._blocks(terms)
+        return borne(self._bare(terms, grams), len(terms), blocks, self.linear.weight_steps, found, grams)
 
     def _bare(self, terms, grams):
         """The Projected problem of terms without the weight."""
@@ -268,12 +271,10 @@ class ModelEvidence:
         They are told by what is itself told from zero. What was found of a spring that bears next to nothing is
         anything, and would deny that it ever bears more.
         """
-        steps, grams, (found, told) = self.linear.weight_steps, partial(self._grams, [level]), self.found(terms)
-        sure = borne(
-            self._bare(terms, grams), len(terms), self._blocks(terms), steps, np.where(told, found, 0.0), grams
-        )
+        found, told = self.found(terms)
+        sure = self._borne(terms, [level], np.where(told, found, 0.0))
         _, covariance = over_cases(sure, np.asarray(strengths)[None])
-        return np.sqrt(np.diag(covariance)[-len(steps) :])
+        return np.sqrt(np.diag(covariance)[-len(self.linear.weight_steps) :])
 
     def calibration(self, terms, level):
         """Covariance (p, p) of the calibration's deviations at known coefficients of terms, and how they follow these.

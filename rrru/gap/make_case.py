@@ -51,7 +51,9 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     stop = stops(measurements)
     used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
     if follows_path(motion.position_mm, measurements["run"].to_numpy()):
-        used &= ~at_reversals(motion, _path_drive(measurements, mechanism, actuators, _FINER_DEGREE))
+        finer, _ = driven_path(measurements, _FINER_DEGREE)
+        drives = mechanism, actuators, motion.path_index
+        used &= ~at_reversals(motion, _path_drive(measurements, finer, drives, _FINER_DEGREE))
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
@@ -139,18 +141,20 @@ def _reversals(path, stands):
 
 def _course(measurements, mechanism, actuators):
     """What the robot was told to do; at the measured points with the table's own actuator values."""
-    _, told = driven_path(measurements)
+    path, told = driven_path(measurements)
     if mechanism.orients:
         told["drive_motion"] = drive_rates(measurements, actuators)
     at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
-    path_drive = _path_drive(measurements, mechanism, actuators)
+    path_drive = _path_drive(measurements, path, (mechanism, actuators, told["path_index"]))
     return Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
 
 
-def _path_drive(measurements, mechanism, actuators, degree=DEGREE):
-    """Actuator values (N, K) along all that is driven, by splines of an odd degree through the points of each run."""
-    path, told = driven_path(measurements, degree)
-    index = told["path_index"]
+def _path_drive(measurements, path, drives, degree=DEGREE):
+    """Actuator values (N, K) along a path (N, 3) by splines of an odd degree through the points of each run.
+
+    drives: the robot, its actuator values (n, K) at the measured points, and the rows (n,) of these on the path.
+    """
+    mechanism, actuators, index = drives
     if mechanism.orients:
         # positions do not tell the orientation between the points
         evenly = np.stack([np.interp(np.arange(len(path)), index, one) for one in actuators.T], axis=1)

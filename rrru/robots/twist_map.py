@@ -58,7 +58,7 @@ class TwistMap:
     @cached_property
     def frames(self):
         """Turn (n, 3, 3) and place (n, 3) of the frame at every site but world and tool, by the site's number."""
-        return {number: frame for leg in self._legs for number, frame in self._frames(*leg[:2]).items()}
+        return {number: frame for number, _, *frame in self._placed}
 
     @property
     def _legs(self):
@@ -66,14 +66,18 @@ class TwistMap:
         return zip(self.closure.legs.legs, self._ways, self._wrenches, self.closure.rows, strict=True)
 
     @cached_property
+    def _placed(self):
+        """Of every site of every leg its number, the leg's, its turn (n, 3, 3) and its place (n, 3)."""
+        made = ((leg, self._frames(*one[:2])) for leg, one in enumerate(self._legs))
+        return [(number, leg, *frame) for leg, own in made for number, frame in own.items()]
+
+    @cached_property
     def _sites(self):
         """Of every site of every leg: its number and the leg's, and of all their turns, places and own axes (s, n, ..).
 
         A site of several legs is there as often.
         """
-        made = ((leg, self._frames(*one[:2])) for leg, one in enumerate(self._legs))
-        frames = [(number, leg, *frame) for leg, own in made for number, frame in own.items()]
-        numbers, legs, turns, places = zip(*frames, strict=True)
+        numbers, legs, turns, places = zip(*self._placed, strict=True)
         own = [self._own(number, turn) for number, turn in zip(numbers, turns, strict=True)]
         return np.array(numbers), np.array(legs), np.stack(turns), np.stack(places), np.stack(own)
 

@@ -11,6 +11,7 @@ from rrru.campaign.ingest.clock import seconds, tells_clock
 from rrru.campaign.ingest.orientations import check_orientations
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, QUATERNIONS, TURNS, drive_name
 from rrru.campaign.ingest.spec import MM, RAD
+from rrru.campaign.ingest.trackers import unit_of
 
 REQUIRED = ("trajectory", *COMMAND, *MEASURED)
 _GROUPS = (*TURNS.values(), *QUATERNIONS.values(), NOISE)
@@ -41,7 +42,6 @@ _OTHER_UNITS = {
     "payload_kg": ("kg", ("g", "t", "lb", "lbs", "n")),
     "temperature_c": ("degrees C", ("f", "°f", "k")),
 }
-_IN_BRACKETS = re.compile(r".*[\[(]\s*([^\])]*?)\s*[\])]\s*")
 
 
 def known_columns(mechanism):
@@ -64,10 +64,9 @@ def resolve(spec, cells, mechanism, problems):
     found = {ours: theirs for ours, theirs in wanted.items() if theirs in names}
     extra = [name for name in names if name not in (*found.values(), *cells.unused)]
     for ours, (unit, others) in _OTHER_UNITS.items():
-        stated = _IN_BRACKETS.fullmatch(found.get(ours, ""))
-        if stated and stated[1].lower() in others:
+        if ours in found and (stated := unit_of(found[ours])) in others:
             allowed = f"{unit}: convert the column, and its name"
-            problems.add("unit", column=found[ours], value=f"the unit {stated[1]}", allowed=allowed)
+            problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
     # drive values tell where the robot was sent as well
     sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():
