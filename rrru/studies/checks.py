@@ -32,13 +32,29 @@ def check_schema(config, file):
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
         place = ".".join(map(str, error.absolute_path)) or "configuration"
-        raise ConfigError(f"{place}: {error.message}{allowed or _meant(error)}")
+        raise ConfigError(f"{place}: {error.message}{allowed}{_as_number(error)}{_meant(error)}")
+
+
+def _as_number(error):
+    """What to write in place of a number that YAML takes for text, such as 8.0e7; "" where the value is none."""
+    if error.validator != "type" or not isinstance(error.instance, str):
+        return ""
+    try:
+        number = float(error.instance)
+    except ValueError:
+        return ""
+    # as YAML writes it: with a point and a sign in the exponent
+    return f"; it is text to YAML: write {yaml.safe_dump(number).split()[0]}, without quotes"
 
 
 def _meant(error):
-    """Which known keys the unknown ones of a mapping look like, "" where they look like none."""
-    known = list(error.schema.get("properties", ())) if error.validator == "additionalProperties" else []
-    unknown = [key for key in error.instance if key not in known] if known else []
+    """Which known keys or words the unknown ones look like, "" where they look like none."""
+    known, unknown = [], []
+    if error.validator == "additionalProperties":
+        known = list(error.schema.get("properties", ()))
+        unknown = [key for key in error.instance if key not in known]
+    elif error.validator == "enum":
+        known, unknown = list(map(str, error.validator_value)), [error.instance]
     near = {key: get_close_matches(str(key), known, n=1) for key in unknown}
     meant = [f"{found[0]} for {key}" for key, found in near.items() if found]
     return f"; did you mean {', '.join(meant)}?" if meant else ""

@@ -70,10 +70,16 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
         ("seed: 5.0", "seed: 5.0 is not of type 'integer'; allowed: a whole number, without a point"),
         ("campaigns: {1: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
         ("campaigns: {no: {robot: rrru3}}", "is not of type 'object'; allowed: a mapping whose keys are text"),
+        ("loads: {arm_mass_kg: 8.0e-1x}", "is not of type 'number'; allowed: a finite number of at most 1e+15"),
+        ("loads: {arm_mass_kg: 8.0e1}", "it is text to YAML: write 80.0, without quotes"),
+        ('loads: {arm_mass_kg: "8e-05"}', "it is text to YAML: write 8.0e-05, without quotes"),
+        ("campaigns: {crooked: {platform_mass_kg: 3.0}}", "crooked: 'platform_mass_kg' is not one of ['robot', "),
+        ("campaigns: {mine: {robot: rrru3, ingest: a.csv, unit: mms}}", "did you mean mm for mms?"),
+        ("campaigns: {mine: {robot: rrru3, virtual: crooked}}", "'trajectories' is a required property"),
         ("real: {sets: {ur10: {files: /data/*.csv}}}", "real.sets.ur10.files: got '/data/*.csv'; allowed: a path"),
     ],
 )
-def test_what_yaml_has_and_json_has_not_is_refused(overlay, message, monkeypatch):
+def test_what_is_refused_says_what_is_meant(overlay, message, monkeypatch):
     monkeypatch.chdir(ROOT)
     config = _base()
     update_config(config, yaml.safe_load(overlay))

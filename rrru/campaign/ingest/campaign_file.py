@@ -102,7 +102,9 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
     if not set(sheet.drives) <= set(frame):
         which = f"{sheet.mechanism.name}, nominal, elbow {sheet.spec.elbow}"
         names = f"{sheet.drives[0]} to {sheet.drives[-1]}"
-        notes.append(f"no {sheet.drive_name}: {names} computed from the commanded positions ({which})")
+        upright = sheet.mechanism.orients and not set(TURNS["command"]) <= set(frame)
+        held = "; nor orientations: it is taken to be turned as at home all the time" if upright else ""
+        notes.append(f"no {sheet.drive_name}: {names} computed from the commanded positions ({which}){held}")
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")
     return notes

@@ -43,6 +43,8 @@ _NAMED = {
     "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
     "target": ("target", "reflector", "marker", "reflektor"),
 }
+# what drives are called where they are numbered only
+_DRIVES = ("q", "j", "a", "l", "joint", "axis", "achse", "theta", "motor", "leg", "gelenk")
 # what counts, beside what may be a text
 _COUNTS = ("run", "point")
 _CLOCKS = (
@@ -120,7 +122,24 @@ def guess_columns(cells, mechanism, given):
     for likeness, one, theirs in sorted(pairs, key=lambda pair: -pair[0]):
         if likeness >= _LEAST_ALIKE and one not in found and theirs not in found.values():
             found[one] = theirs
-    return found
+    return found | _numbered(mechanism.parts.drives, found, [name for name in free if name not in found.values()])
+
+
+def _numbered(drives, found, free):
+    """{drive: the file's column} where as many free columns as there are drives are numbered alike: q1, q2, ..
+
+    None where a drive has its column already, a column states a unit of another kind, or two kinds are numbered so.
+    """
+    ours, others = [drive.column for drive in drives], LENGTHS if drives[0].unit == "rad" else _ANGLE_UNITS
+    kinds = {}
+    for name in free:
+        word, digits, rest = re.fullmatch(r"([^\d]*)(\d*)(.*)", _plain(name)).groups()
+        if digits and word.strip() in _DRIVES and _stated(name) not in others:
+            kinds.setdefault((word, rest), {})[int(digits)] = name
+    counted = [names for names in kinds.values() if len(names) == len(ours) == max(names) - min(names) + 1]
+    if len(counted) != 1 or set(ours) & set(found):
+        return {}
+    return dict(zip(ours, (counted[0][number] for number in sorted(counted[0])), strict=True))
 
 
 def _is_count(cell):

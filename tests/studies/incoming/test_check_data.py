@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.robots.rrru3 import Rrru3
+from rrru.studies import config as parts
+from rrru.studies import setup
 from rrru.studies.incoming.check_data import check_file, main, read_config
 from tests.campaign.ingest.samples import SAMPLES, section
 from tests.places import DATA, ROOT
@@ -178,6 +180,23 @@ def test_a_list_without_commands_says_what_to_give(tmp_path):
     found = check_file(section("leica")["ingest"], CONFIG, "rrru3")
     assert any("--commands" in line for line in found.lines)
     assert {problem["column"] for problem in found.refused} == {f"command_{axis}_mm" for axis in "xyz"}
+
+
+@pytest.mark.parametrize("name", ["q{}", "J{} [deg]", "Achse {} (deg)"])
+def test_drives_that_are_only_numbered_are_proposed_in_their_order(name, tmp_path):
+    """A robot's own drives are called otherwise; where two kinds of columns are numbered, none is taken."""
+    config = {"robots": {"my_arm": {"urdf": str(DATA / "models" / "arm6.urdf"), "base": "base_link", "tip": "tool0"}}}
+    arm = setup.mechanism(parts.robot(CONFIG | config, {"robot": "my_arm"}))
+    rng = np.random.default_rng(5)
+    drives = arm.legs.home_drives + rng.uniform(-0.3, 0.3, (60, 6))
+    positions = arm.forward(drives) + rng.normal(0.0, 0.02, (60, 3))
+    columns = [name.format(i) for i in range(1, 7)]
+    frame = pd.DataFrame(np.degrees(drives) if "deg" in name else drives, columns=columns)[columns[::-1]]
+    frame = frame.assign(trajectory="poses", **dict(zip(LENGTHS[3:], positions.T, strict=True)))
+    found = checked(frame, tmp_path, "my_arm", **config)
+    assert found.refused == () and proposed(found)["columns"] == dict(zip(arm.parts.columns, columns, strict=True))
+    twice = frame.assign(**{name.replace("{}", "{0}").format(i).lower() + " act": 0.0 for i in range(1, 7)})
+    assert "columns" not in proposed(checked(twice, tmp_path, "my_arm", **config))
 
 
 def test_names_that_look_like_nothing_are_not_guessed(tmp_path):
