@@ -36,6 +36,8 @@ _VETO_NATS = 3.0
 _HALF = 0.5
 # the diagnosis looks further than a calibration's bounds, which a strong effect would press against
 _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
+# share of a campaign's points that is usually diagnosed; fewer are told
+_USUAL = 0.8
 _DEFAULTS = GapSettings()
 
 
@@ -118,6 +120,9 @@ def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     yield from mastering_notes(attribution.state, case.mechanism)
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
+    if case.count < _USUAL * len(case.used):
+        which = "where a run begins, where a drive may just have turned back, near singularities, outliers, blanks"
+        yield f"{case.count} of {len(case.used)} points used, left out are those {which}"
     if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
         worse = "the robot does not repeat, or the instrument is worse"
         yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"

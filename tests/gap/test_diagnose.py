@@ -179,6 +179,15 @@ def test_without_times_a_lag_cannot_be_named_and_the_notes_say_so(lagging):
     assert "servo_lag not tested" in verdict["notes"] and "thermal_growth not tested" in verdict["notes"]
 
 
+def test_points_that_are_not_used_are_told_where_they_are_many(lagging):
+    whole = diagnosed(lagging).verdict
+    spoilt = np.arange(len(lagging)) % 4 == 1
+    verdict = diagnosed(lagging.assign(status=np.where(spoilt, "outlier", lagging["status"]))).verdict
+    assert verdict["points"] <= len(lagging) - spoilt.sum() < whole["points"]
+    assert f"{verdict['points']} of {len(lagging)} points used" in verdict["notes"]
+    assert "points used" not in whole["notes"]
+
+
 def test_angles_recomputed_from_the_commands_give_the_same_answer(lagging):
     """A file without drive angles gets those of the nominal inverse kinematics, which is what the controller sent."""
     theta = campaigns.ROBOT.inverse(lagging[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy())
