@@ -70,7 +70,8 @@ def _draw_budget(axes, rows):
     low, high = (100.0 * shown[name] for name in ("share_low", "share_high"))
     axes.hlines(places, low.clip(lower=0.0), high, color=style.BLACK, linewidth=0.7)
     axes.set_yticks(places, names)
-    axes.set_ylim(-0.6, max(len(shown), 3) - 0.4)
+    # bars of one or two parts are no thicker, and on top
+    axes.set_ylim(min(len(shown) - 3, 0) - 0.6, len(shown) - 0.4)
     axes.set_xlim(left=0.0)
     axes.set(xlabel="share of the gap's mean square (%)")
     axes.grid(True, axis="x")
