@@ -1,4 +1,4 @@
-"""Answers that are kept until something else is asked."""
+"""Answers that are kept until others have been asked for."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -21,3 +21,18 @@ def last_kept(method: Callable) -> Callable:
         return self.__dict__[name][1]
 
     return kept
+
+
+class Latest:
+    """Answers by what was asked, so many of the last ones."""
+
+    def __init__(self, count: int) -> None:
+        self._count, self._answers = count, {}  # type: int, dict[Any, Any]
+
+    def of(self, asked: Any, make: Callable[[], Any]) -> Any:
+        """The answer to what is asked, made if it is not there."""
+        answer = self._answers.pop(asked) if asked in self._answers else make()
+        self._answers[asked] = answer
+        if len(self._answers) > self._count:
+            del self._answers[next(iter(self._answers))]
+        return answer

@@ -201,8 +201,8 @@ def _bends(case, linear, state, fitted):
 
 
 def _rounds(case, calibrated, prior, stated):
-    """Search and refinement in turn until the best hypothesis repeats itself."""
-    state, covariance, last, looks = calibrated, _NO_COVARIANCE, None, _Looks(stated, case.noise_mm)
+    """Search and refinement in turn until a hypothesis is the best one again."""
+    state, covariance, seen, looks = calibrated, _NO_COVARIANCE, set(), _Looks(stated, case.noise_mm)
     start = origin(case)
     case, linear, source = looks.at(case, state)
     case, linear = with_seen(case, linear)
@@ -222,9 +222,9 @@ def _rounds(case, calibrated, prior, stated):
         # laws get their chance before an unknown function takes what their linear fit leaves
         named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
         tried, its_level = named or (hypothesis, level)
-        if last == frozenset(hypothesis.terms) or (settled and (tried is hypothesis or not tried.terms)):
+        if frozenset(hypothesis.terms) in seen or (settled and (tried is hypothesis or not tried.terms)):
             break
-        last = frozenset(hypothesis.terms)
+        seen.add(frozenset(hypothesis.terms))
         try:
             # what a dropped effect has done to the others' numbers can hold a fit back
             dropped = {name for name, _ in state.effects} - tried.effects

@@ -107,7 +107,7 @@ def _parts(evidence, hypothesis, level, basis, generator, count):
         if (term.effect, term.shape) in linear.by_weight:
             each = linear.by_weight[term.effect, term.shape].reshape(len(part), -1, len(matrix))
             # to first order, as both were found
-            acting = matrix @ evidence.found(hypothesis.terms)[0][start : start + matrix.shape[1]]
+            acting = matrix @ evidence.found(hypothesis.terms)[start : start + matrix.shape[1]]
             part = part + np.einsum("nqc,c->nq", each, acting) @ drawn[len(mean) - each.shape[1] :]
         start += matrix.shape[1]
         name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect

@@ -26,12 +26,15 @@ from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.noise_model import NoiseModel
 from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
-from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, over_cases
+from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, is_told, mean_over_cases, over_cases
 from rrru.gap.whitened import LEVELS, Whitened
+from rrru.kept import Latest
 
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # times that each of many strengths is found about the others
 _SWEEPS = 2
+# answers of each kind that are kept
+_KEPT = 256
 # a term of which the calibration leaves a smaller share of the mean square is not seen
 _LEAST_VISIBLE = 1e-9
 
@@ -97,32 +100,44 @@ class ModelEvidence:
 
     def projected(self, terms, levels):
         """The projected problem of a set of terms at discrepancy levels (indices)."""
-        key = tuple(terms), tuple(levels)
-        if key not in self._made:
-            self._made[key] = self._projected(terms, levels)
-        return self._made[key]
+        terms = tuple(terms)
+        asked = frozenset(terms), tuple(levels)
+        made, problem = self._problems.of(asked, lambda: (terms, self._projected(terms, levels)))
+        if made == terms:
+            return problem
+        return problem.reordered([made.index(term) for term in terms], self._order(made, terms))
 
     def found(self, terms):
-        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with.
+        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
+        terms = tuple(terms)
+        made, found = self._found.of(frozenset(terms), lambda: (terms, as_found(*self._weakly(terms))))
+        return found if made == terms else found[self._order(made, terms)]
 
-        And whether each is told from zero.
-        """
-        key = tuple(terms)
-        if key not in self._made:
-            # whatever levels are asked for, it is one weight
-            first = self._bare(terms, partial(self._grams, self.levels[:1]))
-            self._made[key] = as_found(first, len(terms), STRENGTHS[-1])
-        return self._made[key]
+    def _weakly(self, terms):
+        """The Projected problem of terms alone at one level, and weak strengths (1, terms)."""
+        # whatever levels are asked for, it is one weight
+        return self._bare(terms, partial(self._grams, self.levels[:1])), np.full((1, len(terms)), STRENGTHS[-1])
+
+    def _order(self, made, terms):
+        """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
+        ends = np.cumsum([0, *(len(prior.index) for prior in self._priors_of(made))])
+        numbers = {key: np.arange(*ends[k : k + 2]) for k, key in enumerate(self._keys(made))}
+        return np.concatenate([numbers[key] for key in self._keys(terms)])
+
+    def _keys(self, terms):
+        """Keys of the priors of terms and after them of their shapes."""
+        return *terms, *(term.effect for term in terms if term.effect in self.linear.shape_columns)
 
     def _priors_of(self, terms):
         """Priors of terms and after them of their shapes."""
-        priors = [self._prior(term) for term in terms]
-        return priors + [self._priors[t.effect] for t in terms if t.effect in self.linear.shape_columns]
+        count = len(terms)
+        keys = self._keys(terms)
+        return [*map(self._prior, keys[:count]), *(self._priors[effect] for effect in keys[count:])]
 
     def _projected(self, terms, levels):
         if not self._blocks(terms):
             return self._bare(terms, partial(self._grams, levels))
-        return self._borne(terms, levels, self.found(terms)[0])
+        return self._borne(terms, levels, self.found(terms))
 
     def _borne(self, terms, levels, found):
         """The Projected problem of terms and of the weight, whose columns are made with coefficients found (k,)."""
@@ -191,17 +206,25 @@ class ModelEvidence:
 
     def _average(self, term, strength, level):
         """The Average over the coefficients of a broad term at a strength and a level (an index)."""
-        key = term, float(strength), int(level)
-        if key not in self._made:
+
+        def make():
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
-            self._made[key] = Average.over(gram, moment, prior.index, prior.at(strength))
-        return self._made[key]
+            return Average.over(gram, moment, prior.index, prior.at(strength))
+
+        return self._averages.of((term, float(strength), int(level)), make)
 
     @cached_property
-    def _made(self):
-        """Problems and averages that have been asked for."""
-        return {}
+    def _problems(self):
+        return Latest(_KEPT)
+
+    @cached_property
+    def _found(self):
+        return Latest(_KEPT)
+
+    @cached_property
+    def _averages(self):
+        return Latest(_KEPT)
 
     def independent(self, terms, levels):
         """Log evidence (l,) of many terms at levels (indices), and their best strengths (l, terms).
@@ -244,14 +267,14 @@ class ModelEvidence:
         """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
         broad = self._broadest(terms)
         if broad is None:
-            return self.coefficients(terms, strengths, level)[0]
+            return mean_over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
         rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
         index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
         if rest:
             problem = self.projected(rest, [level])
             index = problem.index
             problem = problem.on(*(p[None] for p in self._average(terms[broad], strengths[broad], level).rest(index)))
-            found, _ = over_cases(problem, np.delete(strengths, broad)[None])
+            found = mean_over_cases(problem, np.delete(strengths, broad)[None])
         gram, moment, _ = self._whitened.gram(level)
         others = found if problem is None or problem.mix is None else problem.mix @ found
         own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, others)
@@ -271,8 +294,8 @@ class ModelEvidence:
         They are told by what is itself told from zero. What was found of a spring that bears next to nothing is
         anything, and would deny that it ever bears more.
         """
-        found, told = self.found(terms)
-        sure = self._borne(terms, [level], np.where(told, found, 0.0))
+        told = is_told(*self._weakly(terms))
+        sure = self._borne(terms, [level], np.where(told, self.found(terms), 0.0))
         _, covariance = over_cases(sure, np.asarray(strengths)[None])
         return np.sqrt(np.diag(covariance)[-len(self.linear.weight_steps) :])
 

@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
 
 from rrru.gap import evidence_kernels as kernels
 
@@ -67,15 +68,25 @@ class Projected:
             return replace(self, gram=grams, moment=moments)
         return replace(self, gram=self.mix.T @ grams @ self.mix, moment=moments @ self.mix)
 
+    def reordered(self, terms, coefficients):
+        """The problem with terms (terms,), and coefficients (k,) of these and of shapes, in an order of old numbers."""
+        k = np.concatenate([coefficients, np.arange(len(coefficients), len(self.size))])
+        rank = np.append(np.argsort(terms), len(terms))
+        each = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
+        columns = {"index": self.index[k]} if self.mix is None else {"mix": self.mix[:, k]}
+        at_least = None if self.at_least is None else self.at_least[terms]
+        gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
+        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **each, **columns)
+
     def scale(self, strengths):
         """Prior standard deviations (m, k) at strengths (m, terms)."""
         each = np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
         return np.minimum(each[:, self.owner] * self.size, self.largest)
 
 
-def gained(problem, strengths):
-    """Log evidence (levels, m) of a Projected problem at strengths (m, terms) over that of none of its terms."""
-    scale = np.ascontiguousarray(problem.scale(strengths))
+def gained(problem, scale):
+    """Log evidence (levels, m) of a Projected problem at prior deviations (m, k) over that of none of its terms."""
+    scale = np.ascontiguousarray(scale)
     gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
     if not problem.about.any():
         return kernels.log_evidence(gram, moment, scale, problem.positive)
@@ -84,18 +95,38 @@ def gained(problem, strengths):
     return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
 
 
-def posterior_mean(gram, moment, scale, positive, about):
-    """The mean (k,) of normal coefficients, or where that has negative positive ones their most probable point.
+def posterior_mean(problem, scale):
+    """The mean (k,) of a Projected problem of one level at prior deviations (k,).
 
-    gram (k, k), moment (k,); scale, positive, about (k,): of the prior.
+    Where that has negative positive coefficients their most probable point.
     """
-    precision, moment = gram + np.diag(scale**-2.0), moment - gram @ about
+    gram, about, positive = problem.gram[0], problem.about, problem.positive
+    precision = _precision(gram, scale)
+    moment = scale * (problem.moment[0] - gram @ about)
     mean = np.linalg.solve(precision, moment)
-    return about + (_not_negative(precision, moment, positive) if (mean[positive] < 0.0).any() else mean)
+    if (mean[positive] < 0.0).any():
+        mean = _not_negative(precision, moment, positive)
+    return about + scale * mean
+
+
+def posterior_covariance(problem, scale):
+    """The covariance (k, k) of a Projected problem of one level at prior deviations (k,)."""
+    return scale[:, None] * np.linalg.inv(_precision(problem.gram[0], scale)) * scale
+
+
+def _precision(gram, scale):
+    """Precision (k, k) of the coefficients over their prior deviations (k,)."""
+    return scale[:, None] * gram * scale + np.eye(len(scale))
 
 
 def _not_negative(precision, moment, positive):
-    """The most probable point (k,) without negative positive coefficients: bounded least squares."""
-    factor = np.linalg.cholesky(precision)
-    low = np.where(positive, 0.0, -np.inf)
-    return lsq_linear(factor.T, np.linalg.solve(factor, moment), bounds=(low, np.inf), method="bvls").x
+    """The most probable point (k,) without negative positive coefficients, the others found from these."""
+    free = ~positive
+    both = np.column_stack([precision[free][:, positive], moment[free]])
+    taken = np.linalg.solve(precision[free][:, free], both)
+    left = np.column_stack([precision[positive][:, positive], moment[positive]]) - both[:, :-1].T @ taken
+    factor = np.linalg.cholesky(left[:, :-1])
+    result = np.empty(len(moment))
+    result[positive], _ = nnls(factor.T, solve_triangular(factor, left[:, -1], lower=True))
+    result[free] = taken[:, -1] - taken[:, :-1] @ result[positive]
+    return result

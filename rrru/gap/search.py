@@ -138,21 +138,23 @@ class _Tried:
         """The best hypotheses of a size after those of a layer have been tried with every term more."""
         near, gains = self.near_levels(), []
         for start in layer:
-            for name, terms in choices.items():
-                if name not in start.effects:
-                    gains += [(self._gain(start, term), (*start.terms, term)) for term in terms]
+            others = [term for name, terms in choices.items() if name not in start.effects for term in terms]
+            gains += self._gains(start, others)
         gains.sort(key=lambda pair: -pair[0])
         for _, terms in gains[:_POLISHED]:
             self.polished(terms, near)
         return self.best_of_size(size)
 
-    def _gain(self, start, term):
-        """Log evidence of a hypothesis with a term more at the start's best level and strengths there."""
+    def _gains(self, start, others):
+        """Log evidence of a hypothesis with each of other terms at its best level and strengths, and their sets."""
         level = int(start.evidence.argmax())
-        grids = *([strength] for strength in start.strengths[level]), STRENGTHS
-        own, _ = self.evidence.over_strengths(start.terms, grids[:-1], [level])
-        value, _ = self.evidence.over_strengths((*start.terms, term), grids, [level])
-        return float(start.evidence[level] - own[0, 0] + averaged(value, 1)[0])
+        grids = [[strength] for strength in start.strengths[level]]
+        own, _ = self.evidence.over_strengths(start.terms, grids, [level])
+        gains = []
+        for term in others:
+            value, _ = self.evidence.over_strengths((*start.terms, term), (*grids, STRENGTHS), [level])
+            gains.append((float(start.evidence[level] - own[0, 0] + averaged(value, 1)[0]), (*start.terms, term)))
+        return gains
 
     def polished(self, terms, levels=None):
         """The hypothesis of a set of terms, tried if it has not been, by strengths that are independent."""

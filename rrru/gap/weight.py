@@ -15,11 +15,13 @@ stands level within a tenth of a degree, or it leans by a degree.
 """
 
 from dataclasses import replace
+from functools import cache
 from itertools import product
 
 import numpy as np
 
-from rrru.gap.projected import gained, posterior_mean
+from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.projected import gained, posterior_covariance, posterior_mean
 from rrru.robots.dynamics import carried_kg, level_axes
 from rrru.robots.lumps import PLATFORM
 
@@ -58,15 +60,16 @@ def doubts_of(motion, masses):
     return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (doubts, bounds))
 
 
-def as_found(problem, count, strength):
-    """Coefficients (k,) of a Projected problem of one level and so many terms under priors of a strength.
+def as_found(problem, strengths):
+    """Coefficients (k,) of a Projected problem of one level at strengths (1, terms)."""
+    return posterior_mean(problem, problem.scale(strengths)[0])
 
-    And whether each is told from zero.
-    """
-    scale = problem.scale(np.full((1, count), strength))[0]
-    mean = posterior_mean(problem.gram[0], problem.moment[0], scale, problem.positive, problem.about)
-    error = np.sqrt(np.diag(np.linalg.inv(problem.gram[0] + np.diag(scale**-2.0))))
-    return mean, np.abs(mean) > _TOLD * error
+
+def is_told(problem, strengths):
+    """Whether each coefficient (k,) of a Projected problem of one level at strengths (1, terms) is told from zero."""
+    scale = problem.scale(strengths)[0]
+    error = np.sqrt(np.diag(posterior_covariance(problem, scale)))
+    return np.abs(posterior_mean(problem, scale)) > _TOLD * error
 
 
 def borne(problem, count, blocks, steps, found, grams):
@@ -106,56 +109,66 @@ def borne(problem, count, blocks, steps, found, grams):
 def gained_over_cases(problem, strengths):
     """`gained` of a Projected problem at strengths (m, terms), averaged over the cases of the weight."""
     if not problem.weights:
-        return gained(problem, strengths)
+        return gained(problem, problem.scale(strengths))
     # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
     least = np.maximum(strengths, _NEXT * problem.at_least)
-    result = np.logaddexp.reduce([log + gained(one, least) for log, one in _cases(problem)])
+    result = _over_cases(problem, problem.scale(least))
     narrow = (least > strengths).any(axis=1)
     if narrow.any():
-        cost = np.minimum(result[:, narrow] - gained(_stays(problem), least[narrow]), 0.0)
-        result[:, narrow] = gained(_stays(problem), strengths[narrow]) + cost
+        as_it_is = problem.scale(np.concatenate([strengths[narrow], least[narrow]]))
+        # under a prior too narrow for the coefficients the weight's columns, as large as these, would stand for them
+        as_it_is[:, -len(problem.weights) :] = _STAYS
+        own, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
+        result[:, narrow] = own + np.minimum(result[:, narrow] - at_least, 0.0)
     return result
+
+
+def mean_over_cases(problem, strengths):
+    """Mean (k,) of the coefficients of a Projected problem of one level at strengths (1, terms).
+
+    Of a mixture of the cases of the weight, which is always free: the strengths are raised to where it is.
+    """
+    share, scales = _mixture(problem, strengths)
+    return share @ [posterior_mean(problem, scale) for scale in scales]
 
 
 def over_cases(problem, strengths):
-    """Mean (k,) and covariance (k, k) of the coefficients of a Projected problem of one level at strengths (1, terms).
-
-    Of a mixture of the cases of the weight, which is always free: the strengths are raised to where it is. The
-    covariance does not know of positive coefficients.
-    """
-    cases = ((0.0, problem),)
-    if problem.weights:
-        strengths, cases = np.maximum(strengths, problem.at_least), _cases(problem)
-    log = np.array([chance + gained(one, strengths)[0, 0] for chance, one in cases]) if cases[1:] else np.zeros(1)
-    share, means, spreads = np.exp(log - np.logaddexp.reduce(log)), [], []
-    for _, one in cases:
-        scale = one.scale(strengths)[0]
-        means.append(posterior_mean(one.gram[0], one.moment[0], scale, one.positive, one.about))
-        spreads.append(np.linalg.inv(one.gram[0] + np.diag(scale**-2.0)))
+    """`mean_over_cases` and the covariance (k, k), which does not know of positive coefficients."""
+    share, scales = _mixture(problem, strengths)
+    means = np.array([posterior_mean(problem, scale) for scale in scales])
+    spreads = np.array([posterior_covariance(problem, scale) for scale in scales])
     mean = share @ means
-    apart = np.array(means) - mean
+    apart = means - mean
     return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _cases(problem):
-    """Logarithms of the probabilities of all cases, and the problem in each."""
-    kinds, result = sorted(set(problem.weights)), []
-    for cases in product(_CASES, repeat=len(kinds)):
-        shares, size = {kind: share for kind, (_, share) in zip(kinds, cases, strict=True)}, problem.size.copy()
-        size[_of_weight(problem)] *= [shares[kind] for kind in problem.weights]
-        result.append((float(sum(np.log(chance) for chance, _ in cases)), replace(problem, size=size)))
-    return result
+def _mixture(problem, strengths):
+    """Probabilities (c,) of the cases of a weight that is free after the data, and prior deviations (c, k) in each."""
+    if not problem.weights:
+        return np.ones(1), problem.scale(strengths)
+    log, scales = _in_cases(problem, problem.scale(np.maximum(strengths, problem.at_least)))
+    log = log + gained(problem, scales)[0]
+    return np.exp(log - np.logaddexp.reduce(log)), scales
 
 
-def _stays(problem):
-    """The problem with the weight as it is.
-
-    Under a prior too narrow for the coefficients the weight, whose columns are as large as these, would stand for them.
-    """
-    weight = _of_weight(problem)
-    return replace(problem, size=np.where(weight, _STAYS, problem.size), about=np.zeros(len(weight)))
+def _over_cases(problem, scale):
+    """`gained` (levels, m) at prior deviations (m, k) of a weight that is free, averaged over its cases."""
+    log, scales = _in_cases(problem, scale)
+    return log_sum_exp(gained(problem, scales).reshape(len(problem.gram), len(scale), len(log)) + log)
 
 
-def _of_weight(problem):
-    """Which coefficients (k,) are the weight's."""
-    return np.arange(len(problem.size)) >= len(problem.size) - len(problem.weights)
+def _in_cases(problem, scale):
+    """Logarithms (c,) of the probabilities of all cases, and prior deviations (m c, k) of rows (m, k) in each."""
+    log, shares = _cases(problem.weights)
+    each = np.repeat(scale, len(log), axis=0)
+    each[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
+    return log, each
+
+
+@cache
+def _cases(weights):
+    """Logarithms (c,) of the probabilities of all cases of `Projected.weights`, and shares (c, q) of their sizes."""
+    kinds = sorted(set(weights))
+    combined = list(product(_CASES, repeat=len(kinds)))
+    shares = [[case[kinds.index(kind)][1] for kind in weights] for case in combined]
+    return np.array([sum(np.log(chance) for chance, _ in case) for case in combined]), np.array(shares)
