@@ -25,5 +25,5 @@ _SOURCE = "eccentricity over grating radius; up to some arc minutes, assumed"
 
 
 def for_robot(robot):
-    """The law for robots whose drives all turn, None for others."""
+    """The law for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_eccentricity", 1.0, _SOURCE, 3e-4)

@@ -30,5 +30,5 @@ _SOURCE = "difference of diameters over four of them, or tilt squared over four,
 
 
 def for_robot(robot):
-    """The law for robots whose drives all turn, None for others."""
+    """The law for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_ovality", 2.0, _SOURCE, 2e-4)

@@ -1,21 +1,33 @@
-"""What periodic drive errors share: amplitude and phase of each drive as parameters, sine and cosine as coordinates."""
+"""What periodic drive errors share: amplitude and phase of each drive as parameters, sine and cosine as coordinates.
+
+They act at the drives of one unit: of a robot with turning and sliding drives not at all of them.
+"""
 
 import numpy as np
 
-from rrru.effects.protocol import Coordinates, Effect, leg_parameters
-from rrru.parameters import ParameterSet
+from rrru.effects.protocol import Coordinates, Effect
+from rrru.parameters import Parameter, ParameterSet
 
 
-def harmonic_parameters(count, source, unit="rad", highest=0.01):
-    """Amplitudes (count) in the drive's unit and phases (count) in rad, as a tuple of parameters."""
-    amplitudes = leg_parameters(source, ("amplitude", unit, 0.0, highest), count=count)
-    return (*amplitudes, *leg_parameters("free", ("phase", "rad", -np.pi, np.pi), count=count))
+def drives_of(robot, unit):
+    """Numbers (k,) from 0 on of a robot's drives of a unit, "rad" or "mm"."""
+    return np.flatnonzero([own == unit for own in robot.parts.units])
 
 
-def harmonic(drive, periods, values):
-    """Errors a_i sin(N theta_i + p_i), (n, K), of angles (n, K); values: amplitudes, phases; N periods a turn."""
-    count = drive.shape[1]
-    return values[:count] * np.sin(periods * drive + values[count : 2 * count])
+def harmonic_parameters(drives, source, unit="rad", highest=0.01):
+    """Amplitudes in the unit and phases in rad of drives (k,), numbered from 0 on, as a tuple of 2 k parameters."""
+    legs = (drives + 1).tolist()
+    amplitudes = [Parameter(f"amplitude{leg}", unit, 0.0, 0.0, highest, source, leg) for leg in legs]
+    phases = [Parameter(f"phase{leg}", "rad", 0.0, -np.pi, np.pi, "free", leg) for leg in legs]
+    return *amplitudes, *phases
+
+
+def at_harmonic(motion, drives, periods, values):
+    """Contribution of errors a_i sin(N theta_i + p_i) of drives (k,); values: amplitudes, phases; N periods a turn."""
+    count, change = len(drives), np.zeros_like(motion.drive)
+    own = np.sin(periods * motion.drive[:, drives] + values[count : 2 * count])
+    change[:, drives] = values[:count] * own
+    return motion.at_drives(change)
 
 
 def harmonic_coordinates(parameters, typical, shapes=({},)):
@@ -24,16 +36,16 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
     parameters: those of `harmonic_parameters` first, after them those of the shapes.
     """
     names = [name for name in parameters.names if name not in shapes[0]]
-    drives = len(names) // 2
+    drives = [parameters[name].leg for name in names[: len(names) // 2]]
 
     def to_values(coordinates, shape):
-        sine, cosine = np.reshape(coordinates, (drives, 2)).T
+        sine, cosine = np.reshape(coordinates, (-1, 2)).T
         values = np.concatenate([np.hypot(sine, cosine), np.arctan2(cosine, sine)])
         return parameters.vector(dict(shape) | dict(zip(names, values, strict=True)))
 
     return Coordinates(
         typical=np.full(len(names), float(typical)),
-        legs=np.repeat(np.arange(1, drives + 1), 2),
+        legs=np.repeat(drives, 2),
         positive=np.zeros(len(names), dtype=bool),
         to_values=to_values,
         shapes=tuple(shapes),
@@ -42,13 +54,14 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
 
 
 def of_encoders(robot, name, periods, source, typical_rad):
-    """The Effect of errors with so many periods a turn of every drive, None for robots whose drives do not all turn."""
-    if "mm" in robot.parts.units:
+    """The Effect of errors with so many periods a turn of every turning drive, None for robots without any."""
+    turning = drives_of(robot, "rad")
+    if not len(turning):
         return None
-    parameters = ParameterSet(harmonic_parameters(len(robot.parts.drives), source))
+    parameters = ParameterSet(harmonic_parameters(turning, source))
 
     def law(motion, values):
-        return motion.at_drives(harmonic(motion.drive, periods, values))
+        return at_harmonic(motion, turning, periods, values)
 
     return Effect(name, parameters, harmonic_coordinates(parameters, typical_rad), law)
 

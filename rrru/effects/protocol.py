@@ -133,10 +133,12 @@ class Motion:
 class Search:
     """A parameter of a law's shape that may have any value: waves per turn of a drive, up to the highest order.
 
-    name: of the parameter; value: order to the parameter's value; order: the other way.
+    name: of the parameter; unit: of the drives that have it; value: order to the parameter's value; order: the other
+    way.
     """
 
     name: str
+    unit: str
     highest: float
     value: Callable[[float], float]
     order: Callable[[float], float]

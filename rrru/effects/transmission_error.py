@@ -9,7 +9,11 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
 
     dtheta_i = s_i sin(N theta_i) + c_i cos(N theta_i)
 
-A screw of lead h leads and lags once per turn as well: db_i = a_i sin(2 pi b_i / h + p_i).
+A screw of lead h, or a drum of circumference h, leads and lags once per turn as well:
+
+    db_i = a_i sin(2 pi b_i / h + p_i)
+
+In robots with drives of both kinds it acts at those that turn.
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
 of motion. The ratio is a number of the drive's data sheet; where nobody states it, it is searched beside that of the
@@ -24,37 +28,51 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.effects.harmonic import harmonic, harmonic_coordinates, harmonic_parameters
+from rrru.effects.harmonic import at_harmonic, drives_of, harmonic_coordinates, harmonic_parameters
 from rrru.effects.protocol import Effect, Search
 from rrru.parameters import Parameter, ParameterSet
 
 _RATIO = Parameter("ratio", "1", 50.0, 1.0, 1000.0, "gear ratio, 50 by default")
-_LEAD = Parameter("lead", "mm", 10.0, 0.5, 100.0, "lead of the screw, 10 by default")
+_LEAD = Parameter("lead", "mm", 10.0, 0.5, 2000.0, "lead of the screw or circumference of the drum, 10 by default")
 _GEAR, _SCREW = "assumed: up to some arc minutes", "screw out of true, assumed: up to some hundredths of a millimetre"
 
+
+def _inverse(number):
+    """Radians of the wave per millimetre of the slide for a lead, and the other way."""
+    return 2.0 * np.pi / number
+
+
 # waves per turn of the arm, and radians of the wave per millimetre of the slide
-_RATIOS = Search("ratio", 200.0, float, float)
-_LEADS = Search("lead", 2.0 * np.pi / _LEAD.low, lambda order: 2.0 * np.pi / order, lambda lead: 2.0 * np.pi / lead)
+_RATIOS = Search("ratio", "rad", 200.0, float, float)
+_LEADS = Search("lead", "mm", _inverse(_LEAD.low), _inverse, _inverse)
 
 
 def for_robot(robot):
-    """The law for robots whose drives all turn or all slide, None for others."""
-    units, count = set(robot.parts.units), len(robot.parts.drives)
-    if len(units) > 1:
-        return None
-    known, typical, law = (_RATIO, 3e-4, _turned) if units == {"rad"} else (_LEAD, 0.01, _slid)
-    sizes = harmonic_parameters(count, _GEAR) if units == {"rad"} else harmonic_parameters(count, _SCREW, "mm", 1.0)
+    """The law for the drives that turn, or for all where none does."""
+    turning = drives_of(robot, "rad")
+    return _of_gears(turning) if len(turning) else _of_screws(drives_of(robot, "mm"))
+
+
+def _of_gears(drives):
+    """The law for turning drives (k,)."""
+
+    def law(motion, values):
+        return at_harmonic(motion, drives, values[-1], values)
+
+    return _effect(harmonic_parameters(drives, _GEAR), _RATIO, _RATIOS, 3e-4, law)
+
+
+def _of_screws(drives):
+    """The law for sliding drives (k,)."""
+
+    def law(motion, values):
+        return at_harmonic(motion, drives, _inverse(values[-1]), values)
+
+    return _effect(harmonic_parameters(drives, _SCREW, "mm", 1.0), _LEAD, _LEADS, 0.01, law)
+
+
+def _effect(sizes, known, search, typical, law):
+    """The Effect of amplitudes and phases, and of a ratio or lead that is known or searched."""
     parameters = ParameterSet((*sizes, known))
-    search = _RATIOS if units == {"rad"} else _LEADS
     coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
     return Effect("transmission_error", parameters, replace(coordinates, searched=search), law)
-
-
-def _turned(motion, values):
-    """Changes of the drive angles under amplitudes, phases (K,) in rad and the ratio."""
-    return motion.at_drives(harmonic(motion.drive, values[-1], values))
-
-
-def _slid(motion, values):
-    """Changes of the slider positions under amplitudes (K,) in mm, phases (K,) in rad and the lead in mm."""
-    return motion.at_drives(harmonic(motion.drive, 2.0 * np.pi / values[-1], values))

@@ -26,13 +26,13 @@ _HALF = 0.5
 class Corrected:
     """A corrected file.
 
-    text; not_in_model: what it cannot hold, in words; found: what there is to hold, None where nothing could be
-    written; in_file: values by parameter of the effects that it holds beside geometry.
+    text; not_in_model: what it cannot hold, in words; found: what there is to hold; in_file: values by parameter of the
+    effects that it holds beside geometry.
     """
 
     text: str
     not_in_model: tuple
-    found: Found | None
+    found: Found
     in_file: dict = field(default_factory=dict)
 
 

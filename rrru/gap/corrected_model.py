@@ -10,7 +10,7 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
-from rrru.gap.corrected import Corrected, corrected
+from rrru.gap.corrected import corrected
 from rrru.gap.corrected_drives import corrected_drives
 from rrru.gap.shrink import model_row
 from rrru.plant.mujoco_robot import MujocoRobot
@@ -29,22 +29,23 @@ _WHOLE = ("robot", "path_drive", "load_slopes")
 def write_corrected(diagnosis, section, masses, file):
     """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
 
-    A file that cannot be corrected becomes an empty one that says why, as does `not_in_model`. section: the robot's
-    entry in the configuration; masses: the robot's.
+    A file that cannot be corrected, or that is no robot once it is, as where a loop of bodies closes no more, becomes
+    an empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
+    robot's.
     """
     file, attribution = Path(file), diagnosis.attribution
     shrink, why = diagnosis.tables["gap_shrink"], ""
     try:
         written = corrected(attribution, section, file.resolve().parent)
-    except ConfigError as error:
-        tag = "mujoco" if "mjcf" in section else "robot"
-        written = Corrected(f"<{tag}><!-- not corrected: {error} --></{tag}>\n", (str(error),), None)
-    write_text(written.text, file)
-    if written.found:
+        write_text(written.text, file)
         more, why = gap_rows(attribution, written, section, file, shrink)
-        shrink = pd.concat([shrink, more], ignore_index=True)
+        shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
+    except ConfigError as error:
+        tag, said = ("mujoco" if "mjcf" in section else "robot"), " ".join(str(error).replace("--", "-").split())
+        write_text(f"<{tag}><!-- not corrected: {said} --></{tag}>\n", file)
+        lost = (f"not corrected: {said}",)
     notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
-    verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(written.not_in_model)}
+    verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(lost)}
     tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
 
@@ -54,7 +55,8 @@ def gap_rows(attribution, corrected, section, file, shrink):
 
     section: the robot's entry in the configuration; file: the corrected one; shrink: the other rows. MuJoCo drives an
     MJCF, up to 300 points of the campaign, with what loads and drives it itself; where it cannot, and of a URDF, both
-    are closed at the drive values that the numbers in the file lead to.
+    are closed at the drive values that the numbers in the file lead to. Raises ConfigError where the corrected file is
+    no robot.
     """
     key = "mjcf" if "mjcf" in section else "urdf"
     models = [

@@ -23,7 +23,7 @@ from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
-from rrru.gap.uncertainty import weight_notes
+from rrru.gap.uncertainty import deviation_errors, weight_notes
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
@@ -117,7 +117,7 @@ def diagnose(
 def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     """What the data lack for a better answer, what they contradict, and what a user has to know of the robot."""
     case = attribution.case
-    yield from mastering_notes(attribution.state, case.mechanism)
+    yield from mastering_notes(attribution.state, case.mechanism, deviation_errors(attribution))
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
     if case.count < _USUAL * len(case.used):

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import find_peaks
 
+from rrru.effects.harmonic import drives_of
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
 
@@ -71,13 +72,14 @@ def with_orders(case, linear, terms):
 
 def _found(case, linear, effect, others):
     """An effect with the orders that stand out added to its shapes."""
-    coordinates, drive = effect.coordinates, case.motion.drive[case.at]
-    search, step = coordinates.searched, resolution(case.motion.drive[case.used])
+    coordinates, search = effect.coordinates, effect.coordinates.searched
+    drives = drives_of(case.mechanism, search.unit)
+    drive, step = case.motion.drive[:, drives][case.at], resolution(case.motion.drive[:, drives][case.used])
     beside = np.concatenate([linear.base, *signatures(case.library, linear, others)], axis=-1)
     orders = np.arange(step, search.highest, step / _DENSITY)
     if len(orders) < 3 or beside.shape[-1] > linear.data.size // 2:
         return effect
-    gains = periodogram(linear.data, linear.drive, drive, beside, orders)
+    gains = periodogram(linear.data, linear.drive[..., drives], drive, beside, orders)
     peaks, _ = find_peaks(gains)
     shapes = list(coordinates.shapes)
     for peak in peaks[np.argsort(-gains[peaks])][:_PEAKS]:

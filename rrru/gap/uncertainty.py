@@ -59,6 +59,11 @@ def covariance_of(attribution):
     return np.block([[given + across @ follows.T, across], [across.T, own]])
 
 
+def deviation_errors(attribution):
+    """Standard errors (p,) of the deviations."""
+    return np.sqrt(np.diag(covariance_of(attribution))[: len(attribution.state.deviations)])
+
+
 def one_sigma_steps(attribution):
     """Independent errors of one standard deviation each: deviations (q, p), and coordinates (q, c) by key of effect."""
     covariance, count = covariance_of(attribution), len(attribution.state.deviations)

@@ -1,13 +1,17 @@
 """The corrected file of a diagnosed campaign, and the compensation table, against the robot that was measured."""
 
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
+from rrru.gap import corrected_model
+from rrru.gap.corrected import corrected
 from rrru.gap.corrected_drives import at_rest
 from rrru.gap.corrected_model import write_corrected
 from rrru.gap.diagnose import MeasuredRobot, diagnose
@@ -92,6 +96,22 @@ def test_mujoco_drives_the_corrected_hexapod_along_its_campaign_to_the_noise(hex
     before, after = _rows(hexapod, "given_model"), _rows(hexapod, "corrected_model")
     assert before["rms_mm"] > 0.3 and after["rms_mm"] < 1.2 * np.sqrt(3.0) * _NOISE_MM
     assert after["share_closed"] > 0.9
+
+
+def test_a_corrected_file_that_is_no_robot_costs_nothing_but_itself(hexapod, tmp_path, monkeypatch):
+    """As where a loop that several numbers share, each found with an error, closes no more."""
+
+    def without_plate(*known):
+        written = corrected(*known)
+        return replace(written, text=written.text.replace('"plate"', '"gone"'))
+
+    monkeypatch.setattr(corrected_model, "corrected", without_plate)
+    file = tmp_path / "corrected.xml"
+    found = write_corrected(hexapod.found, _SECTIONS["hexapod"], _MASSES, file)
+    assert found.verdict["effects"] == hexapod.found.verdict["effects"]
+    assert found.verdict["not_in_model"].startswith("not corrected: ") and "plate" in found.verdict["not_in_model"]
+    pd.testing.assert_frame_equal(found.tables["gap_shrink"], hexapod.found.tables["gap_shrink"])
+    assert ElementTree.parse(file).getroot().tag == "mujoco" and "not corrected" in file.read_text()
 
 
 def test_the_corrected_file_alone_stands_where_the_calibrated_robot_does(hexapod):

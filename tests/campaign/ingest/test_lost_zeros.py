@@ -114,7 +114,14 @@ def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_
     zeros = _two_far_off(generator, 20.0, 60.0)
     fit, robot = _calibrated(_file(tmp_path, made, generator, zeros), made[0])
     assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
-    assert any(note.startswith("leg ") and note.endswith(" mm") for note in mastering_notes(fit, robot))
+    noted = mastering_notes(fit, robot)
+    assert any(note.startswith("leg ") and note.endswith(" mm") for note in noted)
+    # what is not sure is not told, what is has its error
+    off = np.abs(fit.deviations)
+    assert mastering_notes(fit, robot, 0.3 * off) == ()
+    assert [note.partition(" +- ")[0] for note in mastering_notes(fit, robot, 0.2 * off)] == [
+        note.removesuffix(" mm") for note in noted
+    ]
 
 
 def test_zeros_that_are_known_are_left_alone(tmp_path):
