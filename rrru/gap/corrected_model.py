@@ -72,7 +72,7 @@ def gap_rows(attribution, corrected, section, file, shrink):
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
-        why = f"corrected model not driven: {error}"
+        why = f"corrected model not driven: {error}; closed at its drive values instead"
         poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
     result = []
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):

@@ -48,8 +48,13 @@ def _as_number(error):
 
 
 def _meant(error):
-    """Which known keys or words the unknown ones look like, "" where they look like none."""
+    """Which known keys or words the unknown ones look like, or all known keys where they look like none.
+
+    Of missing keys what the schema says of them.
+    """
     known, unknown = [], []
+    if error.validator == "required" and "description" in error.schema:
+        return f"; {error.schema['description']}"
     if error.validator == "additionalProperties":
         known = list(error.schema.get("properties", ()))
         unknown = [key for key in error.instance if key not in known]
@@ -57,7 +62,9 @@ def _meant(error):
         known, unknown = list(map(str, error.validator_value)), [error.instance]
     near = {key: get_close_matches(str(key), known, n=1) for key in unknown}
     meant = [f"{found[0]} for {key}" for key, found in near.items() if found]
-    return f"; did you mean {', '.join(meant)}?" if meant else ""
+    if meant or error.validator != "additionalProperties":
+        return f"; did you mean {', '.join(meant)}?" if meant else ""
+    return f"; allowed: {', '.join(known)}"
 
 
 def _is_number(value):

@@ -76,6 +76,8 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
         ("campaigns: {crooked: {platform_mass_kg: 3.0}}", "crooked: 'platform_mass_kg' is not one of ['robot', "),
         ("campaigns: {mine: {robot: rrru3, ingest: a.csv, unit: mms}}", "did you mean mm for mms?"),
         ("campaigns: {mine: {robot: rrru3, virtual: crooked}}", "'trajectories' is a required property"),
+        ("campaigns: {mine: {robot: rrru3}}", "a measured one has `ingest: file.csv` instead"),
+        ("gap: {zzz: 3}", "; allowed: effects"),
         ("real: {sets: {ur10: {files: /data/*.csv}}}", "real.sets.ur10.files: got '/data/*.csv'; allowed: a path"),
     ],
 )
