@@ -9,6 +9,10 @@ from rrru.robots.walk import Poses, Twists, bar_ends, walk
 # an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
 # less: longer ones end in other assemblies, or nowhere
 _STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
+# singular values below this share count as lost; where they leave steps below a share of the drives' ranges, it takes
+# a step of another share to get away
+_LOST, _STILL, _AWAY = 1e-9, 1e-6, 0.01
+_FREEDOMS = 6
 # a pose followed from home counts if it is so much closer than home to where it should be
 _CLOSE = 0.1
 
@@ -29,23 +33,26 @@ def drives_at(robot, place, start, twists, nearest=True):
     """
     (position, wanted), (actuators, near) = place, start
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
-    widths = _widths(robot)
+    (low, high), widths = np.asarray(robot.drive_range, dtype=float).T, _widths(robot)
     for _ in range(_STEPS):
-        rows = np.flatnonzero(poses.closed & ~(left < _REACHED_MM))
+        rows = np.flatnonzero(poses.closed & np.isfinite(actuators).all(axis=1) & ~(left < _REACHED_MM))
         if not len(rows):
             break
         own = twists[rows] if len(twists) > 1 else twists
         at = robot.map(actuators[rows], poses.of(rows), own)
         lack = position[rows] - robot.measured(at.poses, own)
         turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
-        step, held = drive_step(at, robot.freedoms, lack, turning)
+        step, held, lost = drive_step(at, robot.freedoms, lack, turning, widths)
         if nearest:
             # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
-            lack = (at.drive_response @ step[:, :, None])[:, :, 0]
+            lack = np.where(lost[:, None], lack, (at.drive_response @ (widths * step)[:, :, None])[:, :, 0])
         left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
-        longest = (np.abs(step) / widths).max(axis=1, keepdims=True)
-        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))
-        actuators[rows] += step
+        longest = np.abs(step).max(axis=1)
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
+        # a stretched arm is led nowhere by what it cannot do there
+        still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
+        step[still] = np.where(actuators[rows] - low > high - actuators[rows], -_AWAY, _AWAY)[still]
+        actuators[rows] += widths * step
         poses = robot.model.solve(actuators, poses, twists)
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
@@ -81,30 +88,43 @@ def _steps_from_home(robot, actuators):
 
 
 def _widths(robot):
-    """How far (K,) each drive goes, a turning one no further than a turn."""
-    turn = [2.0 * np.pi if unit == "rad" else np.inf for unit in robot.parts.units]
-    return np.minimum(np.ptp(robot.drive_range, axis=1), turn)
+    """How far (K,) each drive goes, a turning one no further than a turn; a turn where no range is known."""
+    turning = np.array(robot.parts.units) == "rad"
+    own = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
+    turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
+    return np.where((own > 0.0) & np.isfinite(own), own, turn)
 
 
-def drive_step(at, ranks, lack_mm, turning_rad):
+def drive_step(at, ranks, lack_mm, turning_rad, widths):
     """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
 
-    ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have. With the
-    size (n,) in rad of the change of orientation that they can and should still make.
+    ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have; widths
+    (K,): how far each drive goes, in shares of which the smallest changes are found and given. With the size (n,) in
+    rad of the change of orientation that they can and should still make, and where (n,) a pose lacks some freedom.
     """
-    reach = _inverse_of_rank(at.drive_response, ranks[0])
+    response, turn = at.drive_response * widths, at.platform[:, 3:] @ at.drive_counts * widths
+    reach, stretched = _inverse_of_rank(response, ranks[0], response)
     step = reach @ lack_mm[:, :, None]
-    beside = np.eye(reach.shape[1]) - reach @ at.drive_response
-    turn = at.platform[:, 3:] @ at.drive_counts
-    more = _inverse_of_rank(turn @ beside, ranks[1]) @ (turning_rad[:, :, None] - turn @ step)
-    step += beside @ more
-    return step[:, :, 0], np.linalg.norm((turn @ beside @ more)[:, :, 0], axis=1)
+    beside = np.eye(len(widths)) - reach @ response
+    inverse, aligned = _inverse_of_rank(turn @ beside, ranks[1], turn)
+    more = beside @ inverse @ (turning_rad[:, :, None] - turn @ step)
+    held = np.linalg.norm((turn @ more)[:, :, 0], axis=1)
+    if sum(ranks) == _FREEDOMS:
+        # every orientation can be met, in another pose if not here
+        held = np.where(aligned, np.linalg.norm(turning_rad, axis=1), held)
+    return (step + more)[:, :, 0], held, stretched | aligned
 
 
-def _inverse_of_rank(matrices, rank):
-    """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values."""
+def _inverse_of_rank(matrices, rank, whole):
+    """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values, and which (n,) lack one.
+
+    Values that are nothing beside the matrices (n, j, k) of which these are a part are left out.
+    """
     u, size, vt = np.linalg.svd(matrices, full_matrices=False)
-    return (vt[:, :rank].transpose(0, 2, 1) / size[:, None, :rank]) @ u[:, :, :rank].transpose(0, 2, 1)
+    size = size[:, :rank]
+    lost = size <= _LOST * np.linalg.norm(whole, axis=(1, 2))[:, None]
+    shares = np.where(lost, 0.0, 1.0 / np.where(lost, 1.0, size))
+    return (vt[:, :rank].transpose(0, 2, 1) * shares[:, None]) @ u[:, :, :rank].transpose(0, 2, 1), lost.any(axis=1)
 
 
 def end_of(legs, leg, actuators):
