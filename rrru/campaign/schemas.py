@@ -54,7 +54,8 @@ constraint_determinant float  changes its sign across a constraint singularity; 
 status                 str    as in measurements {ok, outlier, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
-Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points.
+Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points;
+xz through that middle, too, where the robot reaches nothing at y = 0.
 --
 campaign
 slice                  str    plane {xz, xy}

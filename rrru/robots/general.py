@@ -168,8 +168,8 @@ class GeneralRobot(Robot):
 
     @property
     def reach_mm(self):
-        """Length of the longest leg from its foot."""
-        return self.legs.longest_mm(1)
+        """Upper bound of how far the tool can get from the foot of the leg that takes it farthest."""
+        return self._longest_mm(1)
 
     @property
     def orients(self):
@@ -179,10 +179,14 @@ class GeneralRobot(Robot):
     @property
     def size_mm(self):
         """Upper bound of how far the tool can get from the origin."""
-        slides = np.abs(self.drive_range)[np.array(self.parts.units) == "mm"]
-        return self.legs.longest_mm() + float(slides.max(initial=0.0) + np.linalg.norm(self.tool_mm))
+        return self._longest_mm(0)
 
     farthest_mm = size_mm  # searching for it would take the inverse of many points
+
+    def _longest_mm(self, first):
+        """Length of the longest leg from its joint of this number on, slides and bars out, to the tool."""
+        travel = np.abs(np.asarray(self.drive_range, dtype=float)).max(axis=1)
+        return self.legs.longest_mm(first, travel) + float(np.linalg.norm(self.tool_mm))
 
     def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
         """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from the home pose does not end.

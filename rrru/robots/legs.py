@@ -171,10 +171,22 @@ class Legs:
         """Whether every drive has a leg of its own, unlike those of arms."""
         return len(self.legs) >= len(self.driven_kinds)
 
-    def longest_mm(self, first=0):
-        """Length of the longest leg from its joint of this number on, to the platform's frame."""
-        bars = {leg: leg.bar.length_mm + np.linalg.norm(leg.bar.platform_mm) if leg.bar else 0.0 for leg in self.legs}
-        return max(float(sum(np.linalg.norm(j.shift_mm) for j in leg.joints[first:]) + bars[leg]) for leg in self.legs)
+    def longest_mm(self, first, travel):
+        """Length of the longest leg from its joint of this number on, to the platform's frame.
+
+        With its slides and its bar out as far as they go; travel (K,): the largest size of each actuator value.
+        """
+        far = travel if self.coupling is None else np.abs(self.coupling) @ travel
+        return float(max(self._length_mm(leg, first, far) for leg in self.legs))
+
+    def _length_mm(self, leg, first, far):
+        """Length of a leg from its joint of this number on, its driven values (D,) as far out as they go."""
+        slides = sum(far[joint.drive] for joint in leg.joints if joint.kind == "P" and joint.drive is not None)
+        length = sum(np.linalg.norm(joint.shift_mm) for joint in leg.joints[first:]) + slides
+        if leg.bar is None:
+            return length
+        driven = 0.0 if leg.bar.drive is None else far[leg.bar.drive]
+        return length + leg.bar.length_mm + driven + np.linalg.norm(leg.bar.platform_mm)
 
     @property
     def home_passive(self):

@@ -21,15 +21,18 @@ def with_singularities(robot, measurements, margin):
 
 
 def workspace_table(robot, measurements):
-    """Rows of `workspace`: the vertical slice y = 0 and the horizontal one through the middle of the commands."""
-    height = float(rows.command(measurements)[:, 2].mean().round(-1))
+    """Rows of `workspace`: a vertical slice and the horizontal one through the middle of the commands.
+
+    The vertical one is y = 0, or through the same middle where the robot reaches nothing there.
+    """
+    _, side, height = rows.command(measurements).mean(axis=0).round(-1)
     reach = float(robot.reach_mm)
     # where z points down, the platform is on that side of the base
     across, down = (-reach, reach), (0.0 if robot.z_down else -reach, reach)
-    frames = []
-    for plane, at, vertical in (("xz", 0.0, down), ("xy", height, across)):
-        step = reach / robot.workspace_lines
-        points = _around_reachable(robot, workspace.slice_points(plane, at, across, vertical, step), step)
+    step, frames = reach / robot.workspace_lines, []
+    for plane, places, vertical in (("xz", (0.0, side), down), ("xy", (height,), across)):
+        grids = (workspace.slice_points(plane, at, across, vertical, step) for at in places)
+        points = _around_reachable(robot, grids, step)
         names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
         measures = dict(zip(names, workspace.measures(robot, points), strict=True))
         frames.append(pd.DataFrame(points, columns=["x_mm", "y_mm", "z_mm"]).assign(slice=plane, **measures))
@@ -73,14 +76,15 @@ def unadvised(advice):
     return ("no further run was advised, and none was added",) if advice and not len(advice[0]) else ()
 
 
-def _around_reachable(robot, points, step_mm):
-    """The grid points (n, 3) in the box of those that the robot reaches, widened by a tenth or a step.
+def _around_reachable(robot, grids, step_mm):
+    """Points (n, 3) of the first grid of which the robot reaches some, in the box of these, widened by a tenth or step.
 
-    All of them where it reaches none.
+    All of the last one where it reaches none.
     """
-    reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
-    if not len(reachable):
-        return points
-    low, high = reachable.min(axis=0), reachable.max(axis=0)
-    margin = np.maximum(0.1 * (high - low), 1.5 * step_mm)
-    return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
+    for points in grids:
+        reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
+        if len(reachable):
+            low, high = reachable.min(axis=0), reachable.max(axis=0)
+            margin = np.maximum(0.1 * (high - low), 1.5 * step_mm)
+            return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
+    return points
