@@ -47,7 +47,7 @@ def points_of(start_mm, end_mm):
 def _clear(known, points, mechanism):
     """Passes (n,) whose points (n, POINTS, 3) are in reach and nearly as far from singularities as known points."""
     flat = points.reshape(-1, 3)
-    own, drive = mechanism.inverse(known), mechanism.inverse(flat)
+    own, drive = mechanism.inverse(known), mechanism.planned(flat)
     fine = np.isfinite(drive).all(axis=1)
     for measure, limit in zip(_measures(mechanism, flat, drive), _measures(mechanism, known, own), strict=True):
         fine &= measure > _CLEAR * np.nanmin(limit)
@@ -72,7 +72,7 @@ def commands(start_mm, end_mm, mechanism, start_s, speed_mm_s, payload_kg):
         profile = Trapezoid(LENGTH_MM, speed_mm_s, speed_mm_s**2 / LENGTH_MM)
         time = start_s + profile.time(np.linspace(0.0, LENGTH_MM, POINTS))
     told = {"run": np.repeat(np.arange(1, count + 1), POINTS), "point": np.tile(np.arange(1, POINTS + 1), count)}
-    drives = dict(zip(mechanism.parts.columns, mechanism.inverse(points).T, strict=True))
+    drives = dict(zip(mechanism.parts.columns, mechanism.planned(points).T, strict=True))
     return pd.DataFrame(told).assign(
         trajectory="poses",
         time_s=np.tile(time, count),

@@ -13,6 +13,8 @@ _STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
 # a step of another share to get away
 _LOST, _STILL, _AWAY = 1e-9, 1e-6, 0.01
 _FREEDOMS = 6
+# values beyond a drive's range by no more than this share of it are in it
+_SLACK = 1e-6
 # a pose followed from home counts if it is so much closer than home to where it should be
 _CLOSE = 0.1
 
@@ -93,6 +95,21 @@ def _widths(robot):
     own = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
     turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
     return np.where((own > 0.0) & np.isfinite(own), own, turn)
+
+
+def in_range(robot, actuators):
+    """Actuator values (n, K), those of turning drives whole turns further where their ranges want it; NaN outside."""
+    legs, slack = robot.legs, _SLACK * _widths(robot)
+    low, high = np.asarray(robot.drive_range, dtype=float).T + np.outer([-1.0, 1.0], slack)
+    coupling = np.eye(len(legs.driven_kinds)) if legs.coupling is None else legs.coupling
+    turning, whole = np.array(legs.driven_kinds) == "R", np.isclose(coupling, np.rint(coupling))
+    # a turn of such a drive brings back all that it moves
+    periodic = ((coupling == 0.0) | (turning[:, None] & whole)).all(axis=0)
+    turns = np.ceil((low - actuators) / (2.0 * np.pi))
+    assumed = np.array([drive.column in robot.assumed for drive in robot.parts.drives])
+    beyond = ~assumed & ~((low <= actuators) & (actuators <= high))
+    result = np.where(beyond & periodic, actuators + 2.0 * np.pi * turns, actuators)
+    return np.where(beyond & ~((low <= result) & (result <= high)), np.nan, result)
 
 
 def drive_step(at, ranks, lack_mm, turning_rad, widths):

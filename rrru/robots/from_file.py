@@ -176,17 +176,24 @@ def _robot(assembly, servos, follows, options):
     bars = [leg for leg in legs.legs if leg.bar]
     arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
     defaults = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
-    ranges = np.array([_range(assembly, move, servos[move.joint]) for move in each[: len(servos)]])
     drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(each)])
     parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
-    own = {"legs": legs, "parts": parts, "drive_range": ranges, "lumps": lumps_of(chains, structure.open_legs, legs)}
+    stated = [_stated(assembly, move, servos[move.joint]) for move in each[: len(servos)]]
+    own = {"legs": legs, "parts": parts, "lumps": lumps_of(chains, structure.open_legs, legs)}
+    own["drive_range"] = np.array([_range(assembly, move, one) for move, one in zip(each, stated, strict=False)])
+    own["assumed"] = frozenset(drive.column for drive, one in zip(drives, stated, strict=True) if not one)
     return GeneralRobot(**defaults | own | options)
 
 
-def _range(assembly, move, servos):
-    """Lowest and highest value of a driven joint, from its own range and those of its servos."""
+def _stated(assembly, move, servos):
+    """Ranges of a driven joint, its own and those of its servos, as far as they are stated."""
+    model = assembly.model
+    return [*servos, *([model.jnt_range[move.joint]] if model.jnt_limited[move.joint] else [])]
+
+
+def _range(assembly, move, ranges):
+    """Lowest and highest value of a driven joint that all of its ranges hold."""
     model, unit = assembly.model, MM if move.kind == "P" else 1.0
-    ranges = [*servos, *([model.jnt_range[move.joint]] if model.jnt_limited[move.joint] else [])]
     if not ranges:
         about = _RANGE[_UNITS[move.kind]]
         return move.home - about, move.home + about

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.robots import geometric_numbers
-from rrru.robots.drive_step import bar_lengths, drives_from_home, end_of, followed, near_or_followed
+from rrru.robots.drive_step import bar_lengths, drives_from_home, end_of, followed, in_range, near_or_followed
 from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
 from rrru.robots.legs import TOOL, WORLD, Legs, Parts
 from rrru.robots.lumps import base_moment, driven_loads, member_forces, moments
@@ -30,9 +30,10 @@ _SEEN = 1e-6  # share of the largest singular value that others need to count
 class GeneralRobot(Robot):
     """A robot of any legs.
 
-    drive_range (K, 2): actuator values between which it works; parameter_set: one of SETS; lumps: point masses of its
-    links; sample: actuator values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the
-    workspace; among: names that it is chosen from, by default all; reads: what a campaign's readings leave open.
+    drive_range (K, 2): actuator values between which it works; assumed: columns of the drives that nobody states a
+    range of, which may go beyond it; parameter_set: one of SETS; lumps: point masses of its links; sample: actuator
+    values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names
+    that it is chosen from, by default all; reads: what a campaign's readings leave open.
     """
 
     name: str
@@ -46,6 +47,7 @@ class GeneralRobot(Robot):
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
     lumps: tuple = ()
+    assumed: frozenset[str] = frozenset()
     sample: tuple | None = None
     among: tuple[str, ...] = ()
     reads: Reads = field(default_factory=Reads)
@@ -200,6 +202,10 @@ class GeneralRobot(Robot):
             place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
             return bar_lengths(self.legs, self.drive_range, place, twists)
         return drives_from_home(self, (position, wanted), twists, deviations is not None)
+
+    def in_range(self, actuators):
+        """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""
+        return in_range(self, np.asarray(actuators, dtype=float))
 
     def own_load(self, _masses, motion, poses, gravity_mm_s2):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""

@@ -131,6 +131,7 @@ def with_hands(arms, shared, carries=None):
         "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
         "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
         "drive_range": ranges,
+        "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),
         "lumps": _lumps([*arms.values()], shared),
     }
     return HandedRobot(**options | own)

@@ -50,6 +50,14 @@ class Robot(ABC):
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
 
+    def in_range(self, actuators):
+        """Actuator values (n, K), NaN outside of the drives' stated ranges; of most robots none are stated."""
+        return actuators
+
+    def planned(self, position_mm, deviations=None):
+        """Actuator values (n, K) as `inverse` gives them, within the drives' ranges; NaN also outside of these."""
+        return self.in_range(self.inverse(position_mm, deviations))
+
     @property
     def z_down(self):
         """Whether z of its frame points to the ground."""
@@ -228,8 +236,8 @@ class Robot(ABC):
         return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
     def require_reachable(self, position_mm, deviations=None):
-        """Actuator values as `inverse` gives them; raises UnreachableError naming the first point out of reach."""
-        values = self.inverse(position_mm, deviations)
+        """Actuator values as `planned` gives them; raises UnreachableError naming the first point out of reach."""
+        values = self.planned(position_mm, deviations)
         bad = np.flatnonzero(np.isnan(values).any(axis=1))
         if bad.size:
             x, y, z = np.asarray(position_mm, dtype=float)[bad[0]]

@@ -82,7 +82,7 @@ def _around_reachable(robot, grids, step_mm):
     All of the last one where it reaches none.
     """
     for points in grids:
-        reachable = points[np.isfinite(robot.inverse(points)).all(axis=1)]
+        reachable = points[np.isfinite(robot.planned(points)).all(axis=1)]
         if len(reachable):
             low, high = reachable.min(axis=0), reachable.max(axis=0)
             margin = np.maximum(0.1 * (high - low), 1.5 * step_mm)

@@ -3,9 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.errors import UnreachableError
 from rrru.robots.catalogue import make_mechanism
+from rrru.robots.from_file import from_mjcf
+from tests.robots.mjcf import CRANKED, CRANKED_JOINTS, mjcf, servos
 
 _SIX = [
     {"d_mm": 290, "alpha_deg": -90, "range_deg": [-165, 165]},
@@ -90,3 +94,37 @@ def test_a_place_that_is_no_number_has_no_drives():
     robot = _arm(_SCARA)
     found = robot.inverse(np.array([[np.nan, 0.0, 300.0], [400.0, 50.0, 320.0]]))
     assert np.isnan(found[0]).all() and np.isfinite(found[1]).all()
+
+
+def test_a_plan_keeps_within_the_ranges_of_the_drives():
+    """A slide and a joint beyond theirs; what was measured there is still taken."""
+    robot = _arm([_SCARA[0] | {"range_deg": [-60, 60]}, *_SCARA[1:]])
+    shoulder, elbow = np.radians([59.0, 61.0, 0.0]), np.radians(40.0)
+    drives = np.stack([shoulder, np.full(3, elbow), [0.0, 0.0, 101.0]], axis=1)
+    points = robot.forward(drives)
+    np.testing.assert_allclose(robot.forward(robot.inverse(points)), points, rtol=0.0, atol=1e-6)
+    lost = [[False, False, False], [True, False, False], [False, False, True]]
+    np.testing.assert_array_equal(np.isnan(robot.planned(points)), lost)
+    with pytest.raises(UnreachableError, match=r"^point 2 at .* 2 of 3 points"):
+        robot.require_reachable(points)
+    np.testing.assert_array_equal(robot.require_reachable(points[:1]), robot.inverse(points[:1]))
+
+
+def test_whole_turns_bring_joints_alone_into_their_ranges():
+    """A slide knows no turns, nor does a drive that another joint follows by half."""
+    turn, rows = 2.0 * np.pi, [{"range_deg": [-170, 170]}, {"range_deg": [-90, 90]}, {"drives": {"q2": 0.5}}]
+    robot = _arm([*rows, {"sliding": True, "range_mm": [-1.0, 1.0]}])
+    values = np.array([0.1, 0.2, 0.3])
+    np.testing.assert_allclose(robot.in_range((values + turn * np.eye(3))[:1]), [values], atol=1e-12)
+    np.testing.assert_allclose(robot.in_range((values - 2.0 * turn * np.eye(3))[:1]), [values], atol=1e-12)
+    np.testing.assert_array_equal(np.isnan(robot.in_range(values + turn * np.eye(3))), np.diag([False, True, True]))
+    # the ends of the ranges belong to them, a place between 170 and 190 deg does not
+    np.testing.assert_array_equal(robot.in_range(robot.drive_range.T), robot.drive_range.T)
+    assert np.isnan(robot.in_range(np.array([[np.pi, 0.0, 0.0]]))[0, 0])
+
+
+def test_a_drive_whose_range_nobody_states_may_leave_what_is_assumed(tmp_path):
+    robot = from_mjcf(mjcf(tmp_path, CRANKED, actuators=servos(*CRANKED_JOINTS)), "tip")
+    assert robot.assumed == set(robot.parts.columns[1:])
+    beyond = robot.drive_range[None, :, 1] + 1.0
+    assert np.isnan(robot.in_range(beyond)).tolist() == [[True] + 5 * [False]]

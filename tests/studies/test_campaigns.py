@@ -37,11 +37,14 @@ def test_no_corner_of_a_gantry_is_farther_than_its_reach():
     assert _gantry().reach_mm >= farthest and _gantry().size_mm >= farthest
 
 
-@pytest.mark.parametrize(("low_y", "slice_y"), [(-200.0, 0.0)])
+@pytest.mark.parametrize(("low_y", "slice_y"), [(-200.0, 0.0), (100.0, 460.0)])
 def test_the_workspace_of_a_gantry_is_where_its_slides_go(low_y, slice_y):
     """The vertical slice goes through the commands where the gantry reaches nothing at y = 0."""
     low = np.array([_LOW[0], low_y, _LOW[2]])
     table = workspace_table(_gantry(low), _commands([[300.0, 440.0, 100.0], [500.0, 480.0, 140.0]]))
     upright, level = (table[table["slice"] == plane] for plane in ("xz", "xy"))
     assert (upright["y_mm"] == slice_y).all() and (level["z_mm"] == 120.0).all()
-    assert upright["reachable"].any() and level["reachable"].any()
+    points = table[["x_mm", "y_mm", "z_mm"]].to_numpy()
+    inside = ((points >= low) & (points <= _HIGH)).all(axis=1)
+    np.testing.assert_array_equal(table["reachable"], inside)
+    assert all(part["reachable"].any() and not part["reachable"].all() for part in (upright, level))

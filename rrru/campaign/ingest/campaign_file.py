@@ -10,7 +10,7 @@ from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, re
 from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resolve
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.formats import read_cells
-from rrru.campaign.ingest.geometry import check_commands, check_measured, check_sizes, doubts
+from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
@@ -117,7 +117,8 @@ def _table(
     frame, drives = at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
     wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
-    notes, outlier = doubts(frame[~wrong], sheet.mechanism), outliers(frame, digit_mm) | wrong
+    notes = [*doubts(frame[~wrong], sheet.mechanism), *beyond_ranges(values, sheet.mechanism)]
+    outlier = outliers(frame, digit_mm) | wrong
     told = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
         told |= turn_columns("command", sheet.poses.turn)

@@ -121,6 +121,16 @@ def doubts(frame, mechanism):
     return notes
 
 
+def beyond_ranges(actuators, mechanism):
+    """Notes on the drives whose actuator values (n, K) are outside of their stated ranges at some points."""
+    outside, notes = np.isnan(mechanism.in_range(actuators)) & np.isfinite(actuators), []
+    for k in np.flatnonzero(outside.any(axis=0)):
+        (low, high), unit, drive = mechanism.drive_range[k], mechanism.parts.units[k], mechanism.parts.columns[k]
+        points = f"{outside[:, k].sum()} of {len(actuators)} points"
+        notes.append(f"{points} are outside of the range of {drive}, {low:.6g} to {high:.6g} {unit}, and are used")
+    return notes
+
+
 def frame_limit(mechanism):
     """Distance in mm between measured and commanded positions above which the frames must differ."""
     return _FRAME_SHARE * mechanism.size_mm

@@ -1,6 +1,7 @@
 """Tracker files of robots of one's own: a six-axis arm whose orientation changes along the path."""
 
 from contextlib import nullcontext
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -39,6 +40,20 @@ def test_drive_values_are_taken_as_they_are_where_positions_do_not_tell_them(tmp
     found = _ingested(frame, tmp_path).measurements
     assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-12
     assert (found["status"] == "ok").all()
+
+
+def test_points_outside_of_a_drive_s_range_are_told_and_used(tmp_path):
+    """Of 40 even steps from 0 to 0.6 rad those beyond 0.4 rad; a whole turn changes nothing."""
+    ranges, frame = ARM.drive_range.copy(), _file()
+    ranges[5] = -0.1, 0.4
+    frame["axis6_rad"] += 2.0 * np.pi
+    frame.to_csv(tmp_path / "arm.csv", index=False)
+    found = ingest(IngestSpec(str(tmp_path / "arm.csv")), replace(ARM, drive_range=ranges))
+    count = sum(0.6 * k / 39 > 0.4 for k in range(40))
+    told = f"{count} of 40 points are outside of the range of axis6_rad, -0.1 to 0.4 rad, and are used"
+    assert [note for note in found.notes if "range" in note] == [told]
+    assert (found.measurements["status"] == "ok").all()
+    assert not any("range" in note for note in _ingested(frame, tmp_path).notes)
 
 
 def test_degrees_of_an_arm_are_converted_when_declared_and_refused_when_not(tmp_path):
