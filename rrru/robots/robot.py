@@ -235,15 +235,18 @@ class Robot(ABC):
         flat = units.reshape(len(units), -1)
         return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
+    def unreached(self, values):
+        """What keeps the robot from a point whose actuator values (K,) are NaN in part, for a message."""
+        return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
+
     def require_reachable(self, position_mm, deviations=None):
         """Actuator values as `planned` gives them; raises UnreachableError naming the first point out of reach."""
         values = self.planned(position_mm, deviations)
         bad = np.flatnonzero(np.isnan(values).any(axis=1))
         if bad.size:
             x, y, z = np.asarray(position_mm, dtype=float)[bad[0]]
-            legs = ", ".join(str(i + 1) for i in np.flatnonzero(np.isnan(values[bad[0]])))
             raise UnreachableError(
-                f"point {bad[0] + 1} at ({x:.3f}, {y:.3f}, {z:.3f}) mm is out of reach of leg {legs}; "
+                f"point {bad[0] + 1} at ({x:.3f}, {y:.3f}, {z:.3f}) mm is {self.unreached(values[bad[0]])}; "
                 f"{bad.size} of {len(values)} points cannot be reached"
             )
         return values

@@ -105,7 +105,7 @@ def test_a_plan_keeps_within_the_ranges_of_the_drives():
     np.testing.assert_allclose(robot.forward(robot.inverse(points)), points, rtol=0.0, atol=1e-6)
     lost = [[False, False, False], [True, False, False], [False, False, True]]
     np.testing.assert_array_equal(np.isnan(robot.planned(points)), lost)
-    with pytest.raises(UnreachableError, match=r"^point 2 at .* 2 of 3 points"):
+    with pytest.raises(UnreachableError, match=r"^point 2 at .* mm is out of the range of q1_rad; 2 of 3 points"):
         robot.require_reachable(points)
     np.testing.assert_array_equal(robot.require_reachable(points[:1]), robot.inverse(points[:1]))
 
@@ -128,3 +128,10 @@ def test_a_drive_whose_range_nobody_states_may_leave_what_is_assumed(tmp_path):
     assert robot.assumed == set(robot.parts.columns[1:])
     beyond = robot.drive_range[None, :, 1] + 1.0
     assert np.isnan(robot.in_range(beyond)).tolist() == [[True] + 5 * [False]]
+
+
+@pytest.mark.parametrize(("rows", "turned"), [(_SCARA, ""), (_SIX, ", with the platform turned as in the home pose")])
+def test_an_arm_out_of_reach_has_no_legs_that_are(rows, turned):
+    robot = _arm(rows)
+    with pytest.raises(UnreachableError, match=rf"^point 1 at .* mm is out of reach{turned}; 1 of 1 points"):
+        robot.require_reachable(np.array([[5000.0, 0.0, 300.0]]))

@@ -31,8 +31,7 @@ def check_commands(sheet):
     drive = sheet.mechanism.inverse(command, elbow=sheet.spec.elbow)
     reached = np.isfinite(drive).all(axis=1)
     for i in np.flatnonzero(~reached):
-        legs = ", ".join(str(k + 1) for k in np.flatnonzero(np.isnan(drive[i])))
-        allowed = f"a position that every leg reaches; leg {legs} does not"
+        allowed = f"a position that the robot reaches; it is {sheet.mechanism.unreached(drive[i])}"
         sheet.note("reach", COMMAND, position_text(command[i]), allowed, known.index[i])
     flipped = _upside_down(command[reached], drive[reached], sheet)
     # positions that were computed from the drive values tell nothing of these

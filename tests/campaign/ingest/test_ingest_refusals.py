@@ -335,7 +335,7 @@ ROWS = {
         7,
         AT_COMMAND,
         "(-1500, 0, 609.523) mm",
-        "leg 1, 2, 3 does not",
+        "out of reach of leg 1, 2, 3",
     ),
     "a measurement out of reach": (
         cells((7, "measured_x_mm", 9999)),
