@@ -207,11 +207,14 @@ class GeneralRobot(Robot):
         """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""
         return in_range(self, np.asarray(actuators, dtype=float))
 
-    def unreached(self, values):
-        """What keeps the robot from a point: a drive's range where only some of the values (K,) are NaN."""
+    def unreached(self, values, as_home=True):
+        """What keeps the robot from a point: a drive's range where only some of the values (K,) are NaN.
+
+        as_home: whether its platform was to be turned as in the home pose.
+        """
         names = [name for name, lost in zip(self.parts.columns, np.isnan(values), strict=True) if lost]
         where = "out of reach" if len(names) == len(values) else f"out of the range of {', '.join(names)}"
-        return where + (", with the platform turned as in the home pose" if self.orients else "")
+        return where + (", with the platform turned as in the home pose" if self.orients and as_home else "")
 
     def own_load(self, _masses, motion, poses, gravity_mm_s2):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see `rrru.robots.lumps`."""

@@ -235,7 +235,7 @@ class Robot(ABC):
         flat = units.reshape(len(units), -1)
         return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
-    def unreached(self, values):
+    def unreached(self, values, as_home=True):
         """What keeps the robot from a point whose actuator values (K,) are NaN in part, for a message."""
         return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
 

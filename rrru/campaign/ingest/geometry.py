@@ -5,7 +5,7 @@ from itertools import permutations, product
 import numpy as np
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, position_text
+from rrru.campaign.ingest.sheet import AXES, COMMAND, MEASURED, TURNS, position_text
 from rrru.campaign.ingest.spec import MM
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
@@ -28,10 +28,10 @@ def check_commands(sheet):
         return _check_poses(known, command, sheet)
     if _wrong_unit(command, sheet):
         return False
-    drive = sheet.mechanism.inverse(command, elbow=sheet.spec.elbow)
-    reached = np.isfinite(drive).all(axis=1)
+    drive = sheet.needed(known, command)
+    reached, as_home = np.isfinite(drive).all(axis=1), not set(TURNS["command"]) <= set(known)
     for i in np.flatnonzero(~reached):
-        allowed = f"a position that the robot reaches; it is {sheet.mechanism.unreached(drive[i])}"
+        allowed = f"a position that the robot reaches; it is {sheet.mechanism.unreached(drive[i], as_home)}"
         sheet.note("reach", COMMAND, position_text(command[i]), allowed, known.index[i])
     flipped = _upside_down(command[reached], drive[reached], sheet)
     # positions that were computed from the drive values tell nothing of these

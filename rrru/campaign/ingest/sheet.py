@@ -49,9 +49,13 @@ class Sheet:
         """Actuator values (n, K): those of the file, else those that the commanded poses need."""
         if set(self.drives) <= set(self.frame):
             return self.frame[[*self.drives]].to_numpy(dtype=float)
+        return self.needed(self.frame, command)
+
+    def needed(self, frame, command):
+        """Actuator values (n, K) that commanded positions (n, 3) need, with the orientations of their rows if any."""
         turned = {}
-        if self.mechanism.orients and set(TURNS["command"]) <= set(self.frame):
-            turned["turn"] = rows.turns(self.frame, "command")
+        if self.mechanism.orients and set(TURNS["command"]) <= set(frame):
+            turned["turn"] = rows.turns(frame, "command")
         return self.mechanism.inverse(command, elbow=self.spec.elbow, **turned)
 
     @property

@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.campaign.ingest.sheet import TURNS
 from rrru.errors import IngestError
 from rrru.robots.catalogue import make_mechanism
 from tests.places import ROOT
@@ -40,6 +42,27 @@ def test_drive_values_are_taken_as_they_are_where_positions_do_not_tell_them(tmp
     found = _ingested(frame, tmp_path).measurements
     assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-12
     assert (found["status"] == "ok").all()
+
+
+def test_commanded_poses_are_in_reach_as_they_are_turned(tmp_path):
+    """Positions that the arm reaches as commanded, and not turned as at home."""
+    draw = np.random.default_rng(1)
+    drives = ARM.legs.home_drives + draw.uniform(-1.2, 1.2, (150, 6))
+    poses = ARM.solve(drives, ARM.forward(drives))
+    command, turn = ARM.measured(poses, ARM.twists()), poses.turn
+    met = np.isfinite(ARM.inverse(command, turn=turn)).all(axis=1)
+    apart = met & np.isnan(ARM.inverse(command)).any(axis=1)
+    assert apart.sum() > 5
+    frame = pd.DataFrame(Rotation.from_matrix(turn[met]).as_rotvec(), columns=TURNS["command"]).assign(
+        trajectory="poses"
+    )
+    measured = command[met] + draw.normal(0.0, 0.02, command[met].shape)
+    told = rows.vector_columns("command", command[met]) | rows.vector_columns("measured", measured)
+    found = _ingested(frame.assign(**told), tmp_path).measurements
+    off = ARM.forward(rows.actuators(found, ARM)) - command[met]
+    assert len(found) == met.sum() and np.abs(off).max() < 1e-6
+    with pytest.raises(IngestError, match="out of reach, with the platform turned as in the home pose"):
+        _ingested(frame.assign(**told).drop(columns=[*TURNS["command"]]), tmp_path)
 
 
 def test_points_outside_of_a_drive_s_range_are_told_and_used(tmp_path):
