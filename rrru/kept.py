@@ -27,7 +27,8 @@ class Latest:
     """Answers by what was asked, so many of the last ones."""
 
     def __init__(self, count: int) -> None:
-        self._count, self._answers = count, {}  # type: int, dict[Any, Any]
+        self._count = count
+        self._answers: dict[Any, Any] = {}
 
     def of(self, asked: Any, make: Callable[[], Any]) -> Any:
         """The answer to what is asked, made if it is not there."""

@@ -5,8 +5,8 @@ They act at the drives of one unit: of a robot with turning and sliding drives n
 
 import numpy as np
 
-from rrru.effects.protocol import Coordinates, Effect
-from rrru.parameters import Parameter, ParameterSet
+from rrru.effects.protocol import Coordinates, Effect, leg_parameters
+from rrru.parameters import ParameterSet
 
 
 def drives_of(robot, unit):
@@ -16,10 +16,10 @@ def drives_of(robot, unit):
 
 def harmonic_parameters(drives, source, unit="rad", highest=0.01):
     """Amplitudes in the unit and phases in rad of drives (k,), numbered from 0 on, as a tuple of 2 k parameters."""
-    legs = (drives + 1).tolist()
-    amplitudes = [Parameter(f"amplitude{leg}", unit, 0.0, 0.0, highest, source, leg) for leg in legs]
-    phases = [Parameter(f"phase{leg}", "rad", 0.0, -np.pi, np.pi, "free", leg) for leg in legs]
-    return *amplitudes, *phases
+    count = drives.max() + 1
+    amplitudes = leg_parameters(source, ("amplitude", unit, 0.0, highest), count=count)
+    phases = leg_parameters("free", ("phase", "rad", -np.pi, np.pi), count=count)
+    return tuple(one for one in (*amplitudes, *phases) if one.leg - 1 in drives)
 
 
 def at_harmonic(motion, drives, periods, values):

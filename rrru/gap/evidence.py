@@ -294,8 +294,9 @@ class ModelEvidence:
         They are told by what is itself told from zero. What was found of a spring that bears next to nothing is
         anything, and would deny that it ever bears more.
         """
-        told = is_told(*self._weakly(terms))
-        sure = self._borne(terms, [level], np.where(told, self.found(terms), 0.0))
+        found = self.found(terms)
+        told = is_told(found, *self._weakly(terms))
+        sure = self._borne(terms, [level], np.where(told, found, 0.0))
         _, covariance = over_cases(sure, np.asarray(strengths)[None])
         return np.sqrt(np.diag(covariance)[-len(self.linear.weight_steps) :])
 

@@ -65,11 +65,9 @@ def as_found(problem, strengths):
     return posterior_mean(problem, problem.scale(strengths)[0])
 
 
-def is_told(problem, strengths):
-    """Whether each coefficient (k,) of a Projected problem of one level at strengths (1, terms) is told from zero."""
-    scale = problem.scale(strengths)[0]
-    error = np.sqrt(np.diag(posterior_covariance(problem, scale)))
-    return np.abs(posterior_mean(problem, scale)) > _TOLD * error
+def is_told(found, problem, strengths):
+    """Whether each coefficient (k,), found by `as_found` of the same problem and strengths, is told from zero."""
+    return np.abs(found) > _TOLD * np.sqrt(np.diag(posterior_covariance(problem, problem.scale(strengths)[0])))
 
 
 def borne(problem, count, blocks, steps, found, grams):

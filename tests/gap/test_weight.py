@@ -1,6 +1,7 @@
 """A load that nobody told of and a base that leans: what gives way is named, its numbers hold, and the user is told."""
 
 from dataclasses import replace
+from itertools import permutations
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,6 +13,7 @@ from rrru.effects.protocol import bears_load, gives_way
 from rrru.errors import ConfigError
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings, check
+from rrru.gap.terms import Term
 from rrru.gap.weight import doubts_of
 from rrru.gap.whitened import LEVELS
 from rrru.gap.worth import worth
@@ -22,6 +24,7 @@ from rrru.studies.withheld.box import draw_trajectories
 from rrru.studies.withheld.faults import Fault
 from rrru.studies.withheld.foreign import FileRobot
 from tests.gap.campaigns import ROBOT, active, measure
+from tests.gap.test_projected import GRIDS, asked, coefficients_of, the_same
 from tests.studies.withheld.files import conditions
 
 _FILE, _SOFT = "hexapod_file", (0.03, 0.012, 0.045, 0.02, 0.035, 0.025)
@@ -52,6 +55,18 @@ def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     answers = (attribution.hypothesis, attribution.level), (nothing, attribution.level)
     now, runs = worth(attribution, *answers, attribution.case)
     assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
+
+
+def test_beside_a_weight_the_order_of_the_terms_makes_no_difference(misled):
+    *_, attribution = misled
+    evidence = attribution.evidence
+    terms = Term("backlash"), Term("drive_compliance"), Term("joint_clearance", 1)
+    assert evidence.projected(terms, [0]).weights
+    the_same(asked(evidence, terms, GRIDS))
+    first, *others = (coefficients_of(evidence, terms, order) for order in permutations(range(3)))
+    for other in others:
+        for one, own in zip(first, other, strict=True):
+            np.testing.assert_allclose(own, one, rtol=1e-6, atol=1e-9)
 
 
 def test_the_springs_are_named_and_within_their_errors(misled):

@@ -58,11 +58,14 @@ def test_where_nothing_is_better_a_run_still_ends(flat):
 
 
 def test_a_run_ends_where_it_stalls_or_has_no_spread_left():
-    whole = minimise(valley, LOW, HIGH, replace(SETTINGS, generations=5000), 4)
-    assert whole.stopped == "stalled" and whole.generations < 5000
-    settings = replace(SETTINGS, generations=5000, stall_generations=20, stall_tolerance=1e-6)
+    endless = replace(SETTINGS, generations=5000)
+    runs = [minimise(valley, LOW, HIGH, endless, seed) for seed in range(9)]
+    assert {run.stopped for run in runs} == {"stalled"}
+    # where exactly a run has no spread left, rounding decides
+    assert np.median([run.generations for run in runs]) < 1000
+    settings = replace(endless, stall_generations=20, stall_tolerance=1e-6)
     stopped = minimise(valley, LOW, HIGH, settings, 4)
-    assert stopped.found.tobytes() == whole.stalled(20, 1e-6).found.tobytes()
+    assert stopped.found.tobytes() == runs[4].stalled(20, 1e-6).found.tobytes()
 
 
 def test_infeasible_individuals_do_not_lead_it_astray():
