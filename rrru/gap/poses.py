@@ -6,7 +6,6 @@ depends on how it is reached. Lengths in mm, speeds in mm/s.
 
 import numpy as np
 import pandas as pd
-from scipy.stats import qmc
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.speed_profile import Trapezoid
@@ -25,6 +24,9 @@ def passes(measurements, mechanism):
     They go from one point of the box towards another, both of Sobol's sequence (Joe and Kuo, SIAM J. Sci. Comput. 30,
     2008), and keep clear of singularities. None where the robot orients its platform or reflectors are measured.
     """
+    # it takes as long to load as some diagnoses, and few advise poses
+    from scipy.stats import qmc
+
     if mechanism.orients or rows.readings(measurements) is not None:
         return np.zeros((0, 3)), np.zeros((0, 3))
     known = np.unique(rows.command(measurements)[rows.usable(measurements)], axis=0)
