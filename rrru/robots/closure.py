@@ -16,7 +16,7 @@ from rrru.errors import ConfigError
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.closure_tables import closed, tables
 from rrru.robots.walk import Poses, Twists, walks
-from rrru.robots.wrenches import SCALE, by_group, constraints_of, groups_of, spare_joints, wrenches_of
+from rrru.robots.wrenches import SCALE, by_group, constraints_of, spare_joints, wrenches_of
 
 
 class Closure:
@@ -26,9 +26,11 @@ class Closure:
     """
 
     def __init__(self, legs):
-        self.legs, groups = legs, groups_of(legs)
+        self.legs, groups = legs, legs.groups
         self._spare = spare_joints(legs)
         counts = constraints_of(legs, self._spare)
+        # one leg, whose end is the platform's
+        self._driven = len(legs.legs) == 1 and counts == [6] and not legs.passive_joints
         if sum(counts) < 6:
             raise ConfigError(f"the legs hold the platform by {sum(counts)} constraints; allowed: at least 6")
         self._tables = tables(legs, self._spare)
@@ -49,6 +51,8 @@ class Closure:
 
     def inverse(self, wrenches):
         """Twists (n, 6, rows) of the platform per constraint, the inverse of the wrenches A of all legs."""
+        if self._driven:
+            return np.broadcast_to(np.eye(6), wrenches[0].shape)
         rows = np.concatenate(by_group(self.legs, wrenches), axis=1)
         return SCALE[:, None] * _inverse(rows * SCALE * self._weights) * self._weights.T
 

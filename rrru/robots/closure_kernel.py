@@ -245,5 +245,9 @@ def solve(tables, room, drives, twists, active, platform, passive, sizes, lacks)
     for n in range(len(platform)):
         own, drive = twists[n % len(twists)], drives[n]
         _draw_together(slots, frames, motions, drive, own, active, links)
+        for leg in range(len(ends)):
+            if ends[leg, 1] == ends[leg, 2] and not ends[leg, 3]:
+                # where a leg ends whose joints are all driven
+                platform[n] = links[ends[leg, 0]]
         state = platform[n], passive[n], lacks[n]
         sizes[n] = _newton(ends, bars, screws, numbers, turning, drive, own, links, state, work)

@@ -22,33 +22,34 @@ def tables(legs, spare):
     """
     slots, frames, motions, ends, bars, screws, values = [], [], [], [], [], [], []
     for number, leg in enumerate(legs.legs):
-        passive = [joint for joint in leg.joints if joint.passive]
+        passive, chain = [joint for joint in leg.joints if joint.passive], legs.chains[leg.name]
         if leg.bar and passive:
             raise ConfigError(f"{leg.name}: {len(passive)} of the joints before its bar are passive; allowed: none")
         for joint in leg.joints:
             drive = -1 if joint.kind == "fixed" or joint.drive is None else joint.drive
             slots.append((legs.site_numbers[joint.name], drive, joint.passive))
-            frames.append(np.vstack([joint.turn.T, joint.shift_mm]))
-            motions.append(_motion(joint))
         slots.append((-1, -1, True))
-        frames.append(np.vstack([leg.end_turn.T, np.zeros(3)]))
-        motions.append(np.zeros(6))
+        frames += [chain.frames]
+        motions += [chain.motions, np.zeros((1, 6))]
         first, last = len(screws), len(screws) + len(passive)
         ends.append((first + number, first, last, *_bar_numbers(legs, leg)))
         bars.append(np.r_[leg.bar.length_mm, leg.bar.platform_mm] if leg.bar else np.zeros(4))
-        screws += [[*_motion(joint), joint.name not in spare] for joint in passive]
+        screws += [
+            [*motion, joint.name not in spare]
+            for joint, motion in zip(leg.joints, chain.motions, strict=True)
+            if joint.passive
+        ]
         values += [legs.passive_numbers[joint.name] for joint in passive]
     turning = np.array([joint.kind == "R" for joint in legs.passive_joints], dtype=bool)
     parts = (
-        *(np.array(part) for part in (slots, frames, motions, ends, bars)),
+        np.array(slots),
+        np.concatenate(frames),
+        np.concatenate(motions),
+        np.array(ends),
+        np.array(bars),
         np.reshape(screws, (-1, 7)).astype(float),
     )
     return *parts, np.array(values, dtype=np.int64), turning
-
-
-def _motion(joint):
-    """The twist (6,) of a joint's motion in its frame."""
-    return np.concatenate([np.where(joint.kind == kind, joint.axis, 0.0) for kind in "PR"])
 
 
 def _bar_numbers(legs, leg):
@@ -77,14 +78,12 @@ def closed(tables, actuators, start, twists, all_met):
         np.array(np.broadcast_to(part, (n, *shape)), dtype=float, order="C")
         for part, shape in zip((actuators, platform, start.passive), shapes, strict=True)
     ]
-    known = np.all([np.isfinite(one).all(axis=tuple(range(1, one.ndim))) for one in state], axis=0)
+    known = np.isfinite(sum(one.sum(axis=tuple(range(1, one.ndim))) for one in state))
     drives, platform, passive = state
     # links, a frame, screws and equations of one point after the other
     room = tuple(np.empty(shape) for shape in ((len(screws) + legs, 4, 3), (4, 3), (len(screws), 6), (k + 6, k + 8)))
-    values, active = np.require(twists.values, float, ["C", "W"]), np.zeros(twists.values.shape[1], dtype=bool)
-    active[list(twists.active)] = True
     left, lacks = np.empty(n), np.zeros((n, legs, 6))
-    closure_kernel.solve(tables, room, drives, values, active, platform, passive, left, lacks)
+    closure_kernel.solve(tables, room, drives, twists.values, twists.active, platform, passive, left, lacks)
     if all_met:
         arms = np.where(ends[:, 3], 1.0, closure_kernel.ARM_MM)
         left = np.maximum(left, (np.linalg.norm(lacks, axis=2) * arms).max(axis=1))

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.kept import last_kept
-from rrru.robots.walk import Poses, Twists, bar_ends, walk
+from rrru.robots.walk import Poses, Twists, bar_pose, walk
 
 # an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
 # less: longer ones end in other assemblies, or nowhere
@@ -161,7 +161,7 @@ def bar_lengths(legs, drive_range, place, twists):
     needed = none.copy()
     for leg in legs.legs:
         if leg.bar:
-            near, far, length = bar_ends(legs, leg, walk(legs, leg, none, poses.passive, own), poses, none, own)
-            needed[:, leg.bar.drive] = np.linalg.norm(far - near, axis=1) - length
+            way = walk(legs, leg, none, poses.passive, own)
+            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, poses, none, own).lack_mm
     low, high = np.asarray(drive_range, dtype=float).T
     return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)

@@ -13,7 +13,7 @@ from rrru.robots.from_seams import Move, placed
 from rrru.robots.legs import TOOL, WORLD, Bar, Joint, Leg, Z, turn_about
 from rrru.robots.lumps import PLATFORM
 from rrru.robots.walk import Twists, walk
-from rrru.robots.wrenches import groups_of, rank_of, screw
+from rrru.robots.wrenches import rank_of, screw
 
 # axes meet in a point and a slide goes along a line to within this, in mm and rad
 _MEET_MM, _ALONG = 1e-6, 1e-9
@@ -121,7 +121,7 @@ def with_bars(legs):
     """The legs of Legs, those that end in bars as such, at the home pose, and of these the Cuts by number."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
     ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
-    alone = {group[0] for group in groups_of(legs) if len(group) == 1}
+    alone = {group[0] for group in legs.groups if len(group) == 1}
     drives = legs.driven(actuators)[0]
     each = [_with_bar(leg, ways[k], drives) if k in alone else (leg, None) for k, leg in enumerate(legs.legs)]
     return tuple(leg for leg, _ in each), {number: cut for number, (_, cut) in enumerate(each) if cut}

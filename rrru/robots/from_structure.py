@@ -16,7 +16,7 @@ from rrru.robots.from_couplings import coupling
 from rrru.robots.from_mjcf import Assembly
 from rrru.robots.from_seams import undone
 from rrru.robots.legs import Legs
-from rrru.robots.walk import Poses, Twists, bar_ends, walk
+from rrru.robots.walk import Poses, Twists, bar_pose, walk
 
 # a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
 # where more joints than needed do not fit each other; below the last it is not closed at all
@@ -102,8 +102,7 @@ def _gaps(legs, poses):
     for leg in legs.legs:
         way = walk(legs, leg, actuators, poses.passive, twists)
         if leg.bar:
-            near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
-            result.append(abs(length[0] - np.linalg.norm(far - near)))
+            result.append(abs(bar_pose(legs, leg, way, poses, actuators, twists).lack_mm[0]))
         else:
             off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
             result.append(np.linalg.norm(way.place - poses.position_mm) + ARM_MM * off)

@@ -13,6 +13,7 @@ own, the last ones the platform's. Lengths in mm, angles in rad.
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -81,6 +82,19 @@ class Leg:
         Empty without a bar.
         """
         return (f"{self.name} bar", f"{self.name} end") if self.bar else ()
+
+
+class Chain(NamedTuple):
+    """A leg with m joints as arrays for compiled code.
+
+    frames (m + 1, 4, 3): the placement before every joint and after the last, rows its axes and its place; motions (m,
+    6): the twist of a joint's motion in its frame, shift first; numbers (m, 2): its site, and its column in
+    passive values (k,) followed by driven ones (D,), -1 for a fixed joint.
+    """
+
+    frames: np.ndarray
+    motions: np.ndarray
+    numbers: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +179,42 @@ class Legs:
     def passive_numbers(self):
         """Number of every passive joint by its name."""
         return {joint.name: number for number, joint in enumerate(self.passive_joints)}
+
+    @cached_property
+    def groups(self):
+        """Numbers of the legs of each group: those that share passive joints, and all that end apart, are one."""
+        if self.hands:
+            return (tuple(range(len(self.legs))),)
+        result = []
+        for number, leg in enumerate(self.legs):
+            own = {joint.name for joint in leg.joints if joint.passive}
+            # what legs share lies before where they part, in the first of them as in all
+            near = (group for group in result if own & {joint.name for joint in self.legs[group[0]].joints})
+            group = next(near, None)
+            if group is None:
+                result.append([number])
+            else:
+                group.append(number)
+        return tuple(map(tuple, result))
+
+    @cached_property
+    def chains(self):
+        """The Chain of every leg by its name."""
+        return {leg.name: self._chain(leg) for leg in self.legs}
+
+    def _chain(self, leg):
+        """The Chain of a leg."""
+        frames = [np.vstack([joint.turn.T, joint.shift_mm]) for joint in leg.joints]
+        frames.append(np.vstack([leg.end_turn.T, _NO_SHIFT]))
+        motions = [np.concatenate([joint.axis * (joint.kind == kind) for kind in "PR"]) for joint in leg.joints]
+        numbers = [(self.site_numbers[joint.name], self._column(joint)) for joint in leg.joints]
+        return Chain(np.array(frames), np.reshape(motions, (-1, 6)), np.reshape(numbers, (-1, 2)).astype(np.int64))
+
+    def _column(self, joint):
+        """Column of a joint's value in passive values followed by driven ones, -1 for a fixed joint."""
+        if joint.kind == "fixed":
+            return -1
+        return self.passive_numbers[joint.name] if joint.passive else len(self.passive_joints) + joint.drive
 
     @property
     def parallel(self):

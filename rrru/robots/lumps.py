@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rrru.robots.legs import cross, turn_about
-from rrru.robots.walk import Twists, bar_ends, value_of
+from rrru.robots.walk import Twists, bar_pose, value_of
 
 # steps of the differences: in time, and of a driven value in rad or mm
 _STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
@@ -67,9 +67,8 @@ def _behind_joint(legs, leg, way, lump, state):
 
 def _along_bar(legs, leg, way, lump, state):
     """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
-    near, far, _ = bar_ends(legs, leg, way, *state)
-    line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
-    return (near if lump.joint == leg.bar_sites[0] else far) + lump.at_mm[0] * line
+    bar = bar_pose(legs, leg, way, *state)
+    return (bar.near if lump.joint == leg.bar_sites[0] else bar.far) + lump.at_mm[0] * bar.line
 
 
 def driven_loads(robot, motion, poses, gravity_mm_s2):

@@ -193,7 +193,7 @@ class ThreeLegs(Robot):
     def leg_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position by the legs' numbers, shape (n, 3 axes, 3 legs, k)."""
         by_position, by_leg = self.closure_jacobians(position_mm, actuators, deviations)
-        return -np.einsum("nal,nlc->nalc", np.linalg.inv(by_position), by_leg)
+        return np.linalg.inv(by_position)[..., None] * -by_leg[:, None]
 
     def actuator_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position by the actuator values, shape (n, 3, 3)."""
@@ -201,7 +201,8 @@ class ThreeLegs(Robot):
 
     def parameter_jacobian(self, position_mm, actuators, deviations=None):
         """Derivative of the position by the parameters, shape (n, 3, p)."""
-        return np.einsum("nalc,lcp->nap", self.leg_jacobian(position_mm, actuators, deviations), self.leg_map)
+        by_legs = self.leg_jacobian(position_mm, actuators, deviations)
+        return by_legs.reshape(*by_legs.shape[:2], -1) @ self.leg_map.reshape(-1, self.leg_map.shape[-1])
 
 
 def points(array):

@@ -14,9 +14,10 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from rrru.robots import walk_kernel
 from rrru.robots.legs import TOOL, WORLD, cross
-from rrru.robots.walk import Twists, bar_ends
-from rrru.robots.wrenches import by_group, frame_along, screw
+from rrru.robots.walk import Twists, bar_pose
+from rrru.robots.wrenches import by_group, screw
 
 _EYE = np.eye(3)
 
@@ -41,7 +42,7 @@ class TwistMap:
     def point(self):
         """Motion (n, 3, rows) of the measured point, in the world's frame, per unit of every constraint of A."""
         shift, turn = self.platform[:, :3], self.platform[:, 3:]
-        return self._in_world(shift + np.cross(turn, self.point_mm[:, :, None], axis=1))
+        return self._in_world(shift + cross(turn.transpose(0, 2, 1), self.point_mm[:, None]).transpose(0, 2, 1))
 
     @cached_property
     def turn(self):
@@ -51,7 +52,7 @@ class TwistMap:
     def _in_world(self, columns):
         """Vectors (n, 3, k) of the base's frame as the twist of the world turns them."""
         number = self.closure.legs.site_numbers[WORLD]
-        if number not in self._twists.turns:
+        if not self._twists.turn(number):
             return columns
         return Rotation.from_rotvec(self._twists.values[:, number, 3:]).as_matrix() @ columns
 
@@ -73,20 +74,20 @@ class TwistMap:
 
     @cached_property
     def _sites(self):
-        """Of every site of every leg: its number and the leg's, and of all their turns, places and own axes (s, n, ..).
+        """Of every site of every leg: its number and the leg's (S,), and of all their turns and places (S, n, ..).
 
         A site of several legs is there as often.
         """
         numbers, legs, turns, places = zip(*self._placed, strict=True)
-        own = [self._own(number, turn) for number, turn in zip(numbers, turns, strict=True)]
-        return np.array(numbers), np.array(legs), np.stack(turns), np.stack(places), np.stack(own)
+        return np.array(numbers), np.array(legs), np.stack(turns), np.stack(places)
 
     def _swept(self, motion):
-        """Motion (s, n, 3, 6) per twist at each of `_sites`, in its frame, from motion (n, 3, rows) per constraint."""
-        _, legs, turns, places, own = self._sites
-        each = np.stack([motion[:, :, rows] @ one for *_, one, rows in self._legs])[legs]
-        force, moment = each[..., :3], each[..., 3:]
-        return np.concatenate([force @ turns, (moment + cross(force, places[:, :, None])) @ own], axis=3)
+        """Motion (n, 3, S, 6) per twist at each of `_sites`, in its frame, from motion (n, 3, rows) per constraint."""
+        numbers, legs, turns, places = self._sites
+        each = np.stack([motion[:, :, rows] @ one for *_, one, rows in self._legs])
+        result = np.empty((*motion.shape[:2], len(numbers), 6))
+        walk_kernel.sweep(each, legs, numbers, turns, places, self._twists.values, result)
+        return result
 
     @cached_property
     def _moved(self):
@@ -99,14 +100,14 @@ class TwistMap:
         named = zip(leg.joints, way.turns, way.places, strict=True)
         result = {numbers[joint.name]: (turn, place) for joint, turn, place in named}
         if leg.bar:
-            near, far, _ = bar_ends(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
+            own = bar_pose(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
             bar, end = (numbers[name] for name in leg.bar_sites)
-            result |= {bar: (frame_along(far - near), near), end: (self.poses.turn, far)}
+            result |= {bar: (own.frame, own.near), end: (self.poses.turn, own.far)}
         return result
 
     def _own(self, number, turn):
         """Axes (n, 3, 3) about which small rotations of a site's vector turn, in space: its finite one is counted."""
-        if number not in self._twists.turns:
+        if not self._twists.turn(number):
             return turn
         vector = self._twists.values[:, number, 3:]
         angle = np.linalg.norm(vector, axis=1)[:, None, None]
@@ -132,7 +133,7 @@ class TwistMap:
 
     def _of_site(self, site, swept):
         """Motion (n, 3, 6) per twist at a site of legs, of those of all of them."""
-        return swept[self._sites[0] == self.closure.legs.site_numbers[site]].sum(axis=0)
+        return swept[:, :, self._sites[0] == self.closure.legs.site_numbers[site]].sum(axis=2)
 
     def effect(self, site):
         """Change (m, 3, 6) of what is read per twist at a site, in the site's frame: here `response`."""
@@ -163,7 +164,7 @@ class TwistMap:
         active = directions.any(axis=(1, 2))
         used = active[numbers]
         count, parameters = 6 * np.count_nonzero(used), directions.shape[2]
-        along = swept[used].transpose(1, 2, 0, 3).reshape(3 * len(self), count)
+        along = swept[:, :, used].reshape(3 * len(self), count)
         result = along @ directions[numbers[used]].reshape(count, parameters)
         result = result.reshape(len(self), 3, parameters)
         for name in (WORLD, TOOL, *self.closure.legs.reflectors):

@@ -4,12 +4,11 @@ Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.legs import turn_about
+from rrru.robots import walk_kernel
 
 
 @dataclass(frozen=True)
@@ -51,59 +50,64 @@ class Poses:
 
 @dataclass(frozen=True)
 class Walk:
-    """One leg at n points, by the order of its joints: turns (n, 3, 3) and places (n, 3) of the seats' frames.
+    """One leg at n points, by the order of its joints: turns (J, n, 3, 3) and places (J, n, 3) of the seats' frames.
 
-    Places are those after the seat's own twist, turns those before; axes (n, 3), None for a fixed joint. turn, place:
-    of what follows the last joint, the platform's frame or a bar's first ball joint.
+    Places are those after the seat's own twist, turns those before; axes (J, n, 3), none of a fixed joint. turn (n, 3,
+    3), place (n, 3): of what follows the last joint, the platform's frame or a bar's first ball joint.
     """
 
-    turns: tuple
-    places: tuple
-    axes: tuple
+    turns: np.ndarray
+    places: np.ndarray
+    axes: np.ndarray
     turn: np.ndarray
     place: np.ndarray
 
 
+@dataclass(frozen=True)
+class BarPose:
+    """A leg's bar at n points: near, far (n, 3): its ball joints; frame (n, 3, 3): x along it; lack_mm (n,): its length
+    beside what it spans.
+    """
+
+    near: np.ndarray
+    far: np.ndarray
+    frame: np.ndarray
+    lack_mm: np.ndarray
+
+    @property
+    def line(self):
+        """Unit vectors (n, 3) along it."""
+        return self.frame[:, :, 0]
+
+
 class Twists:
-    """Finite twists (n or 1, sites, 6) at the sites of Legs, shift first; most are none."""
+    """Finite twists, values (n or 1, sites, 6), at the sites of Legs, shift first; active (sites,): most are none."""
 
     def __init__(self, legs, values=None):
         shape = (1, len(legs.sites), 6)
-        self.values = np.zeros(shape) if values is None else np.asarray(values, dtype=float).reshape(-1, *shape[1:])
-        self.active = frozenset(np.flatnonzero(self.values.any(axis=(0, 2))).tolist())
+        given = np.zeros(shape) if values is None else np.reshape(values, (-1, *shape[1:]))
+        self.values = np.require(given, float, ["C", "W"])
+        self.active = self.values.any(axis=(0, 2))
 
-    @cached_property
-    def turns(self):
-        """Turns (n or 1, 3, 3) of the twists that turn, by the number of their site."""
-        turned = [k for k in self.active if self.values[:, k, 3:].any()]
-        return {k: Rotation.from_rotvec(self.values[:, k, 3:]).as_matrix() for k in turned}
+    def turn(self, number):
+        """Whether the twist at a site turns."""
+        return self.active[number] and self.values[:, number, 3:].any()
 
     def of(self, rows):
         """The twists of some rows."""
-        result, many = object.__new__(Twists), len(self.values) > 1
-        result.active, result.values = self.active, self.values[rows] if many else self.values
-        result.turns = {k: (turn[rows] if many else turn) for k, turn in self.turns.items()}
+        result = object.__new__(Twists)
+        result.active, result.values = self.active, self.values[rows] if len(self.values) > 1 else self.values
         return result
 
 
 def walk(legs, leg, actuators, passive, twists):
     """The Walk of a leg at actuator values (n, K) and passive values (n, k) under Twists."""
-    turn, place = np.broadcast_to(np.eye(3), (len(actuators), 3, 3)), np.zeros((len(actuators), 3))
-    turns, places, axes = [], [], []
-    for joint in leg.joints:
-        place, turn = place + turn @ joint.shift_mm, turn @ joint.turn
-        turns.append(turn)
-        number = legs.site_numbers[joint.name]
-        if number in twists.active:
-            place = place + (turn @ twists.values[:, number, :3, None])[..., 0]
-            turn = turn @ twists.turns[number] if number in twists.turns else turn
-        places.append(place)
-        axes.append(None if joint.kind == "fixed" else turn @ joint.axis)
-        if joint.kind == "R":
-            turn = turn @ turn_about(joint.axis, value_of(legs, joint, actuators, passive))
-        elif joint.kind == "P":
-            place = place + value_of(legs, joint, actuators, passive)[:, None] * axes[-1]
-    return Walk(tuple(turns), tuple(places), tuple(axes), turn @ leg.end_turn, place)
+    chain, n = legs.chains[leg.name], len(actuators)
+    values = np.concatenate([passive, legs.driven(actuators)], axis=1)
+    turns, places = np.empty((len(chain.frames), n, 3, 3)), np.empty((len(chain.frames), n, 3))
+    axes = np.empty((len(leg.joints), n, 3))
+    walk_kernel.follow(*chain, values, twists.values, twists.active, turns, places, axes)
+    return Walk(turns[:-1], places[:-1], axes, turns[-1], places[-1])
 
 
 def value_of(legs, joint, actuators, passive):
@@ -111,13 +115,16 @@ def value_of(legs, joint, actuators, passive):
     return passive[:, legs.passive_numbers[joint.name]] if joint.passive else legs.driven(actuators)[:, joint.drive]
 
 
-def bar_ends(legs, leg, way, poses, actuators, twists):
-    """Both ball joints (n, 3) of a leg's bar and its length (n,), at platform poses."""
+def bar_pose(legs, leg, way, poses, actuators, twists):
+    """The BarPose of a leg at platform Poses."""
     bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
-    point = leg.bar.platform_mm - twists.values[:, end_site, :3]
-    far = poses.position_mm + np.einsum("nij,nj->ni", poses.turn, np.broadcast_to(point, way.place.shape))
+    point, n = leg.bar.platform_mm - twists.values[:, end_site, :3], len(way.place)
+    # numba compiles anew for arrays that lie otherwise
+    own = (np.require(part, float, ["C", "W"]) for part in (way.place, poses.position_mm, poses.turn, point))
+    far, frame, span = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n)
+    walk_kernel.reach(*own, far, frame, span)
     driven = 0.0 if leg.bar.drive is None else legs.driven(actuators)[:, leg.bar.drive]
-    return way.place, far, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven
+    return BarPose(way.place, far, frame, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven - span)
 
 
 def walks(legs, actuators, passive, twists):

@@ -9,50 +9,17 @@ import numpy as np
 
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.legs import cross
-from rrru.robots.walk import Twists, bar_ends, walks
+from rrru.robots.walk import Twists, bar_pose, walks
 
 # passive motions that a leg's singular values, lengths counted in the arm, tell from none
 _RANK = 1e-7
 SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
 
 
-def groups_of(legs):
-    """Numbers of the legs of each group; legs that end apart are one."""
-    if legs.hands:
-        return (tuple(range(len(legs.legs))),)
-    result = []
-    for number, leg in enumerate(legs.legs):
-        own = {joint.name for joint in leg.joints if joint.passive}
-        # what legs share lies before where they part, in the first of them as in all
-        near = (group for group in result if own & {joint.name for joint in legs.legs[group[0]].joints})
-        group = next(near, None)
-        if group is None:
-            result.append([number])
-        else:
-            group.append(number)
-    return tuple(map(tuple, result))
-
-
 def screw(joint, axis, place):
     """Screw (n, 6) of a joint with axes (n, 3) through places (n, 3)."""
     turning = joint.kind == "R"
     return np.concatenate([cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
-
-
-def line_wrench(near, far):
-    """Wrench (n, 6) of unit force along the lines from near to far, both (n, 3): force and moment about the origin."""
-    line = far - near
-    line = line / np.linalg.norm(line, axis=1, keepdims=True)
-    return np.concatenate([line, cross(near, line)], axis=1)
-
-
-def frame_along(lines):
-    """Right-handed frames (n, 3, 3), columns their axes, whose x points along lines (n, 3)."""
-    x = lines / np.linalg.norm(lines, axis=1, keepdims=True)
-    helper = np.eye(3)[np.abs(x).argmin(axis=1)]
-    y = cross(helper, x)
-    y /= np.linalg.norm(y, axis=1, keepdims=True)
-    return np.stack([x, y, cross(x, y)], axis=2)
 
 
 def group_screws(legs, group, ways, spare=frozenset()):
@@ -75,7 +42,7 @@ def spare_joints(legs):
     """
     offset, result = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints))), set()
     ways = walks(legs, legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs))
-    for group in groups_of(legs):
+    for group in legs.groups:
         names, (screws,) = group_screws(legs, group, ways)
         ranks = [rank_of(screws[:, :count]) for count in range(len(names) + 1)]
         result |= {name for name, more in zip(names, np.diff(ranks), strict=True) if not more}
@@ -91,7 +58,7 @@ def rank_of(screws):
 def constraints_of(legs, spare):
     """Number of the wrenches of every group, `spare` the names of the joints that keep their values."""
     result = []
-    for group in groups_of(legs):
+    for group in legs.groups:
         joints = {joint.name for number in group for joint in legs.legs[number].joints if joint.passive}
         result.append(1 if legs.legs[group[0]].bar else 6 * len(group) - len(joints - spare))
     return result
@@ -103,11 +70,12 @@ def wrenches_of(legs, spare, ways, poses, actuators, twists):
     spare: names of joints that keep their values.
     """
     result = [None] * len(legs.legs)
-    for group in groups_of(legs):
+    for group in legs.groups:
         leg, way = legs.legs[group[0]], ways[group[0]]
         if leg.bar:
-            near, far, _ = bar_ends(legs, leg, way, poses, actuators, twists)
-            result[group[0]] = line_wrench(near, far)[:, None]
+            bar = bar_pose(legs, leg, way, poses, actuators, twists)
+            # a unit force along it
+            result[group[0]] = np.concatenate([bar.line, cross(bar.near, bar.line)], axis=1)[:, None]
             continue
         both = _beside(group_screws(legs, group, ways, spare)[1])
         for row, number in enumerate(group):
@@ -126,4 +94,4 @@ def _beside(screws):
 
 def by_group(legs, wrenches):
     """Wrenches (n, r, 6) on the platform by groups of legs, from those of the legs."""
-    return [sum((wrenches[k] for k in group[1:]), wrenches[group[0]]) for group in groups_of(legs)]
+    return [sum((wrenches[k] for k in group[1:]), wrenches[group[0]]) for group in legs.groups]

@@ -11,8 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.robots.closure import Closure
-from rrru.robots.walk import Poses, Twists, bar_ends, walk
-from rrru.robots.wrenches import line_wrench, screw
+from rrru.robots.legs import cross, turn_about
+from rrru.robots.walk import Poses, Twists, Walk, value_of
+from rrru.robots.wrenches import screw
 
 _ARM_MM = 500.0
 _SCALE = np.repeat([_ARM_MM, 1.0], 3)
@@ -48,6 +49,34 @@ def solve(legs, actuators, start, twists=None):
     return Poses(position, turn, passive, left, closed)
 
 
+def walk(legs, leg, actuators, passive, twists):
+    """The Walk of a leg at actuator values (n, K) and passive values (n, k) under Twists."""
+    turn, place = np.broadcast_to(np.eye(3), (len(actuators), 3, 3)), np.zeros((len(actuators), 3))
+    turns, places, axes = [], [], []
+    for joint in leg.joints:
+        place, turn = place + turn @ joint.shift_mm, turn @ joint.turn
+        turns.append(turn)
+        twist = twists.values[:, legs.site_numbers[joint.name]]
+        place = place + (turn @ twist[:, :3, None])[..., 0]
+        turn = turn @ Rotation.from_rotvec(twist[:, 3:]).as_matrix()
+        places.append(place)
+        axes.append(np.zeros_like(place) if joint.kind == "fixed" else turn @ joint.axis)
+        if joint.kind == "R":
+            turn = turn @ turn_about(joint.axis, value_of(legs, joint, actuators, passive))
+        elif joint.kind == "P":
+            place = place + value_of(legs, joint, actuators, passive)[:, None] * axes[-1]
+    return Walk(tuple(turns), tuple(places), tuple(axes), turn @ leg.end_turn, place)
+
+
+def bar_ends(legs, leg, way, poses, actuators, twists):
+    """Both ball joints (n, 3) of a leg's bar and its length (n,), at platform poses."""
+    bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
+    point = leg.bar.platform_mm - twists.values[:, end_site, :3]
+    far = poses.position_mm + np.einsum("nij,nj->ni", poses.turn, np.broadcast_to(point, way.place.shape))
+    driven = 0.0 if leg.bar.drive is None else legs.driven(actuators)[:, leg.bar.drive]
+    return way.place, far, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven
+
+
 def _step(legs, ranks, actuators, poses, twists):
     """Shift (n, 3) and rotation (n, 3) of the platform and changes (n, k) of the passive joints."""
     total, pull, chains = 0.0, 0.0, []
@@ -55,7 +84,8 @@ def _step(legs, ranks, actuators, poses, twists):
         way = walk(legs, leg, actuators, poses.passive, twists)
         if leg.bar:
             near, far, length = bar_ends(legs, leg, way, poses, actuators, twists)
-            line = line_wrench(near, far) * _SCALE / _ARM_MM
+            line = (far - near) / np.linalg.norm(far - near, axis=1, keepdims=True)
+            line = np.concatenate([line, cross(near, line)], axis=1) * _SCALE / _ARM_MM
             total = total + line[:, :, None] * line[:, None, :]
             pull = pull + line * (length - np.linalg.norm(far - near, axis=1))[:, None] / _ARM_MM
         else:

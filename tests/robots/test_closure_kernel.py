@@ -11,7 +11,7 @@ from rrru.robots.delta import Delta
 from rrru.robots.legs import Bar, Joint, Leg, Legs, X, Y, Z, turn_about
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
-from rrru.robots.walk import Poses, Twists
+from rrru.robots.walk import Poses, Twists, bar_pose, walks
 from rrru.robots.wrenches import constraints_of, spare_joints
 from tests.reference import closure as slow
 
@@ -165,6 +165,30 @@ def test_compiled_poses_equal_numpys_within_1e_9_mm(name, twisted):
     np.testing.assert_allclose(fast.turn, plain.turn, rtol=0.0, atol=1e-12)
     if name != "balls":
         np.testing.assert_allclose(fast.passive, plain.passive, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("count", [POINTS, 1])
+def test_compiled_walks_and_bars_equal_numpys(name, count):
+    legs, actuators, start = CASES[name]()
+    twists = Twists(legs, _twists(legs, count))
+    for leg, way in zip(legs.legs, walks(legs, actuators, start.passive, twists), strict=True):
+        plain = slow.walk(legs, leg, actuators, start.passive, twists)
+        for part in ("turns", "places", "axes", "turn", "place"):
+            fast, expected = getattr(way, part), np.reshape(getattr(plain, part), getattr(way, part).shape)
+            np.testing.assert_allclose(fast, expected, rtol=0.0, atol=1e-11, err_msg=part)
+        if leg.bar:
+            bar = bar_pose(legs, leg, way, start, actuators, twists)
+            near, far, length = slow.bar_ends(legs, leg, plain, start, actuators, twists)
+            span = np.linalg.norm(far - near, axis=1)
+            np.testing.assert_allclose(bar.far, far, rtol=0.0, atol=1e-11)
+            np.testing.assert_allclose(bar.line, (far - near) / span[:, None], rtol=0.0, atol=1e-13)
+            np.testing.assert_allclose(bar.lack_mm, length - span, rtol=0.0, atol=1e-11)
+            # right-handed and square
+            np.testing.assert_allclose(
+                bar.frame @ bar.frame.transpose(0, 2, 1), np.tile(np.eye(3), (POINTS, 1, 1)), atol=1e-14
+            )
+            np.testing.assert_allclose(np.linalg.det(bar.frame), 1.0, atol=1e-14)
 
 
 def test_chains_with_a_joint_too_many_close_under_any_twists_and_keep_its_value():

@@ -164,6 +164,23 @@ def test_the_response_at_every_site_is_the_closures_slope(setting):
     assert (size[:, 0] > 1e-3).all() and ((size[:, 1] > 1e-3) == ~np.array(dead)).all()
 
 
+def test_the_response_of_an_arm_is_the_slope_under_turns_of_half_a_radian():
+    robot, points, actuators = _about_home(GENERAL["coupled"])
+    twists = np.random.default_rng(8).normal(size=(_COUNT, len(robot.legs.sites), 6)) * np.repeat([5.0, 0.3], 3)
+    twists[:, [robot.legs.site_numbers[site] for site in (WORLD, TOOL)]] = 0.0
+    own = Setting(robot, points, actuators, twists, robot.solve(actuators, points, twists))
+    at = robot.map(actuators, own.poses, twists)
+    for site in _inner_sites(robot):
+
+        def along(component, step, number=robot.legs.site_numbers[site]):
+            changed = twists.copy()
+            changed[:, number, component] += step
+            return actuators, changed
+
+        slope = own.differences(along, _STEPS)
+        np.testing.assert_allclose(at.response(site), slope, rtol=0.0, atol=1e-6 * np.abs(slope).max())
+
+
 def test_the_drives_response_is_the_closures_slope(setting):
     units = setting.robot.parts.units
 

@@ -7,7 +7,6 @@ from rrru.robots.delta import Delta
 from rrru.robots.from_file import from_mjcf
 from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.walk import Poses
-from rrru.robots.wrenches import groups_of
 from tests.robots.mjcf import GEOM, delta_mjcf, file_of, text_of
 
 DELTA, FOOT = Delta(), np.array([50.0, 80.0, 900.0])
@@ -38,7 +37,7 @@ def poses(robot):
 
 def test_the_platform_stands_and_the_free_arm_hangs_where_the_deltas_do(robot, poses):
     assert robot.parts.columns == ["theta1_rad", "theta3_rad", "push_mm"]
-    assert sorted(map(len, groups_of(robot.legs))) == [1, 1, 1, 1, 1, 2]
+    assert sorted(map(len, robot.legs.groups)) == [1, 1, 1, 1, 1, 2]
     np.testing.assert_allclose(poses.position_mm, POINTS, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(poses.turn, np.tile(np.eye(3), (len(POINTS), 1, 1)), rtol=0.0, atol=1e-11)
     arm = poses.passive[:, robot.legs.passive_numbers["theta2"]]
@@ -86,7 +85,7 @@ def test_the_legs_bear_any_load_and_the_free_arm_none_about_its_axis(robot, pose
     load = np.random.default_rng(3).normal(size=(len(POINTS), 6)) * np.repeat([10.0, 3000.0], 3)
     wrenches = at.wrenches(load)
     np.testing.assert_allclose(wrenches.sum(axis=0), -load, rtol=0.0, atol=1e-6)
-    group = next(group for group in groups_of(robot.legs) if len(group) == 2)
+    group = next(group for group in robot.legs.groups if len(group) == 2)
     both = wrenches[list(group)].sum(axis=0)
     turn, place = at.frames[robot.legs.site_numbers["theta2"]]
     axis = turn @ next(joint.axis for joint in robot.legs.joints if joint.name == "theta2")
