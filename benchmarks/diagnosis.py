@@ -25,8 +25,8 @@ from rrru.studies.withheld.robots import Conditions
 
 # kind of campaign, points of a line and of the spiral
 SIZES = {222: ("paper", 26, 40), 732: ("full", 26, 40), 5008: ("full", 178, 273)}
-_ROBOTS, _CAMPAIGNS, _GROUP = (1, 2, 4, 5, 6), (10, 100, 1000), 10
-# of the many: few points and one cause, so that a thousand take minutes
+_ROBOTS, _CAMPAIGNS, _GROUP = (1, 2, 4, 5, 6), (10, 100, 1000, 10000), 10
+# of the many: few points and one cause; ten thousand take an hour and a half
 _SHORT, _FEW = ("line_1", "spiral"), ("backlash",)
 _BY_POINTS = "ratio: seconds a point over those of the same robot at 222 points"
 _BY_CAMPAIGNS = "ratio: seconds a campaign over those of the first ten; 66 points, one cause"

@@ -65,8 +65,9 @@ class Walk:
 
 @dataclass(frozen=True)
 class BarPose:
-    """A leg's bar at n points: near, far (n, 3): its ball joints; frame (n, 3, 3): x along it; lack_mm (n,): its length
-    beside what it spans.
+    """A leg's bar at n points: its ball joints near and far (n, 3), its frame (n, 3, 3), whose x runs along it.
+
+    lack_mm (n,): by how much it is longer than what it spans.
     """
 
     near: np.ndarray
@@ -101,8 +102,13 @@ class Twists:
 
 
 def walk(legs, leg, actuators, passive, twists):
-    """The Walk of a leg at actuator values (n, K) and passive values (n, k) under Twists."""
+    """The Walk of a leg at actuator values (n, K) and passive values (n, k) under Twists.
+
+    Raises ValueError for twists at another number of points.
+    """
     chain, n = legs.chains[leg.name], len(actuators)
+    if len(twists.values) not in (1, n):
+        raise ValueError(f"twists at {len(twists.values)} points; allowed: 1 or {n}")
     values = np.concatenate([passive, legs.driven(actuators)], axis=1)
     turns, places = np.empty((len(chain.frames), n, 3, 3)), np.empty((len(chain.frames), n, 3))
     axes = np.empty((len(leg.joints), n, 3))
@@ -119,10 +125,10 @@ def bar_pose(legs, leg, way, poses, actuators, twists):
     """The BarPose of a leg at platform Poses."""
     bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
     point, n = leg.bar.platform_mm - twists.values[:, end_site, :3], len(way.place)
-    # numba compiles anew for arrays that lie otherwise
-    own = (np.require(part, float, ["C", "W"]) for part in (way.place, poses.position_mm, poses.turn, point))
+    given = way.place, np.broadcast_to(poses.position_mm, (n, 3)), np.broadcast_to(poses.turn, (n, 3, 3)), point
     far, frame, span = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n)
-    walk_kernel.reach(*own, far, frame, span)
+    # numba compiles anew for arrays that lie otherwise
+    walk_kernel.reach(*(np.require(part, float, ["C", "W"]) for part in given), far, frame, span)
     driven = 0.0 if leg.bar.drive is None else legs.driven(actuators)[:, leg.bar.drive]
     return BarPose(way.place, far, frame, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven - span)
 

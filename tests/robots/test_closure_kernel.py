@@ -191,6 +191,12 @@ def test_compiled_walks_and_bars_equal_numpys(name, count):
             np.testing.assert_allclose(np.linalg.det(bar.frame), 1.0, atol=1e-14)
 
 
+def test_twists_at_another_number_of_points_are_refused():
+    legs, actuators, start = CASES["hexapod"]()
+    with pytest.raises(ValueError, match="twists at 7 points; allowed: 1 or 30"):
+        walks(legs, actuators, start.passive, Twists(legs, _twists(legs, 7)))
+
+
 def test_chains_with_a_joint_too_many_close_under_any_twists_and_keep_its_value():
     legs, actuators, start = CASES["balls"]()
     closure, twists = Closure(legs), Twists(legs, _twists(legs))
