@@ -15,7 +15,7 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.closure_tables import closed, tables
-from rrru.robots.walk import Poses, Twists, walks
+from rrru.robots.walk import Poses, Twists
 from rrru.robots.wrenches import SCALE, by_group, constraints_of, spare_joints, wrenches_of
 
 
@@ -41,13 +41,9 @@ class Closure:
         slices = {k: slice(*ends[row : row + 2]) for row, group in enumerate(groups) for k in group}
         self.row_count, self.rows = int(ends[-1]), [slices[k] for k in range(len(legs.legs))]
 
-    def walks(self, actuators, passive, twists):
-        """The Walks of all legs."""
-        return walks(self.legs, actuators, passive, twists)
-
-    def wrenches(self, ways, poses, actuators, twists):
+    def wrenches(self, ways, _poses):
         """Wrenches (n, r, 6) of every leg that its passive joints do not feel."""
-        return wrenches_of(self.legs, self._spare, ways, poses, actuators, twists)
+        return wrenches_of(self.legs, self._spare, ways)
 
     def inverse(self, wrenches):
         """Twists (n, 6, rows) of the platform per constraint, the inverse of the wrenches A of all legs."""

@@ -28,8 +28,8 @@ def _free_twists(legs):
     """Twists (k, 6) at the world's origin, lengths counted in the arm, that no leg resists."""
     twists, actuators = Twists(legs), legs.home_drives[None]
     home = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
-    ways = walks(legs, actuators, home.passive, twists)
-    rows = by_group(legs, wrenches_of(legs, spare_joints(legs), ways, home, actuators, twists))
+    ways = walks(legs, actuators, home, twists)
+    rows = by_group(legs, wrenches_of(legs, spare_joints(legs), ways))
     wrenches = np.concatenate([np.zeros((6, 6)), *(one[0] for one in rows)]) * _SCALE
     _, size, vectors = np.linalg.svd(wrenches / np.maximum(np.linalg.norm(wrenches, axis=1, keepdims=True), 1e-300))
     return vectors[size <= _NONE * size[0]]

@@ -17,7 +17,7 @@ from rrru.errors import ConfigError
 from rrru.robots.general import GeneralRobot
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.lumps import PLATFORM
-from rrru.robots.walk import Poses, Twists, walk, walks
+from rrru.robots.walk import Poses, Twists, walk
 
 _EYE = np.eye(6)
 # point masses of two arms' descriptions are the same within this
@@ -39,11 +39,7 @@ class Ends:
     def __init__(self, legs):
         self.legs, self.rows = legs, [slice(0, 6)] * len(legs.legs)
 
-    def walks(self, actuators, passive, twists):
-        """The Walks of all legs."""
-        return walks(self.legs, actuators, passive, twists)
-
-    def wrenches(self, _ways, poses, _actuators, _twists):
+    def wrenches(self, _ways, poses):
         """Wrenches (n, 6, 6) of every leg: all six where its hand is read, none elsewhere."""
         return [np.where((poses.leg == number)[:, None, None], _EYE, 0.0) for number in range(len(self.legs.legs))]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rrru.robots.legs import cross, turn_about
-from rrru.robots.walk import Twists, bar_pose, value_of
+from rrru.robots.walk import Twists, value_of, walks
 
 # steps of the differences: in time, and of a driven value in rad or mm
 _STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
@@ -38,8 +38,7 @@ def places(robot, actuators, poses, twists=None):
 
     twists: finite ones (1, sites, 6) at the sites.
     """
-    there = Twists(robot.legs, twists)
-    ways = dict(zip(robot.legs.legs, robot.model.walks(actuators, poses.passive, there), strict=True))
+    ways = dict(zip(robot.legs.legs, walks(robot.legs, actuators, poses, Twists(robot.legs, twists)), strict=True))
     holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
     result = []
     for lump in robot.lumps:
@@ -47,14 +46,16 @@ def places(robot, actuators, poses, twists=None):
             result.append(poses.point(lump.at_mm))
             continue
         leg = holders[lump.joint]
-        frame = _along_bar if lump.joint in leg.bar_sites else _behind_joint
-        result.append(frame(robot.legs, leg, ways[leg], lump, (poses, actuators, there)))
+        if lump.joint in leg.bar_sites:
+            result.append(_along_bar(leg, ways[leg], lump))
+        else:
+            result.append(_behind_joint(robot.legs, leg, ways[leg], lump, (poses, actuators)))
     return np.stack(result, axis=1)
 
 
 def _behind_joint(legs, leg, way, lump, state):
     """Places (n, 3) of a lump fixed in the frame behind the motion of a joint."""
-    (poses, actuators, _), number = state, [joint.name for joint in leg.joints].index(lump.joint)
+    (poses, actuators), number = state, [joint.name for joint in leg.joints].index(lump.joint)
     joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
     if joint.kind != "fixed":
         known = value_of(legs, joint, actuators, poses.passive)
@@ -65,10 +66,10 @@ def _behind_joint(legs, leg, way, lump, state):
     return place + turn @ lump.at_mm
 
 
-def _along_bar(legs, leg, way, lump, state):
+def _along_bar(leg, way, lump):
     """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
-    bar = bar_pose(legs, leg, way, *state)
-    return (bar.near if lump.joint == leg.bar_sites[0] else bar.far) + lump.at_mm[0] * bar.line
+    end = way.bar.near if lump.joint == leg.bar_sites[0] else way.bar.far
+    return end + lump.at_mm[0] * way.bar.line
 
 
 def driven_loads(robot, motion, poses, gravity_mm_s2):

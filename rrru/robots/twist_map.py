@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots import walk_kernel
 from rrru.robots.legs import TOOL, WORLD, cross
-from rrru.robots.walk import Twists, bar_pose
+from rrru.robots.walk import Twists, walks
 from rrru.robots.wrenches import by_group, screw
 
 _EYE = np.eye(3)
@@ -32,7 +32,7 @@ class TwistMap:
         self.closure, self.poses, self._twists = closure, poses, Twists(closure.legs, twists)
         self._actuators = np.asarray(actuators, dtype=float)
         self.point_mm = poses.point(np.asarray(tool_mm, dtype=float))
-        self._ways = closure.walks(self._actuators, poses.passive, self._twists)
+        self._ways = walks(closure.legs, self._actuators, poses, self._twists)
         self._wrenches, self.platform = _factors(closure, self._ways, poses, self._actuators, self._twists)
 
     def __len__(self):
@@ -100,9 +100,8 @@ class TwistMap:
         named = zip(leg.joints, way.turns, way.places, strict=True)
         result = {numbers[joint.name]: (turn, place) for joint, turn, place in named}
         if leg.bar:
-            own = bar_pose(self.closure.legs, leg, way, self.poses, self._actuators, self._twists)
             bar, end = (numbers[name] for name in leg.bar_sites)
-            result |= {bar: (own.frame, own.near), end: (self.poses.turn, own.far)}
+            result |= {bar: (way.bar.frame, way.bar.near), end: (self.poses.turn, way.bar.far)}
         return result
 
     def _own(self, number, turn):
@@ -229,11 +228,11 @@ class TwistMap:
 def _factors(closure, ways, poses, actuators, twists):
     """`Closure.wrenches` and `Closure.inverse`, NaN where a pose is not known."""
     if poses.closed.all():
-        wrenches = closure.wrenches(ways, poses, actuators, twists)
+        wrenches = closure.wrenches(ways, poses)
         return wrenches, closure.inverse(wrenches)
     rows, n = np.flatnonzero(poses.closed), len(poses.closed)
     own, known, given = twists.of(rows), poses.of(rows), actuators[rows]
-    wrenches = closure.wrenches(closure.walks(given, known.passive, own), known, given, own)
+    wrenches = closure.wrenches(walks(closure.legs, given, known, own), known)
     return [_spread(one, rows, n) for one in wrenches], _spread(closure.inverse(wrenches), rows, n)
 
 

@@ -3,7 +3,7 @@
 Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -49,21 +49,6 @@ class Poses:
 
 
 @dataclass(frozen=True)
-class Walk:
-    """One leg at n points, by the order of its joints: turns (J, n, 3, 3) and places (J, n, 3) of the seats' frames.
-
-    Places are those after the seat's own twist, turns those before; axes (J, n, 3), none of a fixed joint. turn (n, 3,
-    3), place (n, 3): of what follows the last joint, the platform's frame or a bar's first ball joint.
-    """
-
-    turns: np.ndarray
-    places: np.ndarray
-    axes: np.ndarray
-    turn: np.ndarray
-    place: np.ndarray
-
-
-@dataclass(frozen=True)
 class BarPose:
     """A leg's bar at n points: its ball joints near and far (n, 3), its frame (n, 3, 3), whose x runs along it.
 
@@ -79,6 +64,23 @@ class BarPose:
     def line(self):
         """Unit vectors (n, 3) along it."""
         return self.frame[:, :, 0]
+
+
+@dataclass(frozen=True)
+class Walk:
+    """One leg at n points, by the order of its joints: turns (J, n, 3, 3) and places (J, n, 3) of the seats' frames.
+
+    Places are those after the seat's own twist, turns those before; axes (J, n, 3), none of a fixed joint. turn (n, 3,
+    3), place (n, 3): of what follows the last joint, the platform's frame or a bar's first ball joint; bar: the bar
+    there, where the platform's pose is known.
+    """
+
+    turns: np.ndarray
+    places: np.ndarray
+    axes: np.ndarray
+    turn: np.ndarray
+    place: np.ndarray
+    bar: BarPose | None = None
 
 
 class Twists:
@@ -122,17 +124,23 @@ def value_of(legs, joint, actuators, passive):
 
 
 def bar_pose(legs, leg, way, poses, actuators, twists):
-    """The BarPose of a leg at platform Poses."""
+    """The BarPose of a leg at platform Poses; raises ValueError for those of another number of points."""
     bar_site, end_site = (legs.site_numbers[name] for name in leg.bar_sites)
     point, n = leg.bar.platform_mm - twists.values[:, end_site, :3], len(way.place)
-    given = way.place, np.broadcast_to(poses.position_mm, (n, 3)), np.broadcast_to(poses.turn, (n, 3, 3)), point
-    far, frame, span = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n)
+    if len(poses.position_mm) != n or len(poses.turn) != n:
+        raise ValueError(f"poses at {len(poses.position_mm)} points; allowed: {n}")
     # numba compiles anew for arrays that lie otherwise
-    walk_kernel.reach(*(np.require(part, float, ["C", "W"]) for part in given), far, frame, span)
+    given = (np.require(part, float, ["C", "W"]) for part in (way.place, poses.position_mm, poses.turn, point))
+    far, frame, span = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n)
+    walk_kernel.reach(*given, far, frame, span)
     driven = 0.0 if leg.bar.drive is None else legs.driven(actuators)[:, leg.bar.drive]
     return BarPose(way.place, far, frame, leg.bar.length_mm + twists.values[:, bar_site, 0] + driven - span)
 
 
-def walks(legs, actuators, passive, twists):
-    """The Walks of all legs."""
-    return [walk(legs, leg, actuators, passive, twists) for leg in legs.legs]
+def walks(legs, actuators, poses, twists):
+    """The Walks of all legs at actuator values (n, K) and Poses that fit them under Twists."""
+    result = [walk(legs, leg, actuators, poses.passive, twists) for leg in legs.legs]
+    return [
+        replace(way, bar=bar_pose(legs, leg, way, poses, actuators, twists)) if leg.bar else way
+        for leg, way in zip(legs.legs, result, strict=True)
+    ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from rrru.robots.closure_kernel import ARM_MM
 from rrru.robots.legs import cross
-from rrru.robots.walk import Twists, bar_pose, walks
+from rrru.robots.walk import Twists, walk
 
 # passive motions that a leg's singular values, lengths counted in the arm, tell from none
 _RANK = 1e-7
@@ -41,7 +41,8 @@ def spare_joints(legs):
     They keep their values: a link between two ball joints does not spin.
     """
     offset, result = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints))), set()
-    ways = walks(legs, legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs))
+    drives, passive, twists = legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs)
+    ways = [walk(legs, leg, drives, passive, twists) for leg in legs.legs]
     for group in legs.groups:
         names, (screws,) = group_screws(legs, group, ways)
         ranks = [rank_of(screws[:, :count]) for count in range(len(names) + 1)]
@@ -64,7 +65,7 @@ def constraints_of(legs, spare):
     return result
 
 
-def wrenches_of(legs, spare, ways, poses, actuators, twists):
+def wrenches_of(legs, spare, ways):
     """Wrenches (n, r, 6) of every leg, which together with its group's others the passive joints do not feel.
 
     spare: names of joints that keep their values.
@@ -73,9 +74,9 @@ def wrenches_of(legs, spare, ways, poses, actuators, twists):
     for group in legs.groups:
         leg, way = legs.legs[group[0]], ways[group[0]]
         if leg.bar:
-            bar = bar_pose(legs, leg, way, poses, actuators, twists)
             # a unit force along it
-            result[group[0]] = np.concatenate([bar.line, cross(bar.near, bar.line)], axis=1)[:, None]
+            line = way.bar.line
+            result[group[0]] = np.concatenate([line, cross(way.bar.near, line)], axis=1)[:, None]
             continue
         both = _beside(group_screws(legs, group, ways, spare)[1])
         for row, number in enumerate(group):

@@ -11,7 +11,7 @@ from rrru.robots.delta import Delta
 from rrru.robots.legs import Bar, Joint, Leg, Legs, X, Y, Z, turn_about
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
-from rrru.robots.walk import Poses, Twists, bar_pose, walks
+from rrru.robots.walk import Poses, Twists, walks
 from rrru.robots.wrenches import constraints_of, spare_joints
 from tests.reference import closure as slow
 
@@ -172,13 +172,13 @@ def test_compiled_poses_equal_numpys_within_1e_9_mm(name, twisted):
 def test_compiled_walks_and_bars_equal_numpys(name, count):
     legs, actuators, start = CASES[name]()
     twists = Twists(legs, _twists(legs, count))
-    for leg, way in zip(legs.legs, walks(legs, actuators, start.passive, twists), strict=True):
+    for leg, way in zip(legs.legs, walks(legs, actuators, start, twists), strict=True):
         plain = slow.walk(legs, leg, actuators, start.passive, twists)
         for part in ("turns", "places", "axes", "turn", "place"):
             fast, expected = getattr(way, part), np.reshape(getattr(plain, part), getattr(way, part).shape)
             np.testing.assert_allclose(fast, expected, rtol=0.0, atol=1e-11, err_msg=part)
         if leg.bar:
-            bar = bar_pose(legs, leg, way, start, actuators, twists)
+            bar = way.bar
             near, far, length = slow.bar_ends(legs, leg, plain, start, actuators, twists)
             span = np.linalg.norm(far - near, axis=1)
             np.testing.assert_allclose(bar.far, far, rtol=0.0, atol=1e-11)
@@ -194,7 +194,7 @@ def test_compiled_walks_and_bars_equal_numpys(name, count):
 def test_twists_at_another_number_of_points_are_refused():
     legs, actuators, start = CASES["hexapod"]()
     with pytest.raises(ValueError, match="twists at 7 points; allowed: 1 or 30"):
-        walks(legs, actuators, start.passive, Twists(legs, _twists(legs, 7)))
+        walks(legs, actuators, start, Twists(legs, _twists(legs, 7)))
 
 
 def test_chains_with_a_joint_too_many_close_under_any_twists_and_keep_its_value():
@@ -205,7 +205,7 @@ def test_chains_with_a_joint_too_many_close_under_any_twists_and_keep_its_value(
     assert poses.closed.all()
     kept = [joint.name.startswith("end z") for joint in legs.passive_joints]
     assert ((poses.passive == start.passive) == kept).all()
-    for way in closure.walks(actuators, poses.passive, twists):
+    for way in walks(legs, actuators, poses, twists):
         np.testing.assert_allclose(slow.lack_of(way, poses), 0.0, rtol=0.0, atol=1e-9)
 
 

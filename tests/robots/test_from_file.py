@@ -10,7 +10,7 @@ from rrru.robots.from_file import from_mjcf, from_urdf
 from rrru.robots.hexapod import hexapod
 from rrru.robots.lumps import driven_loads, places
 from rrru.robots.rrru3 import Rrru3
-from rrru.robots.walk import Poses, Twists
+from rrru.robots.walk import Poses, Twists, walks
 from tests.robots.mjcf import (
     ARM,
     CRANKED,
@@ -377,7 +377,7 @@ def test_a_home_pose_of_rounded_numbers_is_closed(tmp_path):
     )
     home = Poses(robot.legs.home_mm[None], robot.legs.home_turn[None], robot.legs.home_passive[None], None, None)
     np.testing.assert_allclose(_turned(home)[0, 1], coupler, atol=1e-12)
-    ways = robot.model.walks(robot.legs.home_drives[None], home.passive, Twists(robot.legs))
+    ways = walks(robot.legs, robot.legs.home_drives[None], home, Twists(robot.legs))
     assert not any(leg.bar for leg in robot.legs.legs)
     for way in ways:
         assert np.abs(way.place - home.position_mm).max() < 1e-9
