@@ -36,26 +36,31 @@ def drives_at(robot, place, start, twists, nearest=True):
     (position, wanted), (actuators, near) = place, start
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
     (low, high), widths = np.asarray(robot.drive_range, dtype=float).T, _widths(robot)
+    rows, going = np.arange(len(position)), np.isfinite(actuators).all(axis=1)
     for _ in range(_STEPS):
-        rows = np.flatnonzero(poses.closed & np.isfinite(actuators).all(axis=1) & ~(left < _REACHED_MM))
+        going = going & poses.closed & ~(left[rows] < _REACHED_MM)
+        rows, poses = rows[going], poses.of(going)
         if not len(rows):
             break
         own = twists[rows] if len(twists) > 1 else twists
-        at = robot.map(actuators[rows], poses.of(rows), own)
+        at = robot.map(actuators[rows], poses, own)
         lack = position[rows] - robot.measured(at.poses, own)
         turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
         step, held, lost = drive_step(at, robot.freedoms, lack, turning, widths)
+        longest, gain = np.abs(step).max(axis=1), (at.drive_response @ (widths * step)[:, :, None])[:, :, 0]
+        # what no drive changes stays: a point off the plane that a planar robot keeps to
+        off = np.linalg.norm(lack - gain, axis=1)
+        going = nearest | lost | (longest >= _STILL) | (off < 1e3 * _REACHED_MM)
         if nearest:
             # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
-            lack = np.where(lost[:, None], lack, (at.drive_response @ (widths * step)[:, :, None])[:, :, 0])
+            lack = np.where(lost[:, None], lack, gain)
         left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
-        longest = np.abs(step).max(axis=1)
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
         # a stretched arm is led nowhere by what it cannot do there
         still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
         step[still] = np.where(actuators[rows] - low > high - actuators[rows], -_AWAY, _AWAY)[still]
         actuators[rows] += widths * step
-        poses = robot.model.solve(actuators, poses, twists)
+        poses = robot.model.solve(actuators[rows], poses, own)
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
 

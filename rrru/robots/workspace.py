@@ -18,9 +18,11 @@ def slice_points(plane, at_mm, horizontal_mm, vertical_mm, step_mm):
     return points
 
 
-def measures(mechanism, points_mm):
-    """Reachable (n,), translational and constraint measure (n,), constraint determinant (n,); NaN out of reach."""
-    theta = mechanism.planned(points_mm)
+def measures(mechanism, points_mm, theta):
+    """Reachable (n,), translational and constraint measure (n,), constraint determinant (n,); NaN out of reach.
+
+    theta (n, K): the actuator values of the points, as `planned` gives them.
+    """
     # of the poses that these actuator values allow, the robot takes the one of its own assembly
     reachable = np.linalg.norm(mechanism.forward(theta, guess_mm=points_mm) - points_mm, axis=1) < 1e-6
     result = np.full((3, len(points_mm)), np.nan)

@@ -32,9 +32,9 @@ def workspace_table(robot, measurements):
     step, frames = reach / robot.workspace_lines, []
     for plane, places, vertical in (("xz", (0.0, side), down), ("xy", (height,), across)):
         grids = (workspace.slice_points(plane, at, across, vertical, step) for at in places)
-        points = _around_reachable(robot, grids, step)
+        points, actuators = _around_reachable(robot, grids, step)
         names = ("reachable", "translational_measure", "constraint_measure", "constraint_determinant")
-        measures = dict(zip(names, workspace.measures(robot, points), strict=True))
+        measures = dict(zip(names, workspace.measures(robot, points, actuators), strict=True))
         frames.append(pd.DataFrame(points, columns=["x_mm", "y_mm", "z_mm"]).assign(slice=plane, **measures))
     return pd.concat(frames, ignore_index=True)
 
@@ -77,14 +77,16 @@ def unadvised(advice):
 
 
 def _around_reachable(robot, grids, step_mm):
-    """Points (n, 3) of the first grid of which the robot reaches some, in the box of these, widened by a tenth or step.
+    """Points (n, 3) of the first grid of which the robot reaches some, and their actuator values (n, K).
 
-    All of the last one where it reaches none.
+    Those in the box of what it reaches, widened by a tenth or step; all of the last grid where it reaches nothing.
     """
     for points in grids:
-        reachable = points[np.isfinite(robot.planned(points)).all(axis=1)]
+        actuators = robot.planned(points)
+        reachable = points[np.isfinite(actuators).all(axis=1)]
         if len(reachable):
             low, high = reachable.min(axis=0), reachable.max(axis=0)
             margin = np.maximum(0.1 * (high - low), 1.5 * step_mm)
-            return points[((points >= low - margin) & (points <= high + margin)).all(axis=1)]
-    return points
+            near = ((points >= low - margin) & (points <= high + margin)).all(axis=1)
+            return points[near], actuators[near]
+    return points, actuators

@@ -57,7 +57,7 @@ def singularity(settings):
     frames = []
     for plane, at, vertical in (("xz", 0.0, (-reach, 0.0)), ("xy", float(np.mean(section["z_mm"])), (-reach, reach))):
         points = workspace.slice_points(plane, at, (-reach, reach), vertical, _GRID_STEP_MM)
-        reachable, translational, constraint, _ = workspace.measures(mechanism, points)
+        reachable, translational, constraint, _ = workspace.measures(mechanism, points, mechanism.planned(points))
         slider = mechanism.inverse(points)
         determinant = np.full(len(points), np.nan)
         determinant[reachable] = np.linalg.det(mechanism.jacobian(points[reachable], slider[reachable]))
