@@ -64,7 +64,7 @@ def test_locked_drives_resist_along_the_leg_forces_only(rich_poses):
 def test_workspace_slice_is_reachable_exactly_where_the_inverse_exists():
     points = workspace.slice_points("xz", 25.0, (-1000.0, 1000.0), (100.0, 1300.0), 50.0)
     assert (points[:, 1] == 25.0).all() and len(points) == 41 * 25
-    reachable, translational, constraint, _ = workspace.measures(Rrru3(), points)
+    reachable, translational, constraint, _ = workspace.measures(Rrru3(), points, Rrru3().planned(points))
     assert (reachable == np.isfinite(Rrru3().inverse(points)).all(axis=1)).all()
     assert 0 < reachable.sum() < len(points)
     assert np.isfinite(translational[reachable]).all() and np.isnan(constraint[~reachable]).all()
