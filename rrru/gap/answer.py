@@ -15,8 +15,9 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "at_bound")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
-# more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs
-_LISTED, _WORTH, _SURE = 3, 0.05, 0.9
+# more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs,
+# and one from which on something acts
+_LISTED, _WORTH, _SURE, _ACTS = 3, 0.05, 0.9, 0.5
 # a share beyond this is none: effects that imitate each other make a little more than the whole
 _MOST_SHARE = 1.5
 
@@ -189,8 +190,8 @@ def _sizes(parameters):
 
 
 def _scatter(facts):
-    """What does not repeat, where it matters."""
-    share = _scatter_share(facts)
+    """What does not repeat, where it acts and matters."""
+    share = _scatter_share(facts, _ACTS)
     if share < _WORTH:
         return []
     if not _shares_told(facts):
@@ -198,9 +199,10 @@ def _scatter(facts):
     return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
 
 
-def _scatter_share(facts):
-    """Share of the gap that does not repeat."""
-    return sum(part["share"] for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
+def _scatter_share(facts, least=0.0):
+    """Share of the gap that does not repeat, of the parts that act with a least probability."""
+    parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
+    return sum(part["share"] for part in parts if (part["probability"] or 0.0) >= least)
 
 
 def _left(facts):

@@ -9,6 +9,9 @@ from rrru.robots.serial import FRAME, JOINT, serial
 _LENGTHS, _ANGLES = ("a_mm", "d_mm"), ("alpha_deg", "theta_deg", "rpy_deg")
 _VALUES = ("range_deg", "range_mm", "home_deg", "home_mm")
 _CONVENTIONS = ("standard", "modified")
+# as a row of the configuration has them
+_JOINT = ("a_mm", "d_mm", "alpha_deg", "theta_deg", "sliding", *_VALUES, "name", "drives", "mass_kg", "com_mm")
+_FRAME = ("xyz_mm", "rpy_deg", "mass_kg", "com_mm")
 
 
 def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, **options):
@@ -63,5 +66,6 @@ def _plain(row, where):
         elif key in {*JOINT, *FRAME} - {"a", "alpha", "d", "theta", "rpy_rad"}:
             result[key] = value
         elif key not in _VALUES:
-            raise ConfigError(f"{where} has {key!r}; allowed: {', '.join((*_LENGTHS, *_ANGLES, *_VALUES))}, ..")
+            allowed = f"{', '.join(_JOINT)}; of a fixed frame {', '.join(_FRAME)}"
+            raise ConfigError(f"{where} has {key!r}; allowed: {allowed}")
     return result

@@ -81,6 +81,13 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         assert words in said
 
 
+@pytest.mark.parametrize(("sure", "told"), [(0.49, False), (0.51, True)])
+def test_what_does_not_repeat_is_told_where_it_more_likely_acts_than_not(sure, told):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    unsure = budget.assign(probability=budget["probability"].mask(budget["kind"].isin(["scatter", "runs"]), sure))
+    assert ("does not repeat" in " ".join(answered(unsure)["sentences"])) == told
+
+
 @pytest.mark.parametrize(("factor", "gap"), [(12.0, 0.02), (1.0, 0.0)])
 def test_of_a_gap_that_is_small_beside_the_noise_sizes_are_told_and_no_shares(factor, gap):
     budget = synthetic_gap.gap_budget(CAMPAIGN)
