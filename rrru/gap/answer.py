@@ -202,7 +202,7 @@ def _scatter(facts):
 def _scatter_share(facts, least=0.0):
     """Share of the gap that does not repeat, of the parts that act with a least probability."""
     parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
-    return sum(part["share"] for part in parts if (part["probability"] or 0.0) >= least)
+    return sum(part["share"] for part in parts if not part["probability"] < least)
 
 
 def _left(facts):
