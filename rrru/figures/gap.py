@@ -52,6 +52,7 @@ def gap(tables, options):
     _causes(panels["causes"], causes, verdict, options["drives"])
     _shrink(panels["shrink"], shrink, verdict)
     _along(panels["along"], points, verdict)
+    gap_arrows.fit(figure, panels, used)
     return figure
 
 
@@ -70,6 +71,7 @@ def gap_map(tables, options):
     panels = dict(zip(gap_arrows.VIEWS, axes, strict=True))
     axes[0].sharex(axes[1])
     _map(figure, panels, used, verdict, options["z_down"])
+    gap_arrows.fit(figure, panels, used)
     return figure
 
 
@@ -98,11 +100,12 @@ def _page(lines, causes, trajectories, used):
     rows = [_ROW_MM * causes, _ROW_MM * trajectories]
     views = [_MAP_MM * gap_arrows.height_ratio(used, name) for name in gap_arrows.VIEWS]
     # what stands around the panels takes part in the figure's height, not in their ratios
-    heights = [_LINE_MM * lines, _BUDGET_MM, max(sum(rows) + 30.0, sum(views) + 36.0), 46.0]
-    figure = style.new(style.DOUBLE_MM, min(sum(heights) + 4.0, _MOST_MM))
+    middle, others = max(sum(rows) + 30.0, sum(views) + 36.0), (_LINE_MM * lines, _BUDGET_MM, 46.0, 4.0)
+    heights = [*others[:2], min(middle, _MOST_MM - sum(others)), others[2]]
+    figure = style.new(style.DOUBLE_MM, sum(heights) + others[3])
     outer = figure.add_gridspec(4, 1, height_ratios=heights)
-    middle = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
-    left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(middle, (views, rows), strict=True))
+    sides = outer[2].subgridspec(1, 2, width_ratios=[1.0, 1.0])
+    left, right = (side.subgridspec(2, 1, height_ratios=size) for side, size in zip(sides, (views, rows), strict=True))
     names = ("headline", "budget", *gap_arrows.VIEWS, "causes", "shrink", "along")
     places = (outer[0], outer[1], *left, *right, outer[3])
     panels = {name: figure.add_subplot(place) for name, place in zip(names, places, strict=True)}

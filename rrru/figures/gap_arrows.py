@@ -48,6 +48,20 @@ def draw(panels, points, worst, z_down=True):
     return arrows, bool((size > scale.vmax * (1.0 + 1e-9)).any()), factor
 
 
+def fit(figure, panels, points):
+    """Widen the views where the page is too low for them, so that both hold all points."""
+    engine, needed = figure.get_layout_engine(), []
+    style.arrange(figure)
+    for name, plane in VIEWS.items():
+        (low, high), box = _limits(points, plane), panels[name].get_window_extent()
+        needed.append((high[1] - low[1]) / (high[0] - low[0]) * box.width / box.height)
+    widen = max(needed)
+    if widen > 1.0:
+        # other numbers at the axes take other room
+        figure.set_layout_engine(engine)
+        panels["side view"].set_xlim(0.5 * ((high + low)[0] + widen * (high - low)[0] * np.array([-1.0, 1.0])))
+
+
 def _view(axes, points, shown, plane, scale, factor, z_down):
     """One view: the paths as grey lines, the gap's part in the plane as arrows coloured by its size in space."""
     across, up = (f"command_{axis}_mm" for axis in plane)

@@ -176,7 +176,7 @@ def save(figure, paths, caption=""):
     library.
     """
     with whole(*paths.values()) as partial, print_style():
-        _arrange(figure)
+        arrange(figure)
         for kind, path in zip(paths, partial, strict=True):
             # straight to the canvas: savefig would draw everything a second time to arrange it
             figure.set_dpi(_DPI)
@@ -185,7 +185,7 @@ def save(figure, paths, caption=""):
             write(path, metadata={undated: None, described: caption})
 
 
-def _arrange(figure):
+def arrange(figure):
     """Give the panels their places once, so that all files of a figure, and every later one, have them there."""
     if engine := figure.get_layout_engine():
         engine.execute(figure)

@@ -55,9 +55,16 @@ def test_the_map_shows_the_used_points_gaps_in_the_plane_by_size(frames):
     np.testing.assert_allclose(ring, frames["gap_verdicts"][["worst_x_mm", "worst_y_mm"]].iloc[0].astype(float))
 
 
-def test_both_views_hold_every_point_and_share_x(frames):
-    figure = draw("gap", frames)
-    top, side = figure.axes[2:4]
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.0, 6.0, 1.0), (1.0, 1.0, 8.0), (6.0, 1.0, 1.0)])
+@pytest.mark.parametrize(("name", "first"), [("gap", 2), ("gap_map", 0)])
+def test_both_views_hold_every_point_and_share_x(name, first, stretch, frames, tmp_path):
+    """Also of a gantry that goes far along one axis, for which the page is too low."""
+    for table, place in (("gap_points", "command"), ("gap_verdicts", "worst")):
+        columns = [f"{place}_{axis}_mm" for axis in "xyz"]
+        frames[table] = frames[table].assign(**frames[table][columns] * list(stretch))
+    figure = draw(name, frames)
+    style.save(figure, {"png": tmp_path / "figure.png"})
+    top, side = figure.axes[first : first + 2]
     assert top.get_xlim() == side.get_xlim() and side.get_ylim()[0] > side.get_ylim()[1]
     for axes, up in ((top, "y"), (side, "z")):
         place = frames["gap_points"].query("used")[["command_x_mm", f"command_{up}_mm"]].to_numpy()
