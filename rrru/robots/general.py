@@ -254,15 +254,25 @@ class GeneralRobot(Robot):
         both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
         return int(position_rank), int(both - position_rank)
 
+    @cached_property
+    def _driven_leg(self):
+        """A leg that is all driven, whose end is the platform's place; None where there is none."""
+        legs = (leg for leg in self.legs.legs if not leg.bar and not any(joint.passive for joint in leg.joints))
+        return next(legs, None)
+
     def near(self, position_mm, actuators):
         """Poses near which the legs close: of a leg that is all driven its own end, else upright or followed."""
         actuators = np.asarray(actuators, dtype=float)
-        for leg in self.legs.legs:
-            if not leg.bar and not any(joint.passive for joint in leg.joints):
-                return end_of(self.legs, leg, actuators)
+        if self._driven_leg:
+            return end_of(self.legs, self._driven_leg, actuators)
         return near_or_followed(self, actuators, super().near(position_mm, actuators))
 
     def guess(self, actuators, targets=None):
-        """Positions (n, 3) of the tool at actuator values (n, K), followed from home; the home position's if lost."""
-        position = followed(self, actuators).point(self.tool_mm)
+        """Positions (n, 3) of the tool at actuator values (n, K): a driven leg's end, or followed from home.
+
+        The home position's where they are lost.
+        """
+        actuators = np.asarray(actuators, dtype=float)
+        known = end_of(self.legs, self._driven_leg, actuators) if self._driven_leg else followed(self, actuators)
+        position = known.point(self.tool_mm)
         return np.where(np.isfinite(position), position, self.legs.home_mm)
