@@ -22,6 +22,8 @@ _MAY_BE, _LOST, _EXPLAINED = 5e-4, 2e-3, 0.5
 LARGE = {"rad": 5e-3, "mm": 2.0}
 # other starts, drawn so far from the nominal zeros; a fit this good needs no other
 _STARTS, _SPREAD, _ENOUGH = 16, {"rad": 0.4, "mm": 80.0}, 0.1
+# evaluations of a fit: one that ends well needs twenty
+_EVALUATIONS = 60
 # residual from which on a reading counts less
 _LOOSE_MM = 5.0
 # what counts where a pose is lost
@@ -105,7 +107,8 @@ def _fitted(robot, driven, seen, frames, zeros):
         at = robot.map(values, robot.solve(values, near, twists), twists, readings)
         return -np.nan_to_num(at.columns(directions)).reshape(-1, len(chosen))
 
-    solution = least_squares(residual, np.zeros(len(chosen)), jac=slope, loss="soft_l1", f_scale=_LOOSE_MM)
+    loose = {"loss": "soft_l1", "f_scale": _LOOSE_MM}
+    solution = least_squares(residual, np.zeros(len(chosen)), jac=slope, max_nfev=_EVALUATIONS, **loose)
     sizes = np.zeros(len(numbers))
     sizes[chosen] = solution.x * scale[chosen]
     return zeros + sizes[len(opened) :]

@@ -20,6 +20,8 @@ from rrru.robots.readings import Readings
 _UNNAMED = "tool"
 # orientations that differ by less are the same
 _NEVER_TURNS = 1e-6
+# rows that tell which zeros are lost; the calibration fits what is found to all of them
+_TELLING = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
 _MOST_TURNED_RAD = 0.2
 
@@ -112,7 +114,9 @@ def _frames(sheet, named):
 
 def _zeros(sheet, frames, command):
     """Zeros (K,) that the drives have lost, see `rrru.campaign.ingest.mastering`."""
-    chosen = frames.telling
+    chosen = np.flatnonzero(frames.telling)
+    if len(chosen) > _TELLING:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, _TELLING, replace=False))
     seen = Readings(frames.seen_mm, frames.names, frames.place_mm, on_world=frames.on_world).of(chosen)
     told = frames.of(chosen)
     return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, told.framed)
