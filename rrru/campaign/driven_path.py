@@ -15,7 +15,9 @@ DEGREE = 5
 _DRIVES_WAY = 0.1
 # a path through points turns by more than a right angle at fewer of them; of poses in any order it is three of four
 _MOST_TURNS = 0.5
-# an interval at a run's end that is this much slower than the next leads to rest
+# a path that bends by more than the first between parts that bend by less than the second has a corner, in rad
+_CORNER, _STRAIGHT = 0.2, 0.02
+# an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
 
 
@@ -51,7 +53,7 @@ def smooth_drives(measurements, path, path_index, degree=DEGREE):
     turned = _chords(drives / np.where(span > 0.0, span, 1.0))
     way = np.maximum(_chords(tool), _DRIVES_WAY * reach * turned)
     for piece in _runs(run):
-        own, _ = _smooth(drives[piece], way[piece.start : piece.stop - 1], degree)
+        own, _ = _through(drives[piece], way[piece.start : piece.stop - 1], _corners(tool[piece]), degree)
         result[index[piece][0] : index[piece][-1] + 1] = own
     return result
 
@@ -71,9 +73,9 @@ def _path_through(measurements, degree):
     table, all of them in the order driven: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg,
     temperature_c and path_index, their places on the path (n,); NaN where nobody knows.
 
-    # ASSUME the robot passes smoothly through a run's commanded points and rests where it slows down at an end. Speeds
-    and accelerations come from the times; where a run has no increasing times, or its points follow no path, they are
-    NaN.
+    # ASSUME the robot passes smoothly through a run's commanded points, but for corners between straight parts, and
+    rests where it slows down towards an end or a corner. Speeds and accelerations come from the times; where a run has
+    no increasing times, or its points follow no path, they are NaN.
     """
     position, run = rows.command(measurements), measurements["run"].to_numpy()
     named = measurements.reindex(columns=("time_s", "payload_kg", "temperature_c"))
@@ -81,7 +83,8 @@ def _path_through(measurements, degree):
     pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
     parts = [position[piece] for piece in pieces]
-    path, index = connect(*zip(*(_smooth(one, _chords(one), degree) for one in parts), strict=True), _TRANSFER_STEPS)
+    smooth = (_through(one, _chords(one), _corners(one), degree) for one in parts)
+    path, index = connect(*zip(*smooth, strict=True), _TRANSFER_STEPS)
     told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
     return path, told | {"path_index": index}
 
@@ -92,10 +95,10 @@ def rates(measurements, values):
     NaN where a run has no increasing times or its points follow no path.
     """
     run, time = measurements["run"].to_numpy(), measurements["time_s"].to_numpy(dtype=float)
-    if not follows_path(rows.command(measurements), run):
+    position = rows.command(measurements)
+    if not follows_path(position, run):
         return np.full_like(values, np.nan), np.full_like(values, np.nan)
-    pieces = _runs(run)
-    derivatives = [_derivatives(values[piece], time[piece]) for piece in pieces]
+    derivatives = [_run_rates(values[piece], time[piece], _corners(position[piece])) for piece in _runs(run)]
     return tuple(np.concatenate(parts) for parts in zip(*derivatives, strict=True))
 
 
@@ -118,10 +121,38 @@ def starts_of_runs(run):
     return np.concatenate([[True], np.diff(run) != 0])
 
 
-def _derivatives(points, time):
-    """First and second derivative (k, j) along the points (k, j) of one run, NaN without increasing times.
+def _corners(position_mm):
+    """Points (c,) of the path (k, 3) of one run at which it has a corner, after its first and before its last point.
 
-    An end is one of rest where the robot slows down towards it; else the recording stopped or began on the way.
+    # ASSUME a path that bends at one point between straight parts is sent round a corner there.
+    """
+    moved = np.flatnonzero(np.concatenate([[True], _chords(position_mm) > 0.0]))
+    step = np.diff(position_mm[moved], axis=0)
+    if len(step) < 3:
+        return np.zeros(0, dtype=int)
+    step /= np.linalg.norm(step, axis=1)[:, None]
+    bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(step, axis=0), axis=1), 0.0, 1.0))
+    # of an end nobody knows how the path goes on
+    beside = np.maximum([0.0, *bend[:-1]], [*bend[1:], 0.0])
+    return moved[1:-1][(bend > _CORNER) & (beside < _STRAIGHT)]
+
+
+def _run_rates(values, time, corners):
+    """`_derivatives` of values (k, j) of one run at times (k,); at corners (c,) the mean of those of both sides."""
+    result = np.full((2, *values.shape), np.nan)
+    for first, last in pairwise([0, *corners, len(values) - 1]):
+        piece = slice(first, last + 1)
+        before, own = result[:, piece].copy(), np.array(_derivatives(values[piece], time[piece]))
+        both = np.where(np.isnan(own), before, 0.5 * (before + own))
+        result[:, piece] = np.where(np.isnan(before), own, both)
+    return tuple(result)
+
+
+def _derivatives(points, time):
+    """First and second derivative (k, j) along the points (k, j) of a run or a part of it.
+
+    NaN without increasing times. An end is one of rest where the robot slows down towards it; else the recording
+    stopped or began on the way.
     """
     from scipy.interpolate import CubicSpline
 
@@ -141,21 +172,29 @@ def _chords(points):
     return np.linalg.norm(np.diff(points, axis=0), axis=1)
 
 
-def _smooth(points, way, degree):
-    """Points (N, j) of a smooth path through the points (k, j) of one run and the rows (k,) of these in it.
+def _through(points, way, corners, degree):
+    """Points (N, j) of a path through the points (k, j) of one run, smooth from corner to corner (c,) of them, and the
+    rows (k,) of these in it.
 
     way (k - 1,): how far it is from each to the next.
     """
+    parts = [_smooth(points[a : b + 1], way[a:b], degree) for a, b in pairwise([0, *corners, len(points) - 1])]
+    path = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
+    return path, np.arange(len(points)) * STEPS
+
+
+def _smooth(points, way, degree):
+    """Points (N, j) of a smooth path through points (k, j), way (k - 1,) apart."""
     from scipy.interpolate import make_interp_spline
 
     at = np.arange(len(points)) * STEPS
     if len(points) == 1:
-        return points, at
+        return points
     # points of no distance still follow one another
     length = np.concatenate([[0.0], np.cumsum(np.maximum(way, 1e-6 * max(way.max(), 1e-6)))])
     fine = np.interp(np.arange(at[-1] + 1), at, length)
     if len(points) == 2:
-        return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0]), at
+        return points[0] + (fine / length[-1])[:, None] * (points[1] - points[0])
     path = make_interp_spline(length, points, k=min(degree, len(points) - 1 - len(points) % 2))(fine)
     path[at] = points
-    return path, at
+    return path

@@ -48,6 +48,7 @@ def advise(attribution, verdict, masses, most=3):
     if not choice:
         return NOTHING
     planned, result = _planned(attribution.case, table, masses), []
+    contests = [contest for contest in contests if _tell(planned, contest)]
     for separates, truth, imitator in contests:
         now, added = worth(attribution, truth, imitator, planned)
         start = now.nats()
@@ -58,7 +59,7 @@ def advise(attribution, verdict, masses, most=3):
         ]
     runs = pd.DataFrame(result, columns=_COLUMNS)
     listed = NOTHING.poses
-    if not (runs["gain_nats"] > _ENOUGH_NATS).any():
+    if contests and not (runs["gain_nats"] > _ENOUGH_NATS).any():
         row, listed = _poses(attribution, contests[0], masses)
         runs = pd.DataFrame([*result, *row], columns=_COLUMNS)
     runs = runs[runs["gain_nats"] > _WORTH_NATS]
@@ -88,6 +89,12 @@ def _planned(case, table, masses):
     return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
 
 
+def _tell(planned, contest):
+    """Whether planned runs tell what the effects of a contest need, such as times or temperatures."""
+    _, *answers = contest
+    return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
+
+
 def _poses(attribution, contest, masses):
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
@@ -97,14 +104,18 @@ def _poses(attribution, contest, masses):
     start, end = poses.passes(case.measurements, case.mechanism)
     if not len(start):
         return best
-    own_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    told_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    own_speed = told_speed if np.isfinite(told_speed) else _speed(case.measurements)
     last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
-        if fast and not (own_speed < _FAST_MM_S and np.isfinite(last_s)):
+        if fast and not (told_speed < _FAST_MM_S and np.isfinite(last_s)):
             continue
         speed, load, how = _driven(own_speed, own_load, fast, loaded)
         table = poses.commands(start, end, case.mechanism, last_s + _REST_S, speed, load)
-        now, added = worth(attribution, truth, imitator, _planned(case, table, masses))
+        planned = _planned(case, table, masses)
+        if not _tell(planned, contest):
+            continue
+        now, added = worth(attribution, truth, imitator, planned)
         chosen, gain = greedy(now, added, _MOST_POSES)
         # one that tells hardly more is not worth a payload
         if gain > 1.1 * most:
@@ -126,6 +137,14 @@ def _driven(own_speed, own_load, fast, loaded):
 def _end_s(frame):
     """Time at which a measurement table ends, NaN where it has none."""
     return np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
+
+
+def _speed(frame):
+    """Speed in mm/s between the points of a measurement table, by its times; NaN where it has none."""
+    way = np.linalg.norm(np.diff(rows.command(frame), axis=0), axis=1)
+    time = np.diff(frame["time_s"].to_numpy(dtype=float))
+    moved = (np.diff(frame["run"].to_numpy()) == 0) & (way > 0.0) & (time > 0.0)
+    return float(np.median(way[moved] / time[moved])) if moved.any() else np.nan
 
 
 def candidates(frame):
