@@ -25,23 +25,25 @@ import numpy as np
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
+TIME_CONSTANT = Parameter("time_constant", "s", 600.0, 1.0, 1e5, "lumped body, assumed")
+SHAPES = tuple({TIME_CONSTANT.name: tau} for tau in (30.0, 60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0))
 _PARAMETERS = ParameterSet(
     (
         Parameter("strain", "1", 0.0, 0.0, 1e-2, "aluminium 2.3e-5 per kelvin; temperature assumed"),
-        Parameter("time_constant", "s", 600.0, 1.0, 1e5, "lumped body, assumed"),
+        TIME_CONSTANT,
     )
 )
-_SHAPES = tuple({"time_constant": tau} for tau in (30.0, 60.0, 125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0))
+
+
+def warmth(motion, time_constant):
+    """Share (n,) of its final excess temperature that a body has; 0 where the time is unknown."""
+    return -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
 
 
 def _grown(motion, values):
-    """Shifts of every link's end by its growth under final strain and time constant in s.
-
-    None where the time is unknown.
-    """
+    """Shifts of every link's end by its growth under final strain and time constant in s."""
     strain, time_constant = values
-    share = strain * -np.expm1(-np.nan_to_num(motion.time_s) / time_constant)
-    return Contribution(np.multiply.outer(share, lengths(motion.robot.legs)))
+    return Contribution(np.multiply.outer(strain * warmth(motion, time_constant), lengths(motion.robot.legs)))
 
 
 def lengths(legs):
@@ -58,4 +60,4 @@ def lengths(legs):
 
 def for_robot(_robot):
     """The law, the same for every robot."""
-    return Effect("thermal_growth", _PARAMETERS, plain_coordinates(_PARAMETERS, 2e-4, _SHAPES), _grown, ("time_s",))
+    return Effect("thermal_growth", _PARAMETERS, plain_coordinates(_PARAMETERS, 2e-4, SHAPES), _grown, ("time_s",))

@@ -58,7 +58,7 @@ def _values(effect, share=1.0, shape=-1):
 
 def test_robots_with_sliders_have_rails_instead_of_axes():
     turning, sliding = Rrru3(), Ptt3()
-    assert set(SLIDER_EFFECTS) - set(library(turning)) == {"rail_tilt", "bar_mismatch"}
+    assert set(SLIDER_EFFECTS) - set(library(turning)) == {"rail_tilt", "bar_mismatch", "screw_growth"}
     assert set(library(turning)) - set(SLIDER_EFFECTS) == {"axis_tilt", "encoder_eccentricity", "joint_axis_error"}
     assert find("backlash", sliding).parameters["width1"].unit == "mm"
     assert find("backlash", turning).parameters["width1"].unit == "rad"
