@@ -1,0 +1,102 @@
+"""Paths with corners inside a run: rectangles, zigzags, there and back, and smooth paths that have none."""
+
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.campaign.driven_path import STEPS, driven_path, smooth_drives
+
+_AROUND = np.array([[0.0, 0.0], [300.0, 0.0], [300.0, 200.0], [0.0, 200.0], [0.0, 0.0]])
+
+
+def _along(ends, count):
+    """Points (n, 3) evenly along straight lines through ends (k, 2 or 3), `count` steps each."""
+    ends = np.pad(ends, [(0, 0), (0, 3 - np.shape(ends)[1])], constant_values=400.0)
+    share = np.arange(count)[:, None] / count
+    return np.concatenate([*(a + share * (b - a) for a, b in pairwise(ends)), ends[-1:]])
+
+
+def _table(command, time=np.nan):
+    """A measurement table of one run."""
+    told = {f"command_{axis}_mm": column for axis, column in zip("xyz", command.T, strict=True)}
+    return pd.DataFrame(told | {"run": 1, "time_s": time})
+
+
+def _farthest_from_lines(path, command):
+    """Largest distance in mm of a path (N, 3) from the straight lines between the commanded points."""
+    lines = np.concatenate([_along(pair, 200) for pair in pairwise(command)])
+    return max(np.linalg.norm(lines - point, axis=1).min() for point in path)
+
+
+@pytest.mark.parametrize("degree", [3, 5, 7])
+@pytest.mark.parametrize("count", [2, 3, 12])
+@pytest.mark.parametrize("turned", [0.0, 0.7])
+def test_a_rectangle_driven_in_one_run_stays_a_rectangle(degree, count, turned):
+    turn = np.array([[np.cos(turned), -np.sin(turned)], [np.sin(turned), np.cos(turned)]])
+    command = _along(_AROUND @ turn.T, count)
+    path, told = driven_path(_table(command), degree)
+    np.testing.assert_array_equal(path[told["path_index"]], command)
+    assert _farthest_from_lines(path, command) < 1.0
+    # a drive along one side stands still on the next one
+    if not turned:
+        side = slice(count * STEPS, 2 * count * STEPS + 1)
+        np.testing.assert_allclose(path[side, 0], 300.0, atol=1e-9)
+
+
+def test_there_and_back_in_one_run_turns_at_the_tip():
+    command = _along([[0.0, 0.0], [250.0, 100.0], [0.0, 0.0]], 10)
+    path, _ = driven_path(_table(command))
+    np.testing.assert_allclose(path[10 * STEPS :], path[: 10 * STEPS + 1][::-1], atol=1e-9)
+    assert path[:, 0].max() == pytest.approx(250.0)
+
+
+def test_a_stop_of_several_readings_at_a_corner_changes_nothing():
+    command = _along(_AROUND, 8)
+    twice = np.insert(command, 9, command[8], axis=0)
+    path, _ = driven_path(_table(twice))
+    assert _farthest_from_lines(path, command) < 0.1
+
+
+@pytest.mark.parametrize("count", [13, 25, 60])
+def test_a_smooth_path_has_no_corner(count):
+    """Circles of few points, and a straight part that goes over into an arc, are as smooth as they were."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count)
+    circle = np.stack([100.0 * np.cos(angle), 100.0 * np.sin(angle), 0.0 * angle], axis=1)
+    path, _ = driven_path(_table(circle))
+    radius = np.linalg.norm(path[:, :2], axis=1)
+    assert np.abs(radius - 100.0).max() < 0.5
+    quarter = circle[angle < np.pi / 2.0]
+    straight = np.stack([np.full(6, 100.0), np.linspace(-120.0, -20.0, 6), np.zeros(6)], axis=1)
+    path, _ = driven_path(_table(np.concatenate([straight, quarter])))
+    bend = np.diff(path, axis=0)
+    bend /= np.linalg.norm(bend, axis=1)[:, None]
+    # it turns by little at every one of its small steps
+    assert np.linalg.norm(np.diff(bend, axis=0), axis=1).max() < 0.35
+
+
+def test_speeds_at_a_corner_where_the_robot_rests_are_those_of_rest():
+    command = _along(_AROUND[:3], 10)
+    # each side is driven from rest to rest: way (1 - cos) / 2
+    share = np.linspace(0.0, np.pi, 11)
+    side = 0.5 * (1.0 - np.cos(share))
+    first = np.outer(side, command[10] - command[0]) + command[0]
+    second = np.outer(side, command[20] - command[10]) + command[10]
+    command = np.concatenate([first, second[1:]])
+    time = np.concatenate([share, np.pi + share[1:]])
+    _, told = driven_path(_table(command, time))
+    speed = np.linalg.norm(told["velocity_mm_s"], axis=1)
+    expected = np.concatenate([300.0 * np.sin(share), 200.0 * np.sin(share[1:])]) / 2.0
+    np.testing.assert_allclose(speed, expected, atol=1.0)
+
+
+def test_drives_have_a_corner_where_the_path_of_the_tool_has_one():
+    command = _along(_AROUND[:3], 10)
+    frame = _table(command)
+    path, told = driven_path(frame)
+    # drives of which each moves the tool along an axis
+    drives = np.full_like(path, np.nan)
+    drives[told["path_index"]] = 0.01 * command
+    smooth = smooth_drives(frame, drives, told["path_index"])
+    np.testing.assert_allclose(smooth, 0.01 * path, atol=1e-12)
