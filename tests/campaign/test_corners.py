@@ -45,6 +45,27 @@ def test_a_rectangle_driven_in_one_run_stays_a_rectangle(degree, count, turned):
         np.testing.assert_allclose(path[side, 0], 300.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("degree", [3, 5, 7])
+@pytest.mark.parametrize("count", [2, 9])
+def test_rows_driven_to_and_fro_in_one_run_stay_rows(degree, count):
+    """A grid of rows: from one to the next it is a single step."""
+    rows = [_along([[0.0, y], [300.0, y]], count)[:: 1 - 2 * (k % 2)] for k, y in enumerate((0.0, 40.0, 80.0, 120.0))]
+    command = np.concatenate(rows)
+    path, told = driven_path(_table(command), degree)
+    np.testing.assert_array_equal(path[told["path_index"]], command)
+    assert _farthest_from_lines(path, command) < 1.0
+    # what drives along y stands still in every row
+    along = slice((count + 1) * STEPS, (2 * count + 1) * STEPS + 1)
+    np.testing.assert_allclose(path[along, 1], 40.0, atol=1e-9)
+
+
+def test_a_path_of_sharp_turns_alone_tells_of_no_corner():
+    """Four points of which no three lie on a line may be of any path."""
+    command = np.array([[0.0, 0.0, 400.0], [100.0, 0.0, 400.0], [100.0, 100.0, 400.0], [0.0, 100.0, 400.0]])
+    path, _ = driven_path(_table(command))
+    assert _farthest_from_lines(path, command) > 5.0
+
+
 def test_there_and_back_in_one_run_turns_at_the_tip():
     command = _along([[0.0, 0.0], [250.0, 100.0], [0.0, 0.0]], 10)
     path, _ = driven_path(_table(command))
