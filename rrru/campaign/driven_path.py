@@ -15,9 +15,8 @@ DEGREE = 5
 _DRIVES_WAY = 0.1
 # a path through points turns by more than a right angle at fewer of them; of poses in any order it is three of four
 _MOST_TURNS = 0.5
-# a path that bends by more than the first between parts that bend by less than the last has a corner; two bends of more
-# than the second between such parts, as from one row to the next, are two; in rad
-_CORNER, _SHARP, _STRAIGHT = 0.2, 1.0, 0.02
+# a path that bends by more than the first beside a part that bends by less than the second goes round a corner, in rad
+_CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
 
@@ -125,8 +124,8 @@ def starts_of_runs(run):
 def _corners(position_mm):
     """Points (c,) of the path (k, 3) of one run at which it has a corner, after its first and before its last point.
 
-    # ASSUME a path that bends at one point between straight parts is sent round a corner there, and one that bends
-    sharply at two of them round two.
+    # ASSUME what is straight at three points stays so between them: a path that bends there leaves it at a corner. One
+    smooth curve through both would swing about the straight part, and drives that hold there would turn back.
     """
     moved = np.flatnonzero(np.concatenate([[True], _chords(position_mm) > 0.0]))
     step = np.diff(position_mm[moved], axis=0)
@@ -134,11 +133,9 @@ def _corners(position_mm):
         return np.zeros(0, dtype=int)
     step /= np.linalg.norm(step, axis=1)[:, None]
     bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(step, axis=0), axis=1), 0.0, 1.0))
-    # of an end nobody knows how the path goes on: it hides no corner, and makes none
-    before, after = np.array([np.nan, *bend[:-1]]), np.array([*bend[1:], np.nan])
-    between = ~(before >= _STRAIGHT) & ~(after >= _STRAIGHT)
-    of_two = ((before < _STRAIGHT) & (after > _SHARP)) | ((before > _SHARP) & (after < _STRAIGHT))
-    return moved[1:-1][((bend > _CORNER) & between) | ((bend > _SHARP) & of_two)]
+    # of an end nobody knows how the path goes on
+    beside = (np.array([np.inf, *bend[:-1]]) < _STRAIGHT) | (np.array([*bend[1:], np.inf]) < _STRAIGHT)
+    return moved[1:-1][(bend > _CORNER) & beside]
 
 
 def _run_rates(values, time, corners):

@@ -48,7 +48,7 @@ def test_rivals_that_need_times_are_told_apart_by_poses_that_have_times():
     """A campaign with times and without a column of speeds: poses are planned at the speed that the times tell."""
 
     def grown(way, time):
-        return np.array([1e-5 * way[0], 0.0, 0.0]) * (1.0 - np.exp(-time / 1000.0))
+        return np.array([6e-6 * way[0], 0.0, 0.0]) * (1.0 - np.exp(-time / 1000.0))
 
     frame = campaign(grown=grown, seed=6).iloc[::2].reset_index(drop=True)
     found, *_ = _diagnosed(frame)
