@@ -82,14 +82,24 @@ def _tested(library, motion, used, told):
         if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * told:
             untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
             continue
-        known = {need: np.isfinite(getattr(motion, need).reshape(len(used), -1)).all(axis=1) for need in effect.needs}
-        missing = [need for need, there in known.items() if there[used].mean() < _ENOUGH]
-        if missing:
-            untestable[name] = f"needs {', '.join(missing)}, which the columns do not give"
+        values = {need: getattr(motion, need).reshape(len(used), -1) for need in effect.needs}
+        lacking = _lacking({need: value[used] for need, value in values.items()})
+        if lacking:
+            untestable[name] = lacking
         else:
             testable[name] = effect
-            complete = np.all([complete, *known.values()], axis=0)
+            complete = np.all([complete, *(np.isfinite(value).all(axis=1) for value in values.values())], axis=0)
     return testable, untestable, complete
+
+
+def _lacking(values):
+    """Why values (n, k) by name do not tell what an effect needs, empty where they do."""
+    known = {name: value[np.isfinite(value).all(axis=1)] for name, value in values.items()}
+    few = [name for name, value in known.items() if len(value) < _ENOUGH * len(values[name])]
+    if few:
+        return f"needs {', '.join(few)}, which the columns do not give"
+    alike = [name for name, value in known.items() if not np.ptp(value, axis=0).any()]
+    return f"needs {', '.join(alike)} of more than one value" if alike else ""
 
 
 def _told(measurements, used, stop):

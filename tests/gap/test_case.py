@@ -199,6 +199,12 @@ def test_what_the_columns_do_not_tell_is_not_tested():
         assert all(note.startswith("needs ") for note in case.untestable.values())
 
 
+def test_times_that_are_all_alike_tell_nothing():
+    case = case_of(measure().assign(time_s=5.0))
+    assert {"thermal_growth", "servo_lag"} == set(case.untestable) & set(EFFECTS)
+    assert case.untestable["thermal_growth"] == "needs time_s of more than one value"
+
+
 def test_a_calibration_without_noise_finds_the_robots_errors():
     found = calibrate(case_of(measure(noise_mm=0.0)))
     np.testing.assert_allclose(found.deviations, STATE_ERRORS, atol=1e-6)
