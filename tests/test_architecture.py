@@ -17,6 +17,7 @@ _FLOORS = {
     "robots": 3,
     "effects": 4,
     "campaign": 4,
+    "estimation": 5,
     "plant": 5,
     "fit": 6,
     "genetic": 7,

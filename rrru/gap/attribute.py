@@ -9,12 +9,12 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign import noise
 from rrru.errors import FitError
+from rrru.estimation.noise_model import alike, fit_noise
 from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.identify import with_seen
-from rrru.gap.noise_model import alike, fit_noise
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.refine import refine
@@ -91,7 +91,7 @@ def with_beside(case):
 def with_noise(case, linear, stated_mm):
     """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
 
-    "fitted", see `rrru.gap.noise_model`, or "repeats" where points that were measured again say clearly less.
+    "fitted", see `rrru.estimation.noise_model`, or "repeats" where points that were measured again say clearly less.
     """
     columns = np.concatenate([linear.base, *linear.columns.values(), *linear.shape_columns.values()], axis=-1)
     if columns.shape[-1] > _MOST_FITTED * linear.data.size:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import ndtr
 
-from rrru.gap.noise_model import CONTRADICTED, NoiseModel
+from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 from rrru.gap.terms import signatures, spread
 from rrru.gap.unknown import UNKNOWN
 

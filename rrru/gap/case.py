@@ -16,9 +16,9 @@ from rrru.campaign.driven_path import follows_path, stops
 from rrru.campaign.noise import reading_series
 from rrru.effects.motion import standing
 from rrru.effects.protocol import Contribution, Motion
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.linearise import linearised
-from rrru.gap.noise_model import NoiseModel
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
 

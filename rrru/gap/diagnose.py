@@ -9,6 +9,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.errors import FitError
+from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
@@ -17,7 +18,6 @@ from rrru.gap.budget import budget
 from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
-from rrru.gap.noise_model import CONTRADICTED, NoiseModel
 from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior

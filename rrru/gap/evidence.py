@@ -4,7 +4,7 @@ Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with noise e as in `rrru.gap.noise_model`, of mean variance sigma^2, the calibration's deviations b (flat prior), the
+with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (flat prior), the
 effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
 of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
 O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
@@ -21,9 +21,9 @@ from itertools import product
 
 import numpy as np
 
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence_kernels import log_sum_exp
-from rrru.gap.noise_model import NoiseModel
 from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
 from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, is_told, mean_over_cases, over_cases

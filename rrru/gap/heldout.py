@@ -8,9 +8,9 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 from rrru.campaign.noise import along_runs
+from rrru.estimation.noise_model import lengths
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
-from rrru.gap.noise_model import lengths
 from rrru.gap.terms import EACH, signatures
 from rrru.gap.terms import spread as spread_of
 from rrru.gap.whitened import LEVELS, spectrum

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.campaign.noise import along_runs
-from rrru.gap.noise_model import NoiseModel, lengths
+from rrru.estimation.noise_model import NoiseModel, lengths
 from rrru.gap.terms import EACH, SAME, per_leg, spread
 from rrru.gap.weight import WEIGHT
 

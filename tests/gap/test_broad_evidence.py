@@ -12,9 +12,9 @@ from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
 from rrru.effects.protocol import Coordinates
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
-from rrru.gap.noise_model import NoiseModel
 from rrru.gap.search import Hypothesis
 from rrru.gap.state import Linear
 from rrru.gap.terms import Term

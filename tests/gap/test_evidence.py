@@ -15,9 +15,9 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.campaign.noise import along_runs
 from rrru.effects.protocol import Coordinates
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap import evidence_kernels as kernels
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
-from rrru.gap.noise_model import NoiseModel
 from rrru.gap.state import Linear
 from rrru.gap.terms import EACH, SAME, Term
 from rrru.gap.whitened import LEVELS, spectrum

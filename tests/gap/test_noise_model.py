@@ -5,8 +5,8 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
+from rrru.estimation.noise_model import NoiseModel, fit_noise, lengths
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.noise_model import NoiseModel, fit_noise, lengths
 from tests.gap.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
 
 _RUNS, _POINTS = 12, 26

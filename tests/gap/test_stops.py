@@ -6,10 +6,10 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import isolated
 from rrru.effects.library import find
+from rrru.estimation.noise_model import NoiseModel, alike
 from rrru.gap.calibrate import calibrate
 from rrru.gap.heldout import HeldOut
 from rrru.gap.make_case import make_case
-from rrru.gap.noise_model import NoiseModel, alike
 from tests.gap import arms
 
 _STOPS, _TARGETS = 150, ("a", "b", "c")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from rrru.effects.protocol import Coordinates
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap import diagnose
 from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import ModelEvidence
-from rrru.gap.noise_model import NoiseModel
 from rrru.gap.posterior import NEGLIGIBLE, posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior

@@ -18,7 +18,7 @@ been projected out (Patterson and Thompson, Recovery of inter-block information 
 """
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.fft import dct
@@ -74,10 +74,51 @@ class NoiseModel:
         """The model under which the readings count as independent."""
         return replace(self, axis_mm=self.axis_mm * np.sqrt(self.alike), alike=1.0)
 
+    def whitening(self, series, discrepancy=None):
+        """The Whitening of readings in series (m,) under this noise.
+
+        discrepancy: from half-wave numbers (m,) to variances (m,) in mm^2 of what else is smooth along the series.
+        """
+        waves, length = half_waves(series), lengths(series)
+        variance = self.variance(waves, length)
+        if discrepancy is not None:
+            variance = variance + discrepancy(waves)[:, None]
+        return Whitening(np.asarray(series), np.sqrt(variance))
+
     def variance(self, wave, length):
         """Variances (m, 3) in mm^2 in the cosine basis, by half-wave number and length (m,) of the series."""
         smooth, run = _densities(self.correlation, wave, length)
         return self.axis_mm**2 * (1.0 + self.correlated * (smooth - 1.0) + self.offset * run)
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """The linear map that makes correlated readings independent with unit variance: cosines along each series.
+
+    series (m,): of the rows; sd (m, a): standard deviations of the cosines.
+    """
+
+    series: np.ndarray
+    sd: np.ndarray
+
+    @cached_property
+    def log_determinant(self):
+        """Logarithm of the determinant of the map."""
+        return float(-np.log(self.sd).sum())
+
+    def __call__(self, values):
+        """Whitened values (m, a, ...)."""
+        cosines, _ = along_runs(values, self.series)
+        return cosines / self.sd.reshape(*self.sd.shape, *[1] * (values.ndim - 2))
+
+
+def half_waves(series):
+    """Half-wave number (m,) from 0 on of each row's cosine in its series."""
+    result = np.empty(len(series))
+    for label in np.unique(series):
+        here = np.flatnonzero(series == label)
+        result[here] = np.arange(len(here))
+    return result
 
 
 def lengths(series):

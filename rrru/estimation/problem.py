@@ -1,0 +1,45 @@
+"""What the solver is handed: readings that a parameter vector predicts, their whitening, and the parameters' priors."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from rrru.estimation.parameters import Parameters
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Observations(Protocol):
+    """Readings of one kind or of several: each of n rows holds a numbers in mm."""
+
+    def residual(self, values: FloatArray, /) -> FloatArray:
+        """Readings minus prediction (n, a) at parameter values (p,); NaN where the model predicts nothing."""
+
+    def jacobian(self, values: FloatArray, /) -> FloatArray:
+        """Derivative (n, a, p) of the residual by the parameters."""
+
+
+def unweighted(values: FloatArray) -> FloatArray:
+    """Values (n, a, ...) as they are: readings that are independent and have unit variance."""
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Maximum a posteriori estimation of parameters x from readings y = h(x) + e.
+
+        minimise  1/2 |W (y - h(x))|^2 - log p(x)
+
+    observations: y and h; parameters: x with priors p(x) and bounds; whiten: the linear map W that makes the errors e
+    independent with unit variance, from (n, a, ...) to (n, a, ...); loss: name of a robust loss for rows with gross
+    errors, "linear" for none, which bends at `loss_scale` standard deviations.
+    """
+
+    observations: Observations
+    parameters: Parameters
+    whiten: Callable[[FloatArray], FloatArray] = unweighted
+    loss: str = "linear"
+    loss_scale: float = 1.0

@@ -1,0 +1,169 @@
+"""The one solver: maximum a posteriori estimates of a `Problem` by damped Gauss-Newton steps.
+
+Step, acceptance, convergence and covariance come from the same penalised, whitened objective
+
+    F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
+
+The steps are Levenberg's and Marquardt's with the damping rule of Nielsen (Damping parameter in Marquardt's method,
+IMM-REP-1999-05), on columns scaled to unit length; parameters at a bound that the gradient presses against are held
+(Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from rrru.errors import FitError
+from rrru.estimation.estimate import Estimate, SearchEnd, triangle_of, with_prior
+from rrru.estimation.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SolverOptions:
+    """When a search ends.
+
+    max_iterations: a well-scaled problem needs some ten, one with lost zeros or frames some fifty; step_tolerance: the
+    search has ended where a full step would change no parameter by more than this share of its standard error, far
+    below what any reading tells; cost_tolerance: or lower the objective by less than this share, about the rounding of
+    a sum of squares; first_damping: share of the largest curvature that damps the first step, small since starts are
+    mostly near; max_damping: beyond it no step lowers the objective.
+    """
+
+    max_iterations: int = 200
+    step_tolerance: float = 1e-7
+    cost_tolerance: float = 1e-15
+    first_damping: float = 1e-6
+    max_damping: float = 1e12
+
+
+# first and second derivative of rho(z) by z, the squared residual in units of the loss scale (as scipy names them)
+_LOSSES = {
+    "linear": (lambda z: z, np.ones_like),
+    "soft_l1": (lambda z: 2.0 * (np.sqrt(1.0 + z) - 1.0), lambda z: (1.0 + z) ** -0.5),
+    "huber": (
+        lambda z: np.where(z <= 1.0, z, 2.0 * np.sqrt(np.maximum(z, 1.0)) - 1.0),
+        lambda z: np.where(z <= 1.0, 1.0, np.maximum(z, 1.0) ** -0.5),
+    ),
+    "cauchy": (np.log1p, lambda z: 1.0 / (1.0 + z)),
+}
+LOSSES = tuple(_LOSSES)
+
+
+def solve(
+    problem: Problem, starts: Iterable[npt.ArrayLike] | None = None, options: SolverOptions | None = None
+) -> Estimate:
+    """The Estimate of lowest objective that the searches from some starts (p,) end at, by default the prior means.
+
+    A search that does not converge is no error: the Estimate says so. Raises FitError where the model predicts nothing
+    at any start, which is outside of what the robot can do.
+    """
+    options = options or SolverOptions()
+    found = []
+    for start in [problem.parameters.mean] if starts is None else starts:
+        search = _Search(problem, options, np.asarray(start, dtype=float))
+        if np.isfinite(search.cost):
+            search.run()
+            found.append(search)
+    if not found:
+        raise FitError("the model predicts no reading at the start values; start nearer to the real robot")
+    best = min(found, key=lambda one: one.cost)
+    return best.estimate(sum(one.evaluations for one in found))
+
+
+class _Search:
+    """One search from one start."""
+
+    def __init__(self, problem: Problem, options: SolverOptions, start: FloatArray) -> None:
+        self._problem, self._options = problem, options
+        self.values = problem.parameters.clipped(start)
+        self.evaluations, self.converged, self.straight = 0, False, True
+        self.message = "the largest number of iterations is reached"
+        self.residual, self.cost = self._evaluate(self.values)
+
+    def _evaluate(self, values: FloatArray) -> tuple[FloatArray, float]:
+        """Whitened residual (n, a) and objective at values (p,), inf where the model predicts nothing."""
+        self.evaluations += 1
+        raw = self._problem.observations.residual(values)
+        if not np.isfinite(raw).all():
+            return raw, np.inf
+        white = self._problem.whiten(raw)
+        scale, (loss, _) = self._problem.loss_scale, _LOSSES[self._problem.loss]
+        cost = 0.5 * scale**2 * float(loss((white / scale) ** 2).sum())
+        return white, cost + self._problem.parameters.prior_cost(values)
+
+    def _linearized(self) -> tuple[FloatArray, FloatArray]:
+        """Triangle (p + 1, p + 1) of the whitened readings, and of these with the prior, linearised where it stands.
+
+        The last column is the residual's. Readings under a robust loss have the weight rho' (iteratively reweighted
+        least squares).
+        """
+        problem, values, count = self._problem, self.values, len(self.values)
+        columns = problem.whiten(problem.observations.jacobian(values)).reshape(-1, count)
+        white = np.column_stack([columns, self.residual.ravel()])
+        if problem.loss != "linear":
+            squares = (self.residual.ravel() / problem.loss_scale) ** 2
+            white = white * np.sqrt(_LOSSES[problem.loss][1](squares))[:, None]
+        readings = triangle_of(white)
+        root = np.sqrt(problem.parameters.prior_precision(values))
+        return readings, with_prior(readings, root, root * (values - problem.parameters.mean))
+
+    def run(self) -> None:
+        """Search until the options say that it has ended."""
+        options, damping, growth = self._options, self._options.first_damping, 2.0
+        for _ in range(options.max_iterations):
+            _, triangle = self._linearized()
+            free = self._free(triangle)
+            left, size, right, unit = _factors(triangle[:, :-1][:, free])
+            along = left.T @ triangle[:, -1]
+            # the full step in units of the standard errors along each axis
+            seen = size > 1e-13 * size.max(initial=0.0)
+            decrement = float((along[seen] ** 2).sum())
+            if decrement < options.step_tolerance**2 or decrement < options.cost_tolerance * self.cost:
+                self.converged, self.message = True, "converged"
+                return
+            while True:
+                shares = size / (size**2 + damping * size.max() ** 2)
+                step = np.zeros(len(self.values))
+                step[free] = -unit * (right.T @ (shares * along))
+                trial = self._problem.parameters.clipped(self.values + step)
+                residual, cost = self._evaluate(trial)
+                foreseen = 0.5 * float(((2.0 - size * shares) * size * shares * along**2).sum())
+                if cost < self.cost:
+                    break
+                if foreseen <= max(options.cost_tolerance * self.cost, 0.25 * options.step_tolerance**2):
+                    # no lower than rounding: this is the minimum
+                    self.converged, self.message = True, "converged"
+                    return
+                damping, growth, self.straight = max(damping, 1e-9) * growth, 2.0 * growth, False
+                if damping > options.max_damping:
+                    self.message = "no step lowers the objective"
+                    return
+            ratio = (self.cost - cost) / max(foreseen, 1e-300)
+            damping, growth = damping * max(1.0 / 30.0, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3), 2.0
+            if ratio < 0.5:
+                self.straight = False
+            self.values, self.residual, self.cost = trial, residual, cost
+
+    def _free(self, triangle: FloatArray) -> npt.NDArray[np.bool_]:
+        """Parameters (p,) that are not at a bound which the gradient presses them against."""
+        parameters, gradient = self._problem.parameters, triangle[:, :-1].T @ triangle[:, -1]
+        at_low = (self.values <= parameters.low) & (gradient > 0.0)
+        at_high = (self.values >= parameters.high) & (gradient < 0.0)
+        return ~(at_low | at_high)
+
+    def estimate(self, evaluations: int) -> Estimate:
+        """The Estimate of where the search ended."""
+        readings, triangle = self._linearized()
+        end = SearchEnd(self.converged, self.straight, self.message, self.cost, evaluations)
+        return Estimate.at(self._problem, self.values, readings, self._free(triangle), end)
+
+
+def _factors(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Singular value decomposition (u, s, v') of columns (r, k) scaled to unit length, and the scale (k,)."""
+    length = np.linalg.norm(columns, axis=0)
+    unit = 1.0 / np.where(length > 0.0, length, 1.0)
+    return *np.linalg.svd(columns * unit, full_matrices=False), unit
