@@ -124,6 +124,18 @@ class Estimate:
         return replace(self, covariance=self.covariance * factor**2)
 
 
+def numerical_rank(columns: FloatArray, tolerance: float = 1e-9) -> int:
+    """Number of combinations of columns (n, k) that differ from zero by more than a share of the largest.
+
+    Each column counts by its own length. Columns are taken some rows at a time, so that few are held at once.
+    """
+    size = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), 1e-300)
+    triangle = np.zeros((0, len(size)))
+    for some in np.array_split(columns, len(columns) // 4000 + 1):
+        triangle = np.linalg.qr(np.concatenate([triangle, some / size]), mode="r")
+    return int(np.linalg.matrix_rank(triangle, rtol=tolerance))
+
+
 def triangle_of(rows: FloatArray) -> FloatArray:
     """Upper triangle (k, k) with the same sums of squares and products as rows (n, k)."""
     short = max(rows.shape[1] - len(rows), 0)

@@ -32,8 +32,13 @@ _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 _STATED, _ALIKE = 5.6, 10.0
 # a stated noise is this factor off at most: 1 sigma of what is believed of it; beyond, it is contradicted
 CONTRADICTED = 1.3
+# numbers that have to be left when everything that may be fitted is, for the noise to be estimated within some 20 %
+MIN_FREE_NUMBERS = 15.0
 # offsets of a smaller share of the noise's variance are none
-_NO_OFFSET, _INTERVAL = 0.05, (0.025, 0.975)
+_NO_OFFSET = 0.05
+# prior probability of no correlation, and of no offsets: many campaigns have neither, and readings that cannot tell
+# must not widen every interval
+_NONE = 0.5
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
 # of more columns than this the squares tell the rank, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
@@ -47,22 +52,31 @@ _LONG = 400
 class NoiseModel:
     """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a.
 
-    offset_interval: 95 % of the offset; offset_probability: that it is more than a twentieth of the noise's variance;
-    alike: factor of the variance by which readings at one stop, which share the robot's errors, count as fewer.
+    offset_posterior: values of rho that were tried with their posterior probabilities; alike: factor of the variance by
+    which readings at one stop, which share the robot's errors, count as fewer.
     """
 
     axis_mm: np.ndarray
     correlation: float = 0.0
     offset: float = 0.0
     correlated: np.ndarray | float = 1.0
-    offset_interval: tuple = (0.0, 0.0)
-    offset_probability: float = 0.0
+    offset_posterior: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
     alike: float = 1.0
 
     @classmethod
     def white(cls, noise_mm):
         """Uncorrelated noise of one size (mm) on all axes."""
         return cls(np.full(3, float(noise_mm)))
+
+    @property
+    def offset_probability(self):
+        """Posterior probability that offsets make more than a twentieth of the noise's variance."""
+        return sum(probability for value, probability in self.offset_posterior if value > _NO_OFFSET)
+
+    def drawn_offsets(self, generator, draws):
+        """Draws (draws,) of the share of offsets from its posterior."""
+        values, probabilities = np.array(self.offset_posterior).T
+        return generator.choice(values, draws, p=probabilities / probabilities.sum())
 
     @property
     def mean_mm(self):
@@ -127,10 +141,17 @@ def lengths(series):
     return count[number]
 
 
-def fit_noise(data, columns, series, stated_mm=None):
+def _spike_and_slab(density):
+    """Prior probabilities (g,) over a grid that begins with none: half of them on it, the rest by a density (g,)."""
+    slab = density[1:] / max(density[1:].sum(), 1e-300)
+    return np.concatenate([[_NONE if len(slab) else 1.0], (1.0 - _NONE) * slab])
+
+
+def fit_noise(data, columns, series, stated_mm=None, repeats=None):
     """NoiseModel of data (m, 3) of which columns (m, 3, k) may fit whatever they can; series (m,).
 
-    stated_mm: deviation per axis that is stated, None where none is.
+    stated_mm: deviation per axis that is stated, None where none is; repeats: deviation per axis of poses that were
+    measured several times and its degrees of freedom, which count where the columns leave few numbers, None for none.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
@@ -139,8 +160,12 @@ def fit_noise(data, columns, series, stated_mm=None):
         white = (together / np.sqrt(variance)[..., None]).reshape(-1, together.shape[-1])
         left, share = _left(white[:, -1], white[:, :-1])
         seen = _Seen(variance * left.reshape(-1, 3) ** 2, share.reshape(-1, 3), wave, length)
+        known = [(stated_mm**2, _STATED)] if stated_mm else []
+        if repeats and repeats[1] and seen.free < MIN_FREE_NUMBERS:
+            known.append((repeats[0] ** 2, float(repeats[1])))
+            instrument_mm = instrument_mm or repeats[0]
         instrument_mm = instrument_mm or seen.rough_mm
-        last, model = model, seen.most_likely(instrument_mm, stated_mm)
+        last, model = model, seen.most_likely(instrument_mm, known)
         numbers = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
         if np.allclose(*numbers, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
@@ -221,39 +246,48 @@ class _Seen:
         upper = self.wave > 0.5 * self.length
         return float(np.sqrt(self.squares[upper].sum() / max(self.freedom[upper].sum(), 1e-9)))
 
-    def most_likely(self, instrument_mm, stated_mm):
+    @property
+    def free(self):
+        """Numbers that are left of the readings when everything that may be fitted is."""
+        return float(self.freedom.sum())
+
+    def most_likely(self, instrument_mm, known):
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        correlated = np.minimum(1.0, (CONTRADICTED * instrument_mm) ** 2 / self._axes(1.0, stated_mm)[0])
-        offsets = _OFFSETS[_OFFSETS * instrument_mm**2 / correlated.mean() <= (CONTRADICTED * instrument_mm) ** 2]
+        white, largest = self._axes(1.0, known)[0], (CONTRADICTED * instrument_mm) ** 2
+        correlated = np.minimum(1.0, largest / white)
+        offsets = _OFFSETS[_OFFSETS * white.mean() <= largest]
         grid = [(correlation, offset) for correlation in _CORRELATIONS for offset in offsets]
-        value = np.array([self._value(*pair, correlated, stated_mm) for pair in grid])
-        weight = np.exp(value - value.max())
-        correlation, offset = (weight / weight.sum()) @ np.array(grid)
-        axes, _ = self._axes(self._shape(correlation, offset, correlated), stated_mm)
-        each = (weight / weight.sum()).reshape(len(_CORRELATIONS), len(offsets)).sum(axis=0)
-        low, high = (offsets[np.searchsorted(each.cumsum(), share).clip(max=len(offsets) - 1)] for share in _INTERVAL)
-        real = float(each[offsets > _NO_OFFSET].sum())
-        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated, (low, high), real)
+        value = np.array([self._value(*pair, correlated, known) for pair in grid])
+        prior = np.outer(_spike_and_slab(1.0 - _CORRELATIONS), _spike_and_slab(np.exp(-offsets)))
+        weight = prior.ravel() * np.exp(value - value.max())
+        weight /= weight.sum()
+        correlation, offset = weight @ np.array(grid)
+        axes, _ = self._axes(self._shape(correlation, offset, correlated), known)
+        each = weight.reshape(prior.shape).sum(axis=0)
+        posterior = tuple(zip(offsets.tolist(), each.tolist(), strict=True))
+        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated, posterior)
 
     def _shape(self, correlation, offset, correlated):
         """Variances (m, 3) over those of the axes."""
         smooth, run = _densities(correlation, self.wave, self.length)
         return 1.0 + correlated * (smooth - 1.0) + offset * run
 
-    def _value(self, correlation, offset, correlated, stated_mm):
-        """Log posterior of a correlation and an offset at the likeliest sizes."""
+    def _value(self, correlation, offset, correlated, known):
+        """Log likelihood of a correlation and an offset at the likeliest sizes."""
         shape = self._shape(correlation, offset, correlated)
-        own = self._axes(shape, stated_mm)[1] - 0.5 * (self.freedom * np.log(shape)).sum()
-        return own + np.log1p(-correlation) - offset
+        return self._axes(shape, known)[1] - 0.5 * (self.freedom * np.log(shape)).sum()
 
-    def _axes(self, shape, stated_mm):
-        """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior."""
+    def _axes(self, shape, known):
+        """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior.
+
+        known: statements (variance in mm^2, degrees of freedom that it is worth).
+        """
         sums, freedom = (self.squares / shape).sum(axis=0), self.freedom.sum(axis=0)
-        known = (_STATED, _STATED * stated_mm**2) if stated_mm else (0.0, 0.0)
-        pooled = (sums.sum() + known[1]) / (freedom.sum() + known[0])
+        stated = sum(worth for _, worth in known)
+        pooled = (sums.sum() + sum(worth * variance for variance, worth in known)) / (freedom.sum() + stated)
         axes = (sums + _ALIKE * pooled) / (freedom + _ALIKE)
         value = -0.5 * (freedom * np.log(axes) + sums / axes).sum()
         value -= 0.5 * _ALIKE * (np.log(axes / pooled) + pooled / axes - 1.0).sum()
-        if stated_mm:
-            value -= 0.5 * _STATED * (np.log(pooled / stated_mm**2) + stated_mm**2 / pooled - 1.0)
+        for variance, worth in known:
+            value -= 0.5 * worth * (np.log(pooled / variance) + variance / pooled - 1.0)
         return axes, value

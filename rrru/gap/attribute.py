@@ -1,6 +1,5 @@
 """Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
 
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -8,16 +7,15 @@ import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.campaign import noise
-from rrru.errors import FitError
-from rrru.estimation.noise_model import alike, fit_noise
+from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise
 from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.identify import with_seen
+from rrru.gap.model_fit import EffectModel, ModelFit, fit_model
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.spectra import with_spectra
 from rrru.gap.state import State
@@ -27,9 +25,8 @@ from rrru.gap.whitened import LEVELS
 _MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
 # times the noise below which a gap, and share of the noise, rms, below which what the sim bends by is small
 _SMALL, _STRAIGHT = 10.0, 0.1
-# more columns than this share of the numbers read leave too little to tell the noise by
-_MOST_FITTED = 0.5
-_NO_COVARIANCE = np.zeros((0, 0))
+# share of the numbers read that the columns have to leave, so that each reading still shows some of its noise
+_LEAST_FREE = 0.1
 # what is told of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 
@@ -38,17 +35,16 @@ KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 class Attribution:
     """What the search has found.
 
-    origin: State that calibrations start from; calibrated: of the calibration alone; state: of the best hypothesis,
-    fitted on the exact sim, with the covariance (k, k) of its terms' coefficients; evidence: on the last linearisation,
-    about that state; posterior over all hypotheses; hypothesis, level: the best one and its discrepancy level;
-    noise_from: "given", "repeats" or "fitted"; dropped: number of points left out as outliers.
+    origin: State that calibrations start from; calibrated: of the calibration alone, under the noise that was found;
+    fit: ModelFit of the hypothesis at its discrepancy level; evidence: on the last linearisation;
+    posterior over all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given",
+    "repeats" or "fitted"; dropped: number of points left out as outliers.
     """
 
     case: Case
     origin: State
     calibrated: State
-    state: State
-    covariance: np.ndarray
+    fit: ModelFit
     evidence: ModelEvidence
     posterior: Posterior
     hypothesis: Hypothesis
@@ -56,13 +52,18 @@ class Attribution:
     noise_from: str = "given"
     dropped: int = 0
 
+    @property
+    def state(self):
+        """The State of the fit."""
+        return self.fit.state
+
     @cached_property
     def held_out(self):
         """Predictions of left-out points."""
         return HeldOut(self.case, self.evidence)
 
     def believing(self, beliefs):
-        """The attribution with another posterior and its best hypothesis; the state stays."""
+        """The attribution with another posterior and its best hypothesis; the fit stays."""
         hypothesis, level = beliefs.best()
         return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
 
@@ -91,20 +92,35 @@ def with_beside(case):
 def with_noise(case, linear, stated_mm):
     """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
 
-    "fitted", see `rrru.estimation.noise_model`, or "repeats" where points that were measured again say clearly less.
+    "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
     """
-    columns = np.concatenate([linear.base, *linear.columns.values(), *linear.shape_columns.values()], axis=-1)
-    if columns.shape[-1] > _MOST_FITTED * linear.data.size:
-        # too few points to fit everything: what the calibration leaves has to do
-        columns = linear.base
-    model = fit_noise(linear.data, columns, case.series, stated_mm)
+    repeats = noise.repeat_noise(case.measurements[case.used])
+    columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
+    model = fit_noise(linear.data, columns, case.series, stated_mm, repeats)
     model = replace(model, alike=alike(linear.data, columns, case.stop, case.kind))
-    repeated, count = noise.repeat_noise(case.measurements[case.used])
+    repeated, count = repeats
     # what is correlated tells less
     count *= (1.0 - model.correlation**2) / (1.0 + model.correlation**2)
     if count >= noise.ENOUGH_REPEATS and 0.0 < repeated < model.mean_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
         return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
     return case.under(model), "fitted"
+
+
+def _noise_columns(case, linear, known):
+    """Columns (m, 3, k) that may explain the readings while the noise is estimated.
+
+    All of the library; without effects of many coefficients where these leave too few numbers. known: whether the
+    noise is known otherwise, so that no number needs to be left; where it is not and the library explains everything,
+    what the calibration leaves has to do.
+    """
+    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+    few = [one for key, one in blocks.items() if not case.library[key[0]].coordinates.broad]
+    choices = [*blocks.values()], few
+    for chosen in choices:
+        columns = np.concatenate([linear.base, *chosen, *linear.shape_columns.values()], axis=-1)
+        if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, _LEAST_FREE * linear.data.size):
+            return columns
+    return columns if known else linear.base
 
 
 def _rough(case, calibrated):
@@ -147,25 +163,32 @@ def attribute(case, prior, stated=KNOWN):
 
 
 def with_effects(attribution, effects):
-    """The attribution with hypothesis and state of exactly the named effects, fitted anew; the posterior stays."""
+    """The attribution with hypothesis and fit of exactly the named effects; the posterior stays."""
     same = attribution.hypothesis.effects == frozenset(effects)
-    if same and set(attribution.state.effects) <= {(t.effect, t.shape) for t in attribution.hypothesis.terms}:
-        return attribution
     known = (attribution.hypothesis, attribution.level) if same else attribution.posterior.best_of(frozenset(effects))
     if known is None:
         terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
         found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
         levels = attribution.evidence.levels
         found[levels], strengths[levels] = attribution.evidence.independent(terms, levels)
-        # what an unknown function took beside them is a discrepancy without it
+        # what an unknown function explains with them is a discrepancy without it
         known = Hypothesis(terms, found, strengths), int(found.argmax())
     hypothesis, level = known
-    state, covariance = attribution.calibrated, _NO_COVARIANCE
-    if hypothesis.terms:
-        # where the exact sim cannot follow only the linear one is corrected
-        with suppress(FitError):
-            state, covariance = refine(attribution.case, (attribution.state, attribution.origin), hypothesis, level)
-    return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
+    starts = (attribution.fit.state, attribution.origin) if hypothesis.terms else (attribution.calibrated,)
+    fit = fit_hypothesis(attribution.case, attribution.evidence, starts, (hypothesis, level), attribution.fit)
+    return replace(attribution, hypothesis=hypothesis, level=level, fit=fit)
+
+
+def fit_hypothesis(case, evidence, starts, chosen, known=None):
+    """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
+
+    chosen: both; known: a ModelFit that may be the one asked for.
+    """
+    hypothesis, level = chosen
+    scales = evidence.scales(hypothesis.terms, hypothesis.strengths[level])
+    if known and known.level == level and known.model.same_as(EffectModel(case, hypothesis.terms, scales)):
+        return known
+    return fit_model(case, starts, hypothesis.terms, scales, level)
 
 
 class _Looks:
@@ -201,18 +224,18 @@ def _bends(case, linear, state, fitted):
 
 
 def _rounds(case, calibrated, prior, stated):
-    """Search and refinement in turn until a hypothesis is the best one again."""
-    state, covariance, seen, looks = calibrated, _NO_COVARIANCE, set(), _Looks(stated, case.noise_mm)
-    start = origin(case)
-    case, linear, source = looks.at(case, state)
+    """Search and fit in turn until a hypothesis is the best one again."""
+    looks, seen, start = _Looks(stated, case.noise_mm), set(), origin(case)
+    case, linear, source = looks.at(case, calibrated)
     case, linear = with_seen(case, linear)
+    fit = fit_model(case, [calibrated])
+    calibrated = state = fit.state
     evidence = case.evidence(linear)
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
     for _ in range(_MOST_ROUNDS):
         beliefs = posterior(evidence, search(evidence), prior)
         hypothesis, level = beliefs.best()
         if not hypothesis.terms:
-            state, covariance = calibrated, _NO_COVARIANCE
             break
         shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
         unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
@@ -225,17 +248,16 @@ def _rounds(case, calibrated, prior, stated):
         if frozenset(hypothesis.terms) in seen or (settled and (tried is hypothesis or not tried.terms)):
             break
         seen.add(frozenset(hypothesis.terms))
-        try:
-            # what a dropped effect has done to the others' numbers can hold a fit back
-            dropped = {name for name, _ in state.effects} - tried.effects
-            fitted, spread = refine(case, (calibrated if dropped else state, start), tried, its_level)
-            if settled and not _bends(case, linear, state, fitted):
-                break
-            hypothesis, level, state, covariance = tried, its_level, fitted, spread
-            case = case.standing(state)
-            case, linear, source = looks.at(case, state, hypothesis.terms)
-            evidence = case.evidence(linear)
-        except FitError:
-            # the sim cannot follow: what the last linearisation says stands
+        # what a dropped effect has done to the others' numbers can hold a fit back
+        dropped = {name for name, _ in state.effects} - tried.effects
+        found = fit_hypothesis(case, evidence, (calibrated if dropped else state, start), (tried, its_level))
+        if settled and not _bends(case, linear, calibrated, found.state):
             break
-    return Attribution(case, start, calibrated, state, covariance, evidence, beliefs, hypothesis, level, source)
+        fit, state = found, found.state
+        case = case.standing(state)
+        case, linear, source = looks.at(case, state, tried.terms)
+        evidence = case.evidence(linear)
+    hypothesis, level = beliefs.best()
+    result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
+    # estimate and hypothesis are of one set, whether the rounds have ended or gone round
+    return with_effects(result, hypothesis.effects)

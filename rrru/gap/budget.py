@@ -127,8 +127,7 @@ def _noise_parts(attribution, stated_mm, generator, draws):
         scatter = np.where(beyond, np.maximum(axes - stated_mm**2, 0.0), 0.0)
         error = np.sqrt(0.5 / freedom)
         probability = ndtr((np.log(model.axis_mm / stated_mm) - np.log(CONTRADICTED)) / error).max()
-    low, high = model.offset_interval
-    offset = np.clip(generator.normal(model.offset, (high - low) / 4.0, draws), 0.0, None)
+    offset = model.drawn_offsets(generator, draws)
     return {
         "instrument": (axes - scatter).sum(axis=1),
         "scatter": (scatter.sum(axis=1), probability),

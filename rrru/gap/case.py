@@ -190,6 +190,13 @@ class Case:
         twists = self.mechanism.twists(state.deviations) + self.contribution(state).twists
         return self.mechanism.solve(actuators, command, twists), twists
 
+    def map_of(self, state):
+        """The TwistMap of all points at a state's poses; see `rrru.robots.robot.Robot.map`."""
+        actuators, _ = self.driven
+        if self.readings is None and not state.effects:
+            return self.mechanism.map_at(actuators, self.sim(state.deviations), state.deviations)
+        return self.mechanism.map(actuators, *self.posed(state), self.readings)
+
     def left(self, state):
         """What is read minus the sim corrected by a state, of all points: positions (N, 3), then orientations.
 

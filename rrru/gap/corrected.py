@@ -12,7 +12,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.gap.details import parameter_rows
-from rrru.gap.uncertainty import one_sigma_steps, weight_notes
+from rrru.gap.result_notes import weight_notes
 from rrru.robots.file_changes import Found
 from rrru.robots.to_mjcf import to_mjcf
 from rrru.robots.to_urdf import to_urdf
@@ -43,7 +43,7 @@ def found_of(attribution):
     constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
     constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
     twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
-    steps, coordinates = one_sigma_steps(attribution)
+    steps, coordinates = attribution.fit.one_sigma_steps()
     spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
     for key, twist in constant.items():
         moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])

@@ -8,9 +8,9 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
+from rrru.gap.model_fit import GEOMETRY
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import sites, spread
-from rrru.gap.uncertainty import coefficient_covariance, covariance_of, fitted_terms, weight_of
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 from rrru.gap.weight import WEIGHT
@@ -114,23 +114,14 @@ def _set_rows(attribution):
 
 def parameter_rows(attribution):
     """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
-    parameters, state = attribution.case.mechanism.parameters, attribution.state
-    sizes = np.sqrt(np.diag(covariance_of(attribution))[: len(parameters)])
+    fit, library = attribution.fit, attribution.case.library
+    parameters, errors = attribution.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     result = [
         ("calibration", parameter.name, parameter.unit, value, error, False)
-        for parameter, value, error in zip(parameters, state.deviations, sizes, strict=True)
+        for parameter, value, error in zip(parameters, fit.state.deviations, errors, strict=True)
     ]
-    start, library, found = 0, attribution.case.library, coefficient_covariance(attribution)
-    for term in fitted_terms(attribution):
-        key, effect = (term.effect, term.shape), library[term.effect]
-        shape, coordinates = state.shape(library, key), state.effects[key]
-        matrix = spread(effect.coordinates, term.legs)
-        own = slice(start, start + matrix.shape[1])
-        start = own.stop
-        slope = _slope(effect, coordinates, shape)
-        covariance = slope @ (matrix @ found[own, own] @ matrix.T) @ slope.T
-        errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        values = effect.coordinates.to_values(coordinates, shape)
+    for term in fit.terms:
+        effect, values, errors = library[term.effect], *_effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
         errors = np.where(errors > 0.0, errors, np.nan)
         result += [
@@ -138,19 +129,31 @@ def parameter_rows(attribution):
             for parameter, *numbers in zip(effect.parameters, values, errors, bound.tolist(), strict=True)
         ]
     bounds = attribution.case.bounds
-    result += [(WEIGHT, name, *rest, rest[1] in bounds[name]) for name, *rest in weight_of(attribution)]
+    result += [(WEIGHT, name, *rest, rest[1] in bounds[name]) for name, *rest in fit.weight]
     return pd.DataFrame(result, columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"))
 
 
-def _slope(effect, coordinates, shape):
-    """Derivative (p, c) of an effect's parameter values by its coordinates."""
+def _effect_values(fit, library, term):
+    """Parameter values (p,) of a term's effect and their standard errors (p,), 0 for what was not fitted."""
+    state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
+    shape, present, matrix = state.shape(library, key), state.effects[key], spread(coordinates, term.legs)
+    names, covariance = fit.effect_covariance(term)
+    shifts = [(1e-4 * column * coordinates.typical.max(), {}) for column in matrix.T]
+    shifts += [(0.0, {name: 1e-4 * max(abs(shape[name]), 1e-6)}) for name in names]
     columns = []
-    for shift in np.diag(1e-4 * np.asarray(effect.coordinates.typical)):
-        ends = (effect.coordinates.to_values(coordinates + sign * shift, shape) for sign in (1.0, -1.0))
-        difference = next(ends) - next(ends)
+    for shift, moved in shifts:
+        up, down = (
+            coordinates.to_values(
+                present + sign * shift, dict(shape) | {name: shape[name] + sign * step for name, step in moved.items()}
+            )
+            for sign in (1.0, -1.0)
+        )
+        difference = up - down
+        size = 2.0 * (sum(moved.values()) if moved else np.max(shift))
         # a phase may have gone once round
-        columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / (2.0 * shift.sum()))
-    return np.stack(columns, axis=-1)
+        columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / size)
+    slope = np.stack(columns, axis=-1)
+    return coordinates.to_values(present, shape), np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
 
 
 def _point_rows(attribution, after, drive):

@@ -19,11 +19,11 @@ from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
+from rrru.gap.result_notes import fit_notes, weight_notes
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
-from rrru.gap.uncertainty import deviation_errors, weight_notes
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
@@ -117,9 +117,10 @@ def diagnose(
 def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     """What the data lack for a better answer, what they contradict, and what a user has to know of the robot."""
     case = attribution.case
-    yield from mastering_notes(attribution.state, case.mechanism, deviation_errors(attribution))
+    yield from mastering_notes(attribution.state, case.mechanism, attribution.fit.geometry_errors)
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
+    yield from fit_notes(attribution)
     if case.count < _USUAL * len(case.used):
         which = "where a run begins, where a drive may just have turned back, near singularities, outliers, blanks"
         yield f"{case.count} of {len(case.used)} points used, left out are those {which}"

@@ -4,7 +4,7 @@ Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
 
-with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (flat prior), the
+with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior), the
 effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
 of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
 O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
@@ -26,7 +26,7 @@ from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
-from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, is_told, mean_over_cases, over_cases
+from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, mean_over_cases, over_cases
 from rrru.gap.whitened import LEVELS, Whitened
 from rrru.kept import Latest
 
@@ -287,27 +287,6 @@ class ModelEvidence:
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
         return over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
-
-    def weight_errors(self, terms, strengths, level):
-        """Standard errors (q,) of the weight's numbers, in their steps, at strengths of a set of terms and a level.
-
-        They are told by what is itself told from zero. What was found of a spring that bears next to nothing is
-        anything, and would deny that it ever bears more.
-        """
-        found = self.found(terms)
-        told = is_told(found, *self._weakly(terms))
-        sure = self._borne(terms, [level], np.where(told, found, 0.0))
-        _, covariance = over_cases(sure, np.asarray(strengths)[None])
-        return np.sqrt(np.diag(covariance)[-len(self.linear.weight_steps) :])
-
-    def calibration(self, terms, level):
-        """Covariance (p, p) of the calibration's deviations at known coefficients of terms, and how they follow these.
-
-        The latter is (p, k), in the order of the coefficients of `coefficients` without those of shapes.
-        """
-        covariance, follows = self._whitened.of_calibration(level)
-        index = [number for term in terms for number in self._prior(term).index]
-        return covariance, follows[:, index]
 
 
 def averaged(value, terms):

@@ -5,19 +5,22 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg import block_diag, cho_solve, solve_triangular
 
 from rrru.campaign.noise import along_runs
-from rrru.estimation.noise_model import lengths
+from rrru.estimation.cross_validation import CrossValidation, choose_folds
+from rrru.estimation.noise_model import half_waves, lengths
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
-from rrru.gap.terms import EACH, signatures
+from rrru.gap.terms import signatures
 from rrru.gap.terms import spread as spread_of
 from rrru.gap.whitened import LEVELS, spectrum
 
 # where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
 # so-manieth is left out
 _STRETCH, _FOLDS = 5, 5
+# more runs than this share folds
+_MAX_RUN_FOLDS = 20
 # fewer runs than this are resampled by stretches
 _ENOUGH_RUNS = 10
 
@@ -67,42 +70,45 @@ def _log_score(residual, variance):
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Predictions of every used point of a case from the points of the other folds, on one linearisation."""
+    """Predictions of every used reading of a case from those of the other folds, on one linearisation."""
 
     case: Case
     evidence: ModelEvidence
 
     @cached_property
     def fold(self):
-        """Fold numbers (n,): one fold per run where every trajectory was driven more than once, else five.
+        """Fold numbers (m,) whose complements determine the calibration, see `rrru.estimation.cross_validation`.
 
-        Those are interleaved stretches: leaving out the only run of a kind would ask for extrapolation, which says
-        nothing about the effect.
+        Runs where every trajectory was driven more than once. Else five interleaved stretches: leaving out the only
+        run of a kind would ask for extrapolation, which says nothing about the effect. Where these leave a parameter
+        to one fold alone, as of a target that was seen at a few stops, every fifth stop.
         """
+        white = self.evidence.linear.base / self.case.noise_mm
+        return choose_folds(self._candidates(), white)
+
+    def _candidates(self):
+        """Fold numbers (m,), the ones that ask for most first."""
         frame, run = self.case.points, self.case.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
-            return np.unique(run, return_inverse=True)[1]
-        result = (within(run, self.case.stop) // _STRETCH + run) % _FOLDS
-        return np.unique(result, return_inverse=True)[1]
+            yield np.unique(run, return_inverse=True)[1] % _MAX_RUN_FOLDS
+        place = within(run, self.case.stop)
+        for length in (_STRETCH, 1):
+            yield np.unique((place // length + run) % _FOLDS, return_inverse=True)[1]
 
     def predict(self, terms, strengths, level, uncertain=True):
         """Prediction by the calibration together with a set of terms.
 
         The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
-        laws as they are. uncertain: tell the prediction's spread, too.
+        effect models as they are. uncertain: state the prediction's spread, too.
         """
-        linear, blocks = self.evidence.linear, self._blocks(terms)
-        ends = np.cumsum([block.shape[-1] for block in blocks])
-        residual = np.empty_like(linear.data)
-        together = np.concatenate(blocks, axis=-1) if uncertain else linear.base[..., :0]
-        spread = np.empty_like(together)
-        for number, (unit, factor, mean) in self._fits(terms, strengths, level).items():
+        linear = self.evidence.linear
+        together = np.concatenate(self._blocks(terms), axis=-1)
+        residual, spread = np.empty_like(linear.data), np.empty_like(together if uncertain else linear.base[..., :0])
+        for number, fit in self._fits(terms, strengths, level).items():
             out = self.fold == number
-            parts = np.split(mean, ends[:-1])
-            residual[out] = linear.data[out] - sum(b[out] @ part for b, part in zip(blocks, parts, strict=True))
+            residual[out] = linear.data[out] - together[out] @ fit.mean
             if uncertain:
-                scaled = (together[out] * unit).reshape(-1, len(unit))
-                spread[out] = _halved(factor, scaled).T.reshape(-1, 3, len(unit))
+                spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
 
     def gains(self, terms, strengths, level):
@@ -117,12 +123,12 @@ class HeldOut:
         result, score = [], _log_score(residuals, variances).sum()
         for first, last in pairwise(np.cumsum([block.shape[-1] for block in self._blocks(terms)])):
             residual, variance = residuals.copy(), variances.copy()
-            for number, (unit, factor, mean) in fits.items():
+            for number, fit in fits.items():
                 out = self.fold == number
-                half = _halved(factor, np.diag(unit)[first:last])
+                half = fit.half(np.eye(len(fit.mean))[first:last])
                 root, moved = np.linalg.cholesky(half.T @ half), spread[out] @ half
-                residual[out] += moved @ cho_solve((root, True), mean[first:last])
-                taken = _halved(root, moved.reshape(-1, last - first))
+                residual[out] += moved @ cho_solve((root, True), fit.mean[first:last])
+                taken = solve_triangular(root, moved.reshape(-1, last - first).T, lower=True, check_finite=False)
                 variance[out] -= (taken**2).sum(axis=0).reshape(-1, 3)
             result.append(float(score - _log_score(residual, variance).sum()))
         return result
@@ -133,59 +139,40 @@ class HeldOut:
         return [linear.base, *signatures(self.evidence.library, linear, terms)]
 
     def _fits(self, terms, strengths, level):
-        """What is fitted to the points of all folds but one, by its number.
-
-        Units (k,) of the columns of calibration and terms, the lower Cholesky factor (k, k) of the coefficients'
-        precision in these units, and their mean (k,).
-        """
-        free = np.zeros(self.evidence.linear.base.shape[-1])
-        penalty = np.concatenate([free, self.evidence.scales(terms, strengths) ** -2.0])
-        grams = {number: self._chosen(gram, terms) for number, gram in self._sums(level).items()}
-        total, result = sum(grams.values()), {}
-        unit = 1.0 / np.sqrt(np.maximum(np.diag(total)[:-1] + penalty, 1e-300))
-        for number, gram in grams.items():
-            rest = total - gram
-            precision = unit[:, None] * (rest[:-1, :-1] + np.diag(penalty)) * unit
-            factor = np.linalg.cholesky(precision + 1e-12 * np.eye(len(unit)))
-            result[number] = unit, factor, unit * cho_solve((factor, True), unit * rest[:-1, -1])
-        return result
-
-    def _sums(self, level):
-        """Sums of squares and products (K + 1, K + 1) of all columns and the data, by fold, at a level (an index)."""
-        if level not in self._made:
-            weights, together = self._weighted(level)
-            white = np.sqrt(weights)[..., None] * together
-            self._made[level] = {}
-            for number in np.unique(self.fold):
-                own = white[self.fold == number].reshape(-1, white.shape[-1])
-                self._made[level][number] = own.T @ own
-        return self._made[level]
-
-    def _chosen(self, gram, terms):
-        """Of sums (K + 1, K + 1) those (k + 1, k + 1) of calibration, terms and data."""
-        made = [(slice(0, self.evidence.linear.base.shape[-1]), None)]
+        """ComplementFit of calibration and terms by the number of the fold that is left out."""
+        linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
+        sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
+        places, mixing = [np.arange(count)], [np.eye(count)]
         for term in terms:
-            matrix = None if term.legs == EACH else spread_of(self.evidence.library[term.effect].coordinates, term.legs)
-            made.append((self._places[term.effect, term.shape], matrix))
+            places.append(self._places[term.effect, term.shape])
+            mixing.append(spread_of(self.evidence.library[term.effect].coordinates, term.legs))
+        precision = np.concatenate([sd, self.evidence.scales(terms, strengths)]) ** -2.0
+        moment = np.zeros(len(precision))
+        moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
+        return self._at(level).fits(np.concatenate(places), block_diag(*mixing), precision, moment)
 
-        def columns(whole):
-            """Of columns (r, K + 1) the chosen ones."""
-            parts = [whole[:, at] if matrix is None else whole[:, at] @ matrix for at, matrix in made]
-            return np.concatenate([*parts, whole[:, -1:]], axis=1)
-
-        return columns(columns(gram).T)
+    def _at(self, level):
+        """The CrossValidation of all columns and the data at a level (an index), made once."""
+        if level not in self._made:
+            linear = self.evidence.linear
+            together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
+            if self._whole_runs:
+                together, _ = along_runs(together, self.case.series)
+            white = together / np.sqrt(self._left(level))[..., None]
+            self._made[level] = CrossValidation.of(white, self.fold)
+        return self._made[level]
 
     @cached_property
     def _made(self):
-        """Sums of the levels that have been asked for."""
+        """CrossValidation by level."""
         return {}
 
     @cached_property
     def _places(self):
-        """Which columns of `_weighted` an effect (name, shape) has."""
+        """Places of the columns of an effect (name, shape) among all."""
         linear = self.evidence.linear
         ends = np.cumsum([linear.base.shape[-1], *(columns.shape[-1] for columns in linear.columns.values())])
-        return {key: slice(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
+        return {key: np.arange(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
 
     @cached_property
     def _whole_runs(self):
@@ -200,30 +187,8 @@ class HeldOut:
         if not self._whole_runs:
             size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
             return np.broadcast_to(size, self.evidence.linear.data.shape)
-        return noise.variance(self._wave, lengths(series)) + misfit * spectrum(self._wave)[:, None]
-
-    @cached_property
-    def _wave(self):
-        """Half-wave number (n,) of each row among the runs' cosines."""
-        return along_runs(self.evidence.linear.data, self.case.series)[1]
-
-    def _weighted(self, level):
-        """Weights (n, 3) and all columns with the data (n, 3, K + 1) in which a fit is an ordinary weighted one.
-
-        Where folds are whole runs they are along these runs' cosines.
-        """
-        linear = self.evidence.linear
-        together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
-        if self._whole_runs:
-            together, _ = along_runs(together, self.case.series)
-        return 1.0 / self._left(level), together
-
-
-def _halved(factor, rows):
-    """Columns (k, r) of which products make those of rows (r, k) with the inverse of a matrix whose lower factor this
-    is.
-    """
-    return solve_triangular(factor, rows.T, lower=True, check_finite=False)
+        waves = half_waves(series)
+        return noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None]
 
 
 def within(run, at):

@@ -4,7 +4,8 @@ import numpy as np
 
 from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
-from rrru.gap.state import Linear
+from rrru.estimation.parameters import Block
+from rrru.gap.state import Linear, State
 
 
 def linearised(case, state, keys=None):
@@ -12,7 +13,7 @@ def linearised(case, state, keys=None):
 
     keys: (effect, shape) pairs to make columns for, by default all.
     """
-    at, data = _map(case, state), case.residual(state)
+    at, data = case.map_of(State(state.deviations, {})), case.residual(state)
     lost = ~np.isfinite(data).all(axis=1) | ~np.isfinite(at.point_mm[case.at]).all(axis=1)
     if lost.any():
         raise FitError(f"the sim has no pose at {int(lost.sum())} points")
@@ -20,6 +21,7 @@ def linearised(case, state, keys=None):
         keys = [(name, k) for name, effect in case.library.items() for k in range(len(effect.coordinates.shapes))]
     columns = {key: _columns(case, at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
     by_shape = {key[0]: _by_shape(case, at, key, state) for key in state.effects}
+    geometry = Block.geometry(case.mechanism.parameters)
     for key, coordinates in state.effects.items():
         data = data + columns[key] @ coordinates
     return Linear(
@@ -30,16 +32,8 @@ def linearised(case, state, keys=None):
         {name: steps for name, (_, steps) in by_shape.items()},
         case.of_rows(at.drive_effect),
         *_by_weight(case, at, state, columns),
+        (geometry.sd, geometry.mean - state.deviations),
     )
-
-
-def _map(case, state):
-    """The map at a state's deviations, without its effects."""
-    actuators, command = case.driven
-    if case.readings is None:
-        return case.mechanism.map_at(actuators, case.sim(state.deviations), state.deviations)
-    twists = case.mechanism.twists(state.deviations)
-    return case.mechanism.map(actuators, case.mechanism.solve(actuators, command, twists), twists, case.readings)
 
 
 def _by_shape(case, at, key, state):

@@ -56,7 +56,8 @@ class Linear:
     standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
     derivative by the actuator values; by_weight: (effect, shape) of what bears loads to what a step of each of q
     numbers of the weight makes of its columns, (m, 3, q c); weight_steps: these numbers, each (name, value, stepped
-    value, prior mean of so many steps).
+    value, prior mean of so many steps); base_prior: standard deviations (p,) and means (p,) of the geometric errors'
+    priors, the means as steps from where they stand, None for flat priors.
     """
 
     data: np.ndarray
@@ -67,3 +68,4 @@ class Linear:
     drive: np.ndarray
     by_weight: dict = field(default_factory=dict)
     weight_steps: tuple = ()
+    base_prior: tuple | None = None

@@ -28,14 +28,13 @@ from rrru.robots.lumps import PLATFORM
 # its name beside effects, and that of its mass
 WEIGHT, _EXTRA = "weight", "extra_kg"
 # chances that a mass, or a lean, is as told and that it is not, each with its share of the standard deviations below
-_CASES = ((0.5, 0.1), (0.5, 1.0))
+NARROW_SHARE = 0.1
+_CASES = ((0.5, NARROW_SHARE), (0.5, 1.0))
 _SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
 # share of the told mass that may be missing, and standard deviations that anything may be off by
 _MISSING, _MOST = 0.9, 10.0
 # such a share of these is nothing
 _STAYS = 1e-4
-# standard errors that tell a coefficient from zero
-_TOLD = 2.0
 # strengths lie so far apart that the next one to a size may be this share of it
 _NEXT = 0.5
 
@@ -63,11 +62,6 @@ def doubts_of(motion, masses):
 def as_found(problem, strengths):
     """Coefficients (k,) of a Projected problem of one level at strengths (1, terms)."""
     return posterior_mean(problem, problem.scale(strengths)[0])
-
-
-def is_told(found, problem, strengths):
-    """Whether each coefficient (k,), found by `as_found` of the same problem and strengths, is told from zero."""
-    return np.abs(found) > _TOLD * np.sqrt(np.diag(posterior_covariance(problem, problem.scale(strengths)[0])))
 
 
 def borne(problem, count, blocks, steps, found, grams):

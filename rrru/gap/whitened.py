@@ -17,8 +17,6 @@ from rrru.gap.weight import WEIGHT
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 # the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
 _HALF_WAVES, _WHITE = 3.0, 0.01
-# what the points see less of than this, as a share of what they see best, they do not see
-_UNSEEN = 1e-12
 
 
 def spectrum(wave):
@@ -85,22 +83,21 @@ class Whitened:
         return {}
 
     def _white(self, level):
-        """Whitened columns (m, k), of which the first p are the calibration's; variances; and p."""
+        """Whitened columns (m, k), of which the first p are the calibration's; variances; and p.
+
+        The last rows are the priors of the calibration's parameters.
+        """
         (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
         own = self.noise.variance(wave, lengths(self.run)) / unit**2
         variance = own + LEVELS[level] ** 2 * spectrum(wave)[:, None]
-        return (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1]), variance, p
-
-    def of_calibration(self, level):
-        """Covariance (p, p) of the deviations at a level (an index) where all coefficients are known.
-
-        And by how much they follow each coefficient (p, k).
-        """
-        white, _, p = self._white(level)
-        basis, triangle = np.linalg.qr(white[:, :p])
-        inverse = np.linalg.pinv(triangle, rcond=_UNSEEN)
-        follows = -inverse @ (basis.T @ white[:, p:-1])
-        return inverse @ inverse.T, np.concatenate([follows, follows @ self.layout[1]], axis=1)
+        white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
+        if self.linear.base_prior is None:
+            return white, variance, p
+        sd, mean = self.linear.base_prior
+        stated = np.isfinite(sd)
+        prior = np.zeros((p, white.shape[1]))
+        prior[:, :p], prior[:, -1] = np.diag(1.0 / sd), np.where(stated, mean, 0.0) / sd
+        return np.concatenate([white, prior[stated]]), variance, p
 
     def gram(self, level):
         """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.

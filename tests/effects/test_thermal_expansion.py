@@ -5,7 +5,8 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.effects import library as effects
-from rrru.gap.fit_effects import fit_effects
+from rrru.gap.calibrate import calibrate
+from rrru.gap.model_fit import fit_named_effects
 from rrru.gap.settings import GapSettings
 from tests.gap import arms
 
@@ -45,8 +46,9 @@ def test_the_coefficient_is_found_from_an_arm_measured_warm_and_cold():
     temperature = 20.0 + 8.0 * np.sin(np.arange(60.0))
     grown = rows.measured(frame) * (1.0 + _EXPANSION * (temperature - 20.0))[:, None]
     frame = frame.assign(temperature_c=temperature, **rows.vector_columns("measured", grown))
-    fit = fit_effects(arms.case_of(frame, "thermal_expansion"), ["thermal_expansion"])
-    found, error = fit.state.effects["thermal_expansion", 0][0], fit.errors["thermal_expansion"][0]
+    case = arms.case_of(frame, "thermal_expansion")
+    fit = fit_named_effects(case, ["thermal_expansion"], calibrate(case))
+    found, error = fit.state.effects["thermal_expansion", 0][0], fit.estimate.block_errors("thermal_expansion")[0]
     assert error < 0.05 * _EXPANSION
     assert found == pytest.approx(_EXPANSION, abs=4.0 * error)
 

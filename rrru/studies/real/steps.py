@@ -15,9 +15,10 @@ from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
+from rrru.estimation.estimate import numerical_rank
 from rrru.gap.calibrate import calibrate
 from rrru.gap.case import Case
-from rrru.gap.fit_effects import fit_effects, identified
+from rrru.gap.model_fit import fit_named_effects
 from rrru.gap.state import State
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.geometric_numbers import direction, open_numbers
@@ -118,14 +119,14 @@ def steps(case: Case) -> tuple[Step, ...]:
             continue
         began, names = time.perf_counter(), (*names, effect) if effect else names
         try:
-            fit = fit_effects(case, names, calibrated=calibrated)
+            fit = fit_named_effects(case, names, calibrated)
         except FitError:
             if not effect:
                 raise
             # the next models go on from those before
             names = names[:-1]
             continue
-        numbers = fit.numbers, fit.identifiable, time.perf_counter() - began
+        numbers = len(fit.estimate.values), fit.estimate.rank, time.perf_counter() - began
         result.append(Step(model, adds, fit.state, *numbers, *_left(case, fit.state)))
     return tuple(result)
 
@@ -141,7 +142,7 @@ def _identified(case: Case, state: State, calibrated: bool = True) -> int:
     """How many of the numbers of a state's effects, and of the calibration where that is fitted, the rows tell."""
     linear = case.linearise(state, [])
     blocks = [linear.base] * calibrated + [linear.columns[key] for key in state.effects]
-    return identified(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
+    return numerical_rank(np.concatenate(blocks, axis=-1).reshape(linear.data.size, -1))
 
 
 def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:

@@ -16,9 +16,10 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.effects.library import find
 from rrru.errors import ConfigError
+from rrru.gap.calibrate import calibrate
 from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.fit_effects import fit_effects
 from rrru.gap.make_case import make_case
+from rrru.gap.model_fit import fit_named_effects
 from rrru.robots.dynamics import Masses
 from rrru.studies import setup
 from rrru.studies.real.chains import robot_section, sheet
@@ -47,11 +48,11 @@ class Torso:
         return setup.measured_robot(self.nominal, self.of(0), parameter_set)
 
     def model(self, parameter_set, effects=()):
-        """EffectFit of the rows for training, and distances (n,) in mm of the held-out ones."""
+        """ModelFit of the rows for training, and distances (n,) in mm of the held-out ones."""
         robot = self.robot(parameter_set)
         library = {name: find(name, robot) for name in effects}
         train, test = (make_case(self.of(k), robot, _NO_LOADS, _NOISE_MM, library) for k in (0, 1))
-        fit = fit_effects(train, effects)
+        fit = fit_named_effects(train, effects, calibrate(train))
         return fit, np.linalg.norm(test.left(fit.state), axis=1)
 
 
@@ -108,14 +109,20 @@ def test_all_that_positions_tell_is_fitted(torso):
     """76 numbers at the nominal robot: 12 of frames and markers, and what joints have beside them."""
     assert len(torso.robot("frame").parameters) == 12
     fit, _ = torso.model("full")
-    assert fit.numbers == fit.identifiable == 76
+    assert len(fit.estimate.values) == fit.estimate.rank == 76
 
 
 @needs_data
 def test_both_arms_have_the_same_springs(torso):
     fit, _ = torso.model("full", (_SPRINGS,))
     columns = [column.removesuffix("_rad") for column in torso.robot("zero").parts.columns]
-    size = dict(zip(columns, zip(fit.state.effects[_SPRINGS, 0], fit.errors[_SPRINGS], strict=False), strict=False))
+    size = dict(
+        zip(
+            columns,
+            zip(fit.state.effects[_SPRINGS, 0], fit.estimate.block_errors(_SPRINGS), strict=False),
+            strict=False,
+        )
+    )
     for joint in (0, 1, 2, 3):
         (right, error), (left, other) = size[f"q_right{joint}"], size[f"q_left{joint}"]
         assert right > 3.0 * error and left > 2.0 * other

@@ -1,0 +1,119 @@
+"""Predictions of readings from the others: cross-validation of a linear-Gaussian model with proper priors.
+
+A fold is left out, the parameters are estimated from its complement under the same priors and noise, and the fold is
+predicted. The complement's sums of squares and products are added up fold by fold; a difference from the total would
+lose half of the digits.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_solve, solve_triangular
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# every combination of parameters keeps at least this share of its information when a fold is left out: with less the
+# fold is extrapolated, which says nothing about the model
+MIN_SHARE_IN_COMPLEMENT = 0.05
+# a combination of which the readings tell less than this share of what they tell of the best one is determined by none
+_UNDETERMINED = 1e-12
+# added to the scaled precision, far below what any reading tells: a flat prior leaves it singular
+_RIDGE = 1e-14
+
+
+def complement_sums(sums: dict[int, FloatArray]) -> dict[int, FloatArray]:
+    """Sum of the arrays of all other folds, by fold."""
+    numbers = list(sums)
+    zero = np.zeros_like(next(iter(sums.values())))
+    before, after = [zero], [zero]
+    for number in numbers[:-1]:
+        before.append(before[-1] + sums[number])
+    for number in numbers[:0:-1]:
+        after.append(after[-1] + sums[number])
+    return {number: one + two for number, one, two in zip(numbers, before, reversed(after), strict=True)}
+
+
+def fold_sums(columns: FloatArray, fold: IntArray) -> dict[int, FloatArray]:
+    """Sums of squares and products (k, k) of the rows (m, a, k) of each fold (m,)."""
+    result = {}
+    for number in np.unique(fold).tolist():
+        own = columns[fold == number].reshape(-1, columns.shape[-1])
+        result[number] = own.T @ own
+    return result
+
+
+def least_share_in_complement(columns: FloatArray, fold: IntArray) -> float:
+    """Smallest share of a combination's information that is left in the complement of a fold.
+
+    columns (m, a, p): whitened derivatives by the parameters. Combinations that all readings together do not determine
+    do not count.
+    """
+    sums = fold_sums(columns, fold)
+    total = sum(sums.values(), np.zeros((columns.shape[-1], columns.shape[-1])))
+    unit = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-300))
+    size, turned = np.linalg.eigh(unit[:, None] * total * unit)
+    seen = size > _UNDETERMINED * size[-1]
+    half = unit[:, None] * turned[:, seen] / np.sqrt(size[seen])
+    return float(min(np.linalg.eigvalsh(half.T @ one @ half)[0] for one in complement_sums(sums).values()))
+
+
+def choose_folds(candidates: Iterable[IntArray], columns: FloatArray) -> IntArray:
+    """The first of several fold numbers (m,) whose complements determine every parameter, else the best of them."""
+    best, best_share = np.zeros(len(columns), dtype=np.int64), -np.inf
+    for fold in candidates:
+        share = least_share_in_complement(columns, fold) if len(np.unique(fold)) > 1 else -np.inf
+        if share >= MIN_SHARE_IN_COMPLEMENT:
+            return fold
+        if share > best_share:
+            best, best_share = fold, share
+    return best
+
+
+@dataclass(frozen=True, eq=False)
+class ComplementFit:
+    """Parameters (k,) estimated from the complement of a fold.
+
+    mean (k,); unit (k,): scale of each parameter; factor (k, k): lower Cholesky factor of the precision in these units.
+    """
+
+    mean: FloatArray
+    unit: FloatArray
+    factor: FloatArray
+
+    def half(self, rows: FloatArray) -> FloatArray:
+        """Columns (k, r) whose products make the covariance of rows (r, k) of predictions."""
+        return np.asarray(solve_triangular(self.factor, (rows * self.unit).T, lower=True, check_finite=False))
+
+
+@dataclass(frozen=True, eq=False)
+class CrossValidation:
+    """Complements of folds: sums (k + 1, k + 1) of squares and products of whitened columns and data, by fold."""
+
+    complements: dict[int, FloatArray]
+
+    @classmethod
+    def of(cls, columns: FloatArray, fold: IntArray) -> Self:
+        """Of whitened columns (m, a, k + 1), the data last, with fold numbers (m,)."""
+        return cls(complement_sums(fold_sums(columns, fold)))
+
+    def fits(
+        self, places: IntArray, mixing: FloatArray, precision: FloatArray, moment: FloatArray
+    ) -> dict[int, ComplementFit]:
+        """ComplementFit by fold of the parameters (q,) of a model whose columns are columns[..., places] @ mixing.
+
+        places (r,), mixing (r, q); precision (q,), moment (q,): of the normal priors, the moment being precision times
+        mean.
+        """
+        result = {}
+        for number, sums in self.complements.items():
+            gram = mixing.T @ sums[np.ix_(places, places)] @ mixing
+            unit = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
+            scaled = unit[:, None] * (gram + np.diag(precision)) * unit
+            factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit)))
+            target = mixing.T @ sums[places, -1] + moment
+            result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, factor)
+        return result
