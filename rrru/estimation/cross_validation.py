@@ -115,5 +115,5 @@ class CrossValidation:
             scaled = unit[:, None] * (gram + np.diag(precision)) * unit
             factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit)))
             target = mixing.T @ sums[places, -1] + moment
-            result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, factor)
+            result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, np.asarray(factor))
         return result

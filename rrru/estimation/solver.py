@@ -9,11 +9,12 @@ IMM-REP-1999-05), on columns scaled to unit length; parameters at a bound that t
 (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import solve_triangular
 
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate, SearchEnd, triangle_of, with_prior
@@ -40,8 +41,11 @@ class SolverOptions:
     max_damping: float = 1e12
 
 
-# first and second derivative of rho(z) by z, the squared residual in units of the loss scale (as scipy names them)
-_LOSSES = {
+# damping that keeps directions which nothing determines where they are
+_LEAST_DAMPING = 1e-13
+_Function = Callable[[FloatArray], FloatArray]
+# rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
+_LOSSES: dict[str, tuple[_Function, _Function]] = {
     "linear": (lambda z: z, np.ones_like),
     "soft_l1": (lambda z: 2.0 * (np.sqrt(1.0 + z) - 1.0), lambda z: (1.0 + z) ** -0.5),
     "huber": (
@@ -116,27 +120,23 @@ class _Search:
         options, damping, growth = self._options, self._options.first_damping, 2.0
         for _ in range(options.max_iterations):
             _, triangle = self._linearized()
-            free = self._free(triangle)
-            left, size, right, unit = _factors(triangle[:, :-1][:, free])
-            along = left.T @ triangle[:, -1]
-            # the full step in units of the standard errors along each axis
-            seen = size > 1e-13 * size.max(initial=0.0)
-            decrement = float((along[seen] ** 2).sum())
-            if decrement < options.step_tolerance**2 or decrement < options.cost_tolerance * self.cost:
-                self.converged, self.message = True, "converged"
+            free = np.flatnonzero(self._free(triangle))
+            own = triangle_of(triangle[:, [*free, len(self.values)]])
+            least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
+            if _step(own, _LEAST_DAMPING)[1] <= least:
+                self._end()
                 return
             while True:
-                shares = size / (size**2 + damping * size.max() ** 2)
+                change, foreseen = _step(own, damping)
                 step = np.zeros(len(self.values))
-                step[free] = -unit * (right.T @ (shares * along))
+                step[free] = change
                 trial = self._problem.parameters.clipped(self.values + step)
                 residual, cost = self._evaluate(trial)
-                foreseen = 0.5 * float(((2.0 - size * shares) * size * shares * along**2).sum())
                 if cost < self.cost:
                     break
-                if foreseen <= max(options.cost_tolerance * self.cost, 0.25 * options.step_tolerance**2):
+                if foreseen <= least:
                     # no lower than rounding: this is the minimum
-                    self.converged, self.message = True, "converged"
+                    self._end()
                     return
                 damping, growth, self.straight = max(damping, 1e-9) * growth, 2.0 * growth, False
                 if damping > options.max_damping:
@@ -147,6 +147,10 @@ class _Search:
             if ratio < 0.5:
                 self.straight = False
             self.values, self.residual, self.cost = trial, residual, cost
+
+    def _end(self) -> None:
+        """Note that the search is at a minimum."""
+        self.converged, self.message = True, "converged"
 
     def _free(self, triangle: FloatArray) -> npt.NDArray[np.bool_]:
         """Parameters (p,) that are not at a bound which the gradient presses them against."""
@@ -162,8 +166,16 @@ class _Search:
         return Estimate.at(self._problem, self.values, readings, self._free(triangle), end)
 
 
-def _factors(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Singular value decomposition (u, s, v') of columns (r, k) scaled to unit length, and the scale (k,)."""
+def _step(triangle: FloatArray, damping: float) -> tuple[FloatArray, float]:
+    """Damped Gauss-Newton step (k,) of a linearised problem (k + 1, k + 1), and by how much it lowers the objective.
+
+    damping: of columns scaled to unit length.
+    """
+    columns, target, count = triangle[:, :-1], triangle[:, -1], triangle.shape[1] - 1
     length = np.linalg.norm(columns, axis=0)
     unit = 1.0 / np.where(length > 0.0, length, 1.0)
-    return *np.linalg.svd(columns * unit, full_matrices=False), unit
+    brake = np.column_stack([np.sqrt(damping) * np.eye(count), np.zeros(count)])
+    damped = triangle_of(np.concatenate([np.column_stack([columns * unit, target]), brake]))
+    step = -unit * solve_triangular(damped[:count, :count], damped[:count, -1])
+    moved = columns @ step
+    return step, -float(target @ moved + 0.5 * moved @ moved)
