@@ -5,8 +5,9 @@ Step, acceptance, convergence and covariance come from the same penalised, white
     F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
 
 The steps are Levenberg's and Marquardt's with the damping rule of Nielsen (Damping parameter in Marquardt's method,
-IMM-REP-1999-05), on columns scaled to unit length; parameters at a bound that the gradient presses against are held
-(Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+IMM-REP-1999-05), in units of the priors' standard deviations: a damped step keeps what the readings do not determine
+near the prior mean, so that no search creeps along a curved valley. Parameters at a bound that the gradient presses
+against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
 from collections.abc import Iterable
@@ -64,7 +65,7 @@ def solve(
     options = options or SolverOptions()
     found = []
     for start in [problem.parameters.mean] if starts is None else starts:
-        search = _Search(problem, options, np.asarray(start, dtype=float))
+        search = _Search(problem, options, problem.parameters.clipped(np.asarray(start, dtype=float)))
         if np.isfinite(search.cost):
             search.run()
             found.append(search)
@@ -74,12 +75,24 @@ def solve(
     return best.estimate(sum(one.evaluations for one in found))
 
 
+def estimate_at(problem: Problem, values: npt.ArrayLike, message: str, evaluations: int = 1) -> Estimate:
+    """The Estimate linearised at values (p,) that another search ended at, as its message says.
+
+    Raises FitError where the model predicts nothing there.
+    """
+    search = _Search(problem, SolverOptions(), np.asarray(values, dtype=float))
+    if not np.isfinite(search.cost):
+        raise FitError(f"the model predicts no reading at the values of a search; its end: {message}")
+    search.converged, search.message = True, message
+    return search.estimate(evaluations)
+
+
 class _Search:
-    """One search from one start."""
+    """One search from one start (p,) within the bounds."""
 
     def __init__(self, problem: Problem, options: SolverOptions, start: FloatArray) -> None:
         self._problem, self._options = problem, options
-        self.values = problem.parameters.clipped(start)
+        self.values = start
         self.evaluations, self.converged, self.straight = 0, False, True
         self.message = "the largest number of iterations is reached"
         self.residual, self.cost = self._evaluate(self.values)
@@ -117,7 +130,7 @@ class _Search:
         for _ in range(options.max_iterations):
             _, triangle = self._linearized()
             free = self._free(triangle)
-            left, size, right, unit = _factors(triangle[:, :-1][:, free])
+            left, size, right, unit = _factors(triangle[:, :-1][:, free], self._problem.parameters.sd[free])
             along = left.T @ triangle[:, -1]
             # the full step in units of the standard errors along each axis
             seen = size > 1e-13 * size.max(initial=0.0)
@@ -162,8 +175,11 @@ class _Search:
         return Estimate.at(self._problem, self.values, readings, self._free(triangle), end)
 
 
-def _factors(columns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Singular value decomposition (u, s, v') of columns (r, k) scaled to unit length, and the scale (k,)."""
+def _factors(columns: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Singular value decomposition (u, s, v') of scaled columns (r, k), and the scale (k,).
+
+    The scale is the prior's standard deviation sd (k,), and where the prior is flat the inverse of the column's length.
+    """
     length = np.linalg.norm(columns, axis=0)
-    unit = 1.0 / np.where(length > 0.0, length, 1.0)
+    unit = np.where(np.isfinite(sd), sd, 1.0 / np.where(length > 0.0, length, 1.0))
     return *np.linalg.svd(columns * unit, full_matrices=False), unit
