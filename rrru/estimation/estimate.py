@@ -132,7 +132,7 @@ def numerical_rank(columns: FloatArray, tolerance: float = 1e-9) -> int:
     size = np.maximum(np.sqrt(np.einsum("ij,ij->j", columns, columns)), 1e-300)
     triangle = np.zeros((0, len(size)))
     for some in np.array_split(columns, len(columns) // 4000 + 1):
-        triangle = np.linalg.qr(np.concatenate([triangle, some / size]), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, some / size]), mode="r"))
     return int(np.linalg.matrix_rank(triangle, rtol=tolerance))
 
 

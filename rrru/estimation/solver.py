@@ -10,7 +10,7 @@ near the prior mean, so that no search creeps along a curved valley. Parameters 
 against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +42,7 @@ class SolverOptions:
 
 
 # first and second derivative of rho(z) by z, the squared residual in units of the loss scale (as scipy names them)
-_LOSSES = {
+_LOSSES: dict[str, tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], FloatArray]]] = {
     "linear": (lambda z: z, np.ones_like),
     "soft_l1": (lambda z: 2.0 * (np.sqrt(1.0 + z) - 1.0), lambda z: (1.0 + z) ** -0.5),
     "huber": (

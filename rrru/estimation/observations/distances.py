@@ -72,7 +72,7 @@ class Distances:
         """Derivative (n-1, 1, p) of the residual by the deviations (p,)."""
         places = self._model(values)
         slope = self.mechanism.parameter_jacobian(places, self.actuators, values)
-        rows = np.einsum("na,nap->np", _from_first(places)[1], slope[1:] - slope[0])
+        rows: FloatArray = np.einsum("na,nap->np", _from_first(places)[1], slope[1:] - slope[0])
         return -(self.whitener @ rows)[:, None]
 
 

@@ -113,7 +113,7 @@ class Inclinations:
         level = np.hypot(y, z)
         off = self.measured_rad - np.stack([np.arctan2(y, z), np.arctan2(-x, level)], axis=1)
         off[level < _MIN_COSINE] = np.nan
-        return (off + np.pi) % (2.0 * np.pi) - np.pi
+        return np.asarray((off + np.pi) % (2.0 * np.pi) - np.pi)
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
         """Derivative (n, 2, p + 2) of the residual by the values."""

@@ -95,7 +95,8 @@ class ProbedHeights:
         """Derivative (n + m, 1, p) of the residual by the deviations (p,)."""
         places = self.places(values)
         moved = self.mechanism.parameter_jacobian(places, self.actuators, values)
-        return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self.gradient(places), moved)[:, None]
+        slope: FloatArray = np.einsum("rna,nap->rp", self.gradient(places), moved)
+        return -(self.root_weight[:, None] * slope)[:, None]
 
     def without(self, reading: int) -> Self:
         """The same residuals less one reading, counted from 0 over the heights and then the distances."""

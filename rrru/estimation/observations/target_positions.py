@@ -91,10 +91,11 @@ class TargetPositions:
             return -self.mechanism.parameter_jacobian(self.model(deviations), self.actuators, deviations)
         poses, twists = self._poses(deviations)
         at = self.mechanism.map(self.actuators, poses, twists, self.readings)
-        return -at.columns(self.mechanism.directions)
+        columns: FloatArray = at.columns(self.mechanism.directions)
+        return -columns
 
     @cached_property
-    def mean_distance(self) -> Callable:
+    def mean_distance(self) -> Callable[[FloatArray], FloatArray]:
         """Objective of paper A, eq. (11): callable, deviations (m, p) to mean distances (m,) in mm, inf out of reach.
 
         Where the mechanism offers it, a CompiledObjective. Orientations count as distances at the readings' arm.
