@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks import harness, searchers
 from benchmarks.harness import Task
 from benchmarks.objective import campaign, mean_by_fsolve, population
-from rrru.fit.least_squares import least_squares
+from rrru.fit.calibration import calibrate
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 
@@ -107,7 +107,7 @@ def seconds_by_fsolve(residuals, least=40):
 def rows():
     """Rows of the group."""
     residuals = campaign((0.0,))
-    goal = _ABOVE * least_squares(campaign((0.0,), "identifiable")).mean_mm
+    goal = _ABOVE * calibrate(campaign((0.0,), "identifiable")).mean_mm
     robot = residuals.mechanism.widened(_ANGLE_RAD, _LENGTH_MM)
     box = residuals.mean_distance, robot.parameters.low, robot.parameters.high
     one = population(1)

@@ -13,8 +13,8 @@ from benchmarks import harness
 from benchmarks.harness import Call, Task
 from benchmarks.kinematics import legs, ur10
 from benchmarks.objective import Batch, by_fsolve, campaign
-from rrru.fit.least_squares import minimise
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import estimate_deviations
 
 _POINTS, _NOISE_MM, _SAME = 100, 0.02, 1e-5
 _DIFFERENCES = "SciPy, finite differences, our forward kinematics"
@@ -30,7 +30,7 @@ def measured(robot, actuators, start_mm, turn_rad=2e-4, length_mm=0.2):
     robot, draw = robot.seen_at(actuators, start_mm), np.random.default_rng(5)
     sizes = [length_mm if unit == "mm" else turn_rad for unit in robot.parameters.units]
     real = robot.forward(actuators, sizes * draw.standard_normal(len(sizes)), start_mm)
-    return Residuals(robot, actuators, real + draw.normal(0.0, _NOISE_MM, real.shape), start_mm)
+    return TargetPositions(robot, actuators, real + draw.normal(0.0, _NOISE_MM, real.shape), start_mm)
 
 
 def an_arm():
@@ -50,7 +50,7 @@ def a_hexapod():
 
 def compared(what, residuals, others=None):
     """Rows of one robot; others: functions of deviations (p,) to lacks (n, 3) by name."""
-    count, own = len(residuals.mechanism.parameters), minimise(residuals)[0]
+    count, own = len(residuals.mechanism.parameters), estimate_deviations(residuals).values
     least = (residuals.residual(own) ** 2).sum()
     functions = {_DIFFERENCES: residuals.residual} | (others or {})
     for name, function in functions.items():
@@ -58,7 +58,7 @@ def compared(what, residuals, others=None):
         assert abs((residuals.residual(found) ** 2).sum() / least - 1.0) < _SAME, name
     calls = {name: Call(lambda f=function: fitted(f, count)) for name, function in functions.items()}
     task = Task("least_squares", f"{what}, {count} parameters, fit", len(residuals))
-    return task.in_turns(Call(lambda: minimise(residuals)), calls)
+    return task.in_turns(Call(lambda: estimate_deviations(residuals)), calls)
 
 
 def rows():

@@ -15,7 +15,7 @@ from scipy.optimize import fsolve
 from benchmarks import harness, rates
 from benchmarks.harness import Call, Task
 from rrru.campaign.trajectories import line_groups, sample
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.robots.rrru3 import Rrru3
 
 POPULATION, SIDES_MM = 30, (0.0, 37.5, -37.5, 75.0, -75.0, 112.5, -112.5)
@@ -27,13 +27,14 @@ _LOOPS, _WORKERS = 4000, 2
 
 
 def campaign(sides_mm=SIDES_MM, parameter_set="tied", noise_mm=0.3):
-    """Residuals of lines at the given y, measured under Table 5's errors and noise."""
+    """TargetPositions of lines at the given y, measured under Table 5's errors and noise."""
     robot = Rrru3(parameter_set=parameter_set)
     lines = line_groups((-800.0, 0.0, 600.0), (-300.0, 0.0, 600.0), sides_mm, 26)
     points = np.concatenate([sample(line) for line in lines])
     theta, real = robot.require_reachable(points), Rrru3(parameter_set="tied")
     measured = real.forward(theta, real.parameters.vector(TABLE_5), points)
-    return Residuals(robot, theta, measured + np.random.default_rng(0).normal(0.0, noise_mm, measured.shape), points)
+    noise = np.random.default_rng(0).normal(0.0, noise_mm, measured.shape)
+    return TargetPositions(robot, theta, measured + noise, points)
 
 
 def population(count=POPULATION):

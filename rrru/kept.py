@@ -2,23 +2,26 @@
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
+_Owner = TypeVar("_Owner")
+_Answer = TypeVar("_Answer")
 
-def last_kept(method: Callable) -> Callable:
+
+def last_kept(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
     """A method of one array that keeps its last answer: a search wants slopes where it just wanted residuals."""
     name = f"_last_{method.__name__}"
 
     @wraps(method)
-    def kept(self: Any, array: npt.ArrayLike) -> Any:
+    def kept(self: _Owner, array: npt.ArrayLike) -> _Answer:
         array = np.asarray(array, dtype=float)
         asked = array.shape, array.tobytes()
         if self.__dict__.get(name, (None,))[0] != asked:
             self.__dict__[name] = asked, method(self, array)
-        return self.__dict__[name][1]
+        return cast(_Answer, self.__dict__[name][1])
 
     return kept
 

@@ -1,6 +1,7 @@
 """The measuring noise of a campaign where nobody has stated it, and single points that the instrument got wrong."""
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.campaign import measurements as rows
 
@@ -10,7 +11,9 @@ ENOUGH_REPEATS = 30
 _OUTLYING, _MOST = 8.0, 0.1
 
 
-def along_runs(values, run):
+def along_runs(
+    values: npt.NDArray[np.float64], run: npt.NDArray[np.generic]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Cosine transform of (n, ...) along each run (n,), orthonormal, and the half-wave number (n,) of each row."""
     from scipy.fft import dct
 

@@ -110,10 +110,10 @@ class CrossValidation:
         """
         result = {}
         for number, sums in self.complements.items():
-            gram = mixing.T @ sums[np.ix_(places, places)] @ mixing
-            unit = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
+            gram: FloatArray = mixing.T @ sums[np.ix_(places, places)] @ mixing
+            unit: FloatArray = 1.0 / np.sqrt(np.maximum(np.diag(gram) + precision, 1e-300))
             scaled = unit[:, None] * (gram + np.diag(precision)) * unit
-            factor = np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit)))
+            factor: FloatArray = np.asarray(np.linalg.cholesky(scaled + _RIDGE * np.eye(len(unit))))
             target = mixing.T @ sums[places, -1] + moment
             result[number] = ComplementFit(unit * cho_solve((factor, True), unit * target), unit, np.asarray(factor))
         return result

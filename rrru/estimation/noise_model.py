@@ -17,14 +17,19 @@ been projected out (Patterson and Thompson, Recovery of inter-block information 
 58, 1971), times their prior.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 from scipy.fft import dct
 from scipy.linalg import qr, toeplitz
 
 from rrru.campaign.noise import along_runs
+
+FloatArray = npt.NDArray[np.float64]
 
 _CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
@@ -56,50 +61,53 @@ class NoiseModel:
     which readings at one stop, which share the robot's errors, count as fewer.
     """
 
-    axis_mm: np.ndarray
+    axis_mm: FloatArray
     correlation: float = 0.0
     offset: float = 0.0
-    correlated: np.ndarray | float = 1.0
+    correlated: FloatArray | float = 1.0
     offset_posterior: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
     alike: float = 1.0
 
     @classmethod
-    def white(cls, noise_mm):
+    def white(cls, noise_mm: float) -> Self:
         """Uncorrelated noise of one size (mm) on all axes."""
         return cls(np.full(3, float(noise_mm)))
 
     @property
-    def offset_probability(self):
+    def offset_probability(self) -> float:
         """Posterior probability that offsets make more than a twentieth of the noise's variance."""
         return sum(probability for value, probability in self.offset_posterior if value > _NO_OFFSET)
 
-    def drawn_offsets(self, generator, draws):
+    def drawn_offsets(self, generator: np.random.Generator, draws: int) -> FloatArray:
         """Draws (draws,) of the share of offsets from its posterior."""
         values, probabilities = np.array(self.offset_posterior).T
-        return generator.choice(values, draws, p=probabilities / probabilities.sum())
+        return np.asarray(generator.choice(values, draws, p=probabilities / probabilities.sum()))
 
     @property
-    def mean_mm(self):
+    def mean_mm(self) -> float:
         """Deviation per axis, offsets included, root mean square over the axes."""
         return float(np.sqrt((self.axis_mm**2).mean() * (1.0 + self.offset)))
 
     @property
-    def counted(self):
+    def counted(self) -> Self:
         """The model under which the readings count as independent."""
         return replace(self, axis_mm=self.axis_mm * np.sqrt(self.alike), alike=1.0)
 
-    def whitening(self, series, discrepancy=None):
+    def whitening(
+        self, series: npt.ArrayLike, discrepancy: Callable[[FloatArray], FloatArray] | None = None
+    ) -> "Whitening":
         """The Whitening of readings in series (m,) under this noise.
 
         discrepancy: from half-wave numbers (m,) to variances (m,) in mm^2 of what else is smooth along the series.
         """
+        series = np.asarray(series)
         waves, length = half_waves(series), lengths(series)
         variance = self.variance(waves, length)
         if discrepancy is not None:
             variance = variance + discrepancy(waves)[:, None]
-        return Whitening(np.asarray(series), np.sqrt(variance))
+        return Whitening(series, np.sqrt(variance))
 
-    def variance(self, wave, length):
+    def variance(self, wave: FloatArray, length: npt.NDArray[np.int_]) -> FloatArray:
         """Variances (m, 3) in mm^2 in the cosine basis, by half-wave number and length (m,) of the series."""
         smooth, run = _densities(self.correlation, wave, length)
         return self.axis_mm**2 * (1.0 + self.correlated * (smooth - 1.0) + self.offset * run)
@@ -112,21 +120,21 @@ class Whitening:
     series (m,): of the rows; sd (m, a): standard deviations of the cosines.
     """
 
-    series: np.ndarray
-    sd: np.ndarray
+    series: npt.NDArray[np.generic]
+    sd: FloatArray
 
     @cached_property
-    def log_determinant(self):
+    def log_determinant(self) -> float:
         """Logarithm of the determinant of the map."""
         return float(-np.log(self.sd).sum())
 
-    def __call__(self, values):
+    def __call__(self, values: FloatArray) -> FloatArray:
         """Whitened values (m, a, ...)."""
         cosines, _ = along_runs(values, self.series)
         return cosines / self.sd.reshape(*self.sd.shape, *[1] * (values.ndim - 2))
 
 
-def half_waves(series):
+def half_waves(series: npt.NDArray[np.generic]) -> FloatArray:
     """Half-wave number (m,) from 0 on of each row's cosine in its series."""
     result = np.empty(len(series))
     for label in np.unique(series):
@@ -135,19 +143,25 @@ def half_waves(series):
     return result
 
 
-def lengths(series):
+def lengths(series: npt.NDArray[np.generic]) -> npt.NDArray[np.int_]:
     """Number of points (m,) of the series of each row."""
     _, number, count = np.unique(series, return_inverse=True, return_counts=True)
-    return count[number]
+    return np.asarray(count[number])
 
 
-def _spike_and_slab(density):
+def _spike_and_slab(density: FloatArray) -> FloatArray:
     """Prior probabilities (g,) over a grid that begins with none: half of them on it, the rest by a density (g,)."""
     slab = density[1:] / max(density[1:].sum(), 1e-300)
     return np.concatenate([[_NONE if len(slab) else 1.0], (1.0 - _NONE) * slab])
 
 
-def fit_noise(data, columns, series, stated_mm=None, repeats=None):
+def fit_noise(
+    data: FloatArray,
+    columns: FloatArray,
+    series: npt.NDArray[np.generic],
+    stated_mm: float | None = None,
+    repeats: tuple[float, int] | None = None,
+) -> NoiseModel:
     """NoiseModel of data (m, 3) of which columns (m, 3, k) may fit whatever they can; series (m,).
 
     stated_mm: deviation per axis that is stated, None where none is; repeats: deviation per axis of poses that were
@@ -166,13 +180,13 @@ def fit_noise(data, columns, series, stated_mm=None, repeats=None):
             instrument_mm = instrument_mm or repeats[0]
         instrument_mm = instrument_mm or seen.rough_mm
         last, model = model, seen.most_likely(instrument_mm, known)
-        numbers = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
-        if np.allclose(*numbers, rtol=1e-2, atol=1e-2 * model.mean_mm):
+        new, old = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
+        if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
     return model
 
 
-def alike(data, columns, stop, kind):
+def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
     """Factor by which readings at one stop count as fewer: 1 + (t - 1) r, t of them at a stop, of correlation r.
 
     data (m, 3) of which columns (m, 3, k) may fit whatever they can; stop (m,): where each row was read; kind (m,): of
@@ -195,7 +209,7 @@ def alike(data, columns, stop, kind):
     return float(1.0 + (mean - 1.0) * np.clip(share, 0.0, 1.0))
 
 
-def _densities(correlation, wave, length):
+def _densities(correlation: float, wave: FloatArray, length: npt.NDArray[np.int_]) -> tuple[FloatArray, FloatArray]:
     """Variances (m, 1) in the cosine basis of correlated noise of unit variance, and of offsets of unit variance."""
     density = np.empty(len(wave))
     for count in np.unique(length):
@@ -205,7 +219,7 @@ def _densities(correlation, wave, length):
 
 
 @lru_cache(maxsize=256)
-def _spectrum(correlation, count):
+def _spectrum(correlation: float, count: int) -> FloatArray:
     """Variances (count,) of an autoregression of unit variance in the cosine basis, exact for runs of usual length."""
     if count > _LONG:
         angle = np.pi * np.arange(count) / count
@@ -214,7 +228,7 @@ def _spectrum(correlation, count):
     return np.diag(dct(dct(covariance, axis=0, norm="ortho"), axis=1, norm="ortho")).copy()
 
 
-def _left(data, columns):
+def _left(data: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     """What columns (n, k) leave of data (n,), and the share (n,) of each row's variance that they leave."""
     if not columns.size:
         return data, np.ones(len(data))
@@ -235,23 +249,23 @@ def _left(data, columns):
 class _Seen:
     """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom."""
 
-    def __init__(self, squares, share, wave, length):
+    def __init__(self, squares: FloatArray, share: FloatArray, wave: FloatArray, length: npt.NDArray[np.int_]) -> None:
         self.freedom = np.where(share > _LEAST_LEFT, share, 0.0)
         self.squares = np.where(self.freedom > 0.0, squares, 0.0)
         self.wave, self.length = wave, length
 
     @property
-    def rough_mm(self):
+    def rough_mm(self) -> float:
         """Deviation per axis by the upper half of the frequencies."""
         upper = self.wave > 0.5 * self.length
         return float(np.sqrt(self.squares[upper].sum() / max(self.freedom[upper].sum(), 1e-9)))
 
     @property
-    def free(self):
+    def free(self) -> float:
         """Numbers that are left of the readings when everything that may be fitted is."""
         return float(self.freedom.sum())
 
-    def most_likely(self, instrument_mm, known):
+    def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
         white, largest = self._axes(1.0, known)[0], (CONTRADICTED * instrument_mm) ** 2
         correlated = np.minimum(1.0, largest / white)
@@ -267,17 +281,19 @@ class _Seen:
         posterior = tuple(zip(offsets.tolist(), each.tolist(), strict=True))
         return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated, posterior)
 
-    def _shape(self, correlation, offset, correlated):
+    def _shape(self, correlation: float, offset: float, correlated: FloatArray | float) -> FloatArray:
         """Variances (m, 3) over those of the axes."""
         smooth, run = _densities(correlation, self.wave, self.length)
         return 1.0 + correlated * (smooth - 1.0) + offset * run
 
-    def _value(self, correlation, offset, correlated, known):
+    def _value(
+        self, correlation: float, offset: float, correlated: FloatArray, known: Sequence[tuple[float, float]]
+    ) -> float:
         """Log likelihood of a correlation and an offset at the likeliest sizes."""
         shape = self._shape(correlation, offset, correlated)
-        return self._axes(shape, known)[1] - 0.5 * (self.freedom * np.log(shape)).sum()
+        return self._axes(shape, known)[1] - 0.5 * float((self.freedom * np.log(shape)).sum())
 
-    def _axes(self, shape, known):
+    def _axes(self, shape: FloatArray | float, known: Sequence[tuple[float, float]]) -> tuple[FloatArray, float]:
         """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior.
 
         known: statements (variance in mm^2, degrees of freedom that it is worth).

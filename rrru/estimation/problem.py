@@ -27,6 +27,17 @@ def unweighted(values: FloatArray) -> FloatArray:
     return values
 
 
+@dataclass(frozen=True)
+class WhiteNoise:
+    """Whitening of readings with independent errors of one standard deviation, in the readings' unit."""
+
+    sd: float
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Whitened values (n, a, ...)."""
+        return values / self.sd
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Maximum a posteriori estimation of parameters x from readings y = h(x) + e.

@@ -5,8 +5,9 @@ Step, acceptance, convergence and covariance come from the same penalised, white
     F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
 
 The steps are Levenberg's and Marquardt's with the damping rule of Nielsen (Damping parameter in Marquardt's method,
-IMM-REP-1999-05), on columns scaled to unit length; parameters at a bound that the gradient presses against are held
-(Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+IMM-REP-1999-05), in units of the priors' standard deviations: a damped step keeps what the readings do not determine
+near the prior mean, so that no search creeps along a curved valley. Parameters at a bound that the gradient presses
+against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
 from collections.abc import Callable, Iterable
@@ -42,7 +43,7 @@ class SolverOptions:
 
 
 # damping that keeps directions which nothing determines where they are
-_LEAST_DAMPING = 1e-13
+_LEAST_DAMPING = 1e-15
 _Function = Callable[[FloatArray], FloatArray]
 # rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
 _LOSSES: dict[str, tuple[_Function, _Function]] = {
@@ -68,7 +69,7 @@ def solve(
     options = options or SolverOptions()
     found = []
     for start in [problem.parameters.mean] if starts is None else starts:
-        search = _Search(problem, options, np.asarray(start, dtype=float))
+        search = _Search(problem, options, problem.parameters.clipped(np.asarray(start, dtype=float)))
         if np.isfinite(search.cost):
             search.run()
             found.append(search)
@@ -78,12 +79,24 @@ def solve(
     return best.estimate(sum(one.evaluations for one in found))
 
 
+def estimate_at(problem: Problem, values: npt.ArrayLike, message: str, evaluations: int = 1) -> Estimate:
+    """The Estimate linearised at values (p,) that another search ended at, as its message says.
+
+    Raises FitError where the model predicts nothing there.
+    """
+    search = _Search(problem, SolverOptions(), np.asarray(values, dtype=float))
+    if not np.isfinite(search.cost):
+        raise FitError(f"the model predicts no reading at the values of a search; its end: {message}")
+    search.converged, search.message = True, message
+    return search.estimate(evaluations)
+
+
 class _Search:
-    """One search from one start."""
+    """One search from one start (p,) within the bounds."""
 
     def __init__(self, problem: Problem, options: SolverOptions, start: FloatArray) -> None:
         self._problem, self._options = problem, options
-        self.values = problem.parameters.clipped(start)
+        self.values = start
         self.evaluations, self.converged, self.straight = 0, False, True
         self.message = "the largest number of iterations is reached"
         self.residual, self.cost = self._evaluate(self.values)
@@ -121,13 +134,13 @@ class _Search:
         for _ in range(options.max_iterations):
             _, triangle = self._linearized()
             free = np.flatnonzero(self._free(triangle))
-            own = triangle_of(triangle[:, [*free, len(self.values)]])
+            own, sd = triangle_of(triangle[:, [*free, len(self.values)]]), self._problem.parameters.sd[free]
             least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
-            if _step(own, _LEAST_DAMPING)[1] <= least:
+            if _step(own, sd, _LEAST_DAMPING)[1] <= least:
                 self._end()
                 return
             while True:
-                change, foreseen = _step(own, damping)
+                change, foreseen = _step(own, sd, damping)
                 step = np.zeros(len(self.values))
                 step[free] = change
                 trial = self._problem.parameters.clipped(self.values + step)
@@ -166,15 +179,17 @@ class _Search:
         return Estimate.at(self._problem, self.values, readings, self._free(triangle), end)
 
 
-def _step(triangle: FloatArray, damping: float) -> tuple[FloatArray, float]:
+def _step(triangle: FloatArray, sd: FloatArray, damping: float) -> tuple[FloatArray, float]:
     """Damped Gauss-Newton step (k,) of a linearised problem (k + 1, k + 1), and by how much it lowers the objective.
 
-    damping: of columns scaled to unit length.
+    sd (k,): of the priors, in which the parameters count; those of flat priors count by the length of their column.
+    damping: as a share of the largest curvature.
     """
     columns, target, count = triangle[:, :-1], triangle[:, -1], triangle.shape[1] - 1
     length = np.linalg.norm(columns, axis=0)
-    unit = 1.0 / np.where(length > 0.0, length, 1.0)
-    brake = np.column_stack([np.sqrt(damping) * np.eye(count), np.zeros(count)])
+    unit = np.where(np.isfinite(sd), sd, 1.0 / np.where(length > 0.0, length, 1.0))
+    size = np.sqrt(damping) * max(float((length * unit).max(initial=0.0)), 1e-300)
+    brake = np.column_stack([size * np.eye(count), np.zeros(count)])
     damped = triangle_of(np.concatenate([np.column_stack([columns * unit, target]), brake]))
     step = -unit * solve_triangular(damped[:count, :count], damped[:count, -1])
     moved = columns @ step

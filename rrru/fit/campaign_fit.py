@@ -9,15 +9,15 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError, FitError
-from rrru.fit.least_squares import Fit, least_squares
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import Calibration, calibrate
 from rrru.fit.mean_distance import least_mean_distance
-from rrru.fit.residuals import Residuals
 from rrru.robots.robot import Robot
 
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """Sets {name: patterns of trajectories}, loss and its scale as in `least_squares`, and which points may be used."""
+    """Sets {name: patterns of trajectories}, loss and its scale as in `calibrate`, and which points may be used."""
 
     sets: Mapping[str, tuple[str, ...]]
     loss: str = "linear"
@@ -36,8 +36,8 @@ def select(
     patterns: Iterable[str],
     use_near_singularity: bool = True,
     arm_mm: float = np.nan,
-) -> Residuals | None:
-    """Residuals of the usable points on some trajectories, None where the campaign has too few of them to fit.
+) -> TargetPositions | None:
+    """The usable points on some trajectories, None where the campaign has too few of them to fit.
 
     arm_mm: length at which a measured orientation counts beside a position.
     """
@@ -50,7 +50,7 @@ def select(
     mechanism = mechanism.seen_at(actuators, command, readings)
     if 3 * len(frame) < len(mechanism.parameters):
         return None
-    return Residuals(mechanism, actuators, rows.measured(frame), command, readings)
+    return TargetPositions(mechanism, actuators, rows.measured(frame), command, readings)
 
 
 def fit_sets(
@@ -59,8 +59,8 @@ def fit_sets(
     settings: CalibrationSettings,
     noise_mm: float | None = None,
     arm_mm: float = np.nan,
-) -> dict[tuple[str, str], Fit]:
-    """Fits {(set, method): Fit} of all sets of the CalibrationSettings that the campaign has points for.
+) -> dict[tuple[str, str], Calibration]:
+    """{(set, method): Calibration} of all sets of the CalibrationSettings that the campaign has points for.
 
     noise_mm, arm_mm: of the campaign, see `rrru.fit.campaign_noise.Noise`. Raises ConfigError where no set matches.
     """
@@ -68,7 +68,7 @@ def fit_sets(
     for name, patterns in settings.sets.items():
         residuals = select(measurements, mechanism, patterns, settings.use_near_singularity, arm_mm)
         if residuals is not None:
-            fit = least_squares(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
+            fit = calibrate(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
             fits[name, "least_squares"] = fit
             fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
@@ -78,7 +78,7 @@ def fit_sets(
 
 
 def tables(
-    campaign: str, fits: Mapping[tuple[str, str], Fit], truth: Mapping[str, float] | None = None
+    campaign: str, fits: Mapping[tuple[str, str], Calibration], truth: Mapping[str, float] | None = None
 ) -> dict[str, pd.DataFrame]:
     """Frames by table name: calibrations, parameters, correlations, observability.
 
@@ -98,7 +98,7 @@ def tables(
     return {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()}
 
 
-def _calibration_row(fit: Fit) -> pd.DataFrame:
+def _calibration_row(fit: Calibration) -> pd.DataFrame:
     """One row of `calibrations`."""
     ident, distance = fit.identifiability, fit.distance_mm
     row = {
@@ -117,7 +117,7 @@ def _calibration_row(fit: Fit) -> pd.DataFrame:
     return pd.DataFrame([row | {f"{key}_observability": value for key, value in ident.indices().items()}])
 
 
-def _parameter_rows(fit: Fit, method: str, truth: Mapping[str, float]) -> pd.DataFrame:
+def _parameter_rows(fit: Calibration, method: str, truth: Mapping[str, float]) -> pd.DataFrame:
     """Rows of `parameters`; standard errors belong to least squares only."""
     ident, parameters = fit.identifiability, fit.parameters
     stated = np.isfinite(fit.standard_errors) & (method == "least_squares")
@@ -134,7 +134,7 @@ def _parameter_rows(fit: Fit, method: str, truth: Mapping[str, float]) -> pd.Dat
     )
 
 
-def _correlation_rows(fit: Fit) -> pd.DataFrame:
+def _correlation_rows(fit: Calibration) -> pd.DataFrame:
     """Rows of `correlations`: every pair of parameters once."""
     names, matrix = np.array(fit.identifiability.names), fit.identifiability.correlations()
     second, first = np.tril_indices(len(names), -1)
@@ -142,7 +142,7 @@ def _correlation_rows(fit: Fit) -> pd.DataFrame:
     return pd.DataFrame(columns)
 
 
-def _observability_rows(fit: Fit) -> pd.DataFrame:
+def _observability_rows(fit: Calibration) -> pd.DataFrame:
     """Rows of `observability`: how each direction of parameter space is seen, and what it is made of."""
     ident = fit.identifiability
     count, values = len(ident.names), ident.singular_values

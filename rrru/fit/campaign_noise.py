@@ -8,8 +8,8 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import estimate, read_noise
 from rrru.errors import ConfigError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.robots.robot import Robot
 
 
@@ -47,7 +47,7 @@ def campaign_noise(
     residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
     if residuals is None:
         raise ConfigError("too few usable points to estimate noise_mm; give it")
-    fit, used = least_squares(residuals), measurements[rows.usable(measurements, use_near_singularity)]
+    fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
     left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
     found_mm, found_turned, source = estimate(used, left, columns, residuals.readings)
     found_rad = noise_rad or found_turned / robot.angle_arm_mm

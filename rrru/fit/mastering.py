@@ -14,8 +14,8 @@ _TOLD = 4.0
 def mastering_notes(fit: Any, robot: Any, errors: npt.ArrayLike | None = None) -> tuple[str, ...]:
     """Sentences on drives whose zeros are far off, such as "joint 4: zero is off by 2 +- 0.01 degrees".
 
-    fit: what has `deviations` (p,) of the robot's parameters, a Fit or the State of a diagnosis; errors (p,): their
-    standard errors where they are known.
+    fit: what has `deviations` (p,) of the robot's parameters, a Calibration or the State of a diagnosis; errors
+    (p,): their standard errors where they are known.
     """
     off = np.asarray(fit.deviations, dtype=float)
     error = np.zeros(len(off)) if errors is None else np.asarray(errors, dtype=float)

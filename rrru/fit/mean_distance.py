@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from rrru.errors import FitError
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import Calibration, assess, estimate_deviations_at
 from rrru.fit.identifiability import analyse, parameter_scale
-from rrru.fit.least_squares import Fit, make_fit
-from rrru.fit.residuals import Residuals
 
 _OUT_OF_REACH_MM = 1e6
 _GRADIENT = 1e-9
@@ -18,14 +18,13 @@ _MOST_FOR_SIMPLEX = 15
 _SIMPLEX = {"maxfev": 20_000, "maxiter": 20_000, "xatol": 1e-8, "fatol": 1e-12, "adaptive": True}
 
 
-def least_mean_distance(residuals: Residuals, start: npt.ArrayLike, noise_mm: float | None = None) -> Fit:
-    """Fit within the parameters' bounds, near `start` (p,), that minimises the mean distance.
+def least_mean_distance(residuals: TargetPositions, start: npt.ArrayLike, noise_mm: float | None = None) -> Calibration:
+    """Calibration within the parameters' bounds, near `start` (p,), that minimises the mean distance.
 
     Newton steps in a trust region with the exact gradient and the Hessian of the distances without the model's own
     curvature, which is smaller by residual over link length. Where they end at a kink of the objective (a point met
     exactly) a simplex search goes on, and where they leave the bounds a bounded search (SLSQP) does. The bounds hold
-    only where every direction is seen, as in `least_squares`. Raises FitError, carrying scipy's result, where the
-    search fails.
+    only where every direction is seen. Raises FitError, carrying scipy's result, where the search fails.
     """
     from scipy import optimize
 
@@ -52,10 +51,12 @@ def least_mean_distance(residuals: Residuals, start: npt.ArrayLike, noise_mm: fl
         evaluations += more
     if not np.isfinite(residuals.mean_distance(deviations[None])[0]):
         raise FitError(f"least mean distance did not converge: {solution.message}", solution)
-    return make_fit(residuals, deviations, evaluations, noise_mm)
+    return assess(estimate_deviations_at(residuals, deviations, solution.message, evaluations), noise_mm)
 
 
-def _objective(residuals: Residuals, start: np.ndarray, directions: np.ndarray) -> tuple[Callable, Callable, Callable]:
+def _objective(
+    residuals: TargetPositions, start: np.ndarray, directions: np.ndarray
+) -> tuple[Callable, Callable, Callable]:
     """Mean distance at start + directions q, its gradient and its Hessian, as functions of q."""
     rank = directions.shape[1]
 
@@ -90,7 +91,7 @@ def _simplex(centre: np.ndarray) -> np.ndarray:
     return np.vstack([centre, centre + 0.01 * np.eye(len(centre))])
 
 
-def _bounded(residuals: Residuals, start: np.ndarray) -> tuple[np.ndarray, int]:
+def _bounded(residuals: TargetPositions, start: np.ndarray) -> tuple[np.ndarray, int]:
     """Errors (p,) of least mean distance inside the bounds from a start (p,) inside them, and the evaluations."""
     from scipy import optimize
 

@@ -1,24 +1,24 @@
 """The sim without effects: as its owner believes it to be, and calibrated."""
 
 from rrru.campaign import measurements as rows
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import estimate_deviations
 from rrru.fit.start import start_of
 from rrru.gap.state import State
 
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    return State(least_squares(_residuals(case)).deviations, {})
+    return State(estimate_deviations(_observations(case)).values, {})
 
 
 def origin(case):
     """State that the calibration starts from, see `rrru.fit.start`."""
-    return State(start_of(_residuals(case))[0], {})
+    return State(start_of(_observations(case))[0], {})
 
 
-def _residuals(case):
-    """Residuals of the case's used points."""
+def _observations(case):
+    """TargetPositions of the case's used points."""
     frame = case.measurements[case.used]
     driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)
-    return Residuals(case.mechanism, *driven, rows.readings(frame, case.arm_mm))
+    return TargetPositions(case.mechanism, *driven, rows.readings(frame, case.arm_mm))

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 import pandas as pd
 
-from rrru.fit.least_squares import least_squares
+from rrru.fit.calibration import calibrate
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
@@ -30,7 +30,7 @@ def study_set(searched, identified, calibration, runs):
     3-RRRU 8 and 7; each run is polished locally in the latter.
     """
     parameters, mechanism = searched.mechanism.parameters, identified.mechanism
-    fit, fit_seconds = _timed(lambda: least_squares(identified))
+    fit, fit_seconds = _timed(lambda: calibrate(identified))
     best, polish_seconds = _timed(lambda: least_mean_distance(identified, fit.deviations))
     # the compiled objective is loaded before anything is timed
     searched.mean_distance(parameters.nominal[None])

@@ -9,8 +9,8 @@ from scipy.stats import t
 from rrru.campaign import measurements as rows
 from rrru.compensate.evaluate import model_residual
 from rrru.errors import FitError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import deviation_vector, select
-from rrru.fit.least_squares import least_squares
 from rrru.report.compare import METHOD
 from rrru.studies import setup
 
@@ -108,7 +108,7 @@ def _without(side, fold, calibration):
     residuals = select(rest, robot, side.settings.sets[calibration], side.settings.use_near_singularity, arm_mm)
     if residuals is None:
         raise FitError(f"{side.name}: too few points are left")
-    fit = least_squares(residuals, side.told["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
+    fit = calibrate(residuals, side.told["noise_mm"], side.settings.loss, side.settings.loss_scale_mm)
     return robot, fit.deviations
 
 

@@ -74,7 +74,11 @@ class ReadingMap(TwistMap):
     def columns(self, directions):
         """Derivative (m, 3, p) of what is read by p parameters with directions (sites, 6, p) at the sites."""
         shifts = self._columns(directions, self._moved, self.response)
-        return self._with_turns(shifts, lambda: self._columns(directions, self._turned, self.turning))
+        return self._with_turns(shifts, lambda: self.turn_columns(directions))
+
+    def turn_columns(self, directions):
+        """Turn (n, 3, p) in rad of the platform, as it is read, by p parameters with directions (sites, 6, p)."""
+        return self._columns(directions, self._turned, self.turning)
 
     def _about(self, axes):
         """Turns (n, 3, 6) per twist whose rotation turns about axes (3, 3) or (n, 3, 3), and whose shift does not."""

@@ -6,11 +6,15 @@ orientations that were read, rotation vectors in rad times an arm in mm, so that
 
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from rrru.robots.legs import TOOL, WORLD
+
+FloatArray = npt.NDArray[np.float64]
 
 _EYE = np.eye(3)
 
@@ -86,14 +90,14 @@ def reflector_numbers(legs, readings):
     return np.array([legs.site_numbers[name] for name in readings.reflectors])
 
 
-def orientation(robot, poses, twists):
+def orientation(robot: Any, poses: Any, twists: FloatArray) -> FloatArray:
     """Orientations (n, 3, 3) of the platform as an instrument in the world's frame reads them."""
     numbers = robot.legs.site_numbers
     world, tool = (_turn(twists[:, numbers[site], 3:]) for site in (WORLD, TOOL))
     return world @ poses.turn @ tool
 
 
-def lacking(robot, readings, poses, twists):
+def lacking(robot: Any, readings: Readings, poses: Any, twists: FloatArray) -> FloatArray:
     """Residual (m, 3) of readings at Poses under twists (n or 1, sites, 6): what was read minus the model."""
     position = readings.position_mm - robot.measured(poses, twists, readings)
     if not len(readings.turned):

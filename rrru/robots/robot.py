@@ -4,19 +4,24 @@ A robot's class adds its legs, parts and parameters, and where it pays a closed 
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import UnreachableError
 from rrru.parameters import ParameterSet
 from rrru.robots.closure import Closure
 from rrru.robots.legs import Legs, Parts
 from rrru.robots.reading_map import ReadingMap
-from rrru.robots.readings import place_on_platform, points_read, turned_by
+from rrru.robots.readings import Readings, place_on_platform, points_read, turned_by
 from rrru.robots.twist_map import TwistMap
 from rrru.robots.walk import Poses
+
+FloatArray = npt.NDArray[np.float64]
 
 
 class Robot(ABC):
@@ -111,7 +116,7 @@ class Robot(ABC):
         """Twists (1, sites, 6) of deviations by name."""
         return self.twists(self.parameters.vector(values))
 
-    def twists(self, deviations=None):
+    def twists(self, deviations: npt.ArrayLike | None = None) -> FloatArray:
         """Twists (1, sites, 6) that deviations (p,) make."""
         if deviations is None:
             return np.zeros((1, len(self.legs.sites), 6))
@@ -128,18 +133,20 @@ class Robot(ABC):
         """Values (n, k) of the passive joints near platform centres (n, 3) and actuator values (n, K)."""
         return np.broadcast_to(self.legs.home_passive, (len(position_mm), len(self.legs.passive_joints)))
 
-    def solve(self, actuators, position_mm, twists=None):
+    def solve(self, actuators: FloatArray, position_mm: FloatArray, twists: FloatArray | None = None) -> Poses:
         """Poses at actuator values (n, K) near positions (n, 3), under twists (n or 1, sites, 6) at the sites."""
         return self.model.solve(actuators, self.near(position_mm, actuators), twists)
 
-    def measured(self, poses, twists, readings=None):
+    def measured(self, poses: Poses, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
         """Positions (n, 3) in the world's frame at Poses, under the twists (n or 1, sites, 6) of both.
 
         Of the tool, or of the reflectors of `rrru.robots.readings.Readings`.
         """
         return into_frame(points_read(self, poses, twists, readings), twists[:, 0])
 
-    def map(self, actuators, poses, twists=None, readings=None):
+    def map(
+        self, actuators: FloatArray, poses: Poses, twists: FloatArray | None = None, readings: Readings | None = None
+    ) -> Any:
         """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6).
 
         Of the tool, or of Readings at these poses.
@@ -162,7 +169,9 @@ class Robot(ABC):
         """
         return np.tile(self.legs.home_mm, (len(actuators), 1))
 
-    def forward(self, actuators, deviations=None, guess_mm=None):
+    def forward(
+        self, actuators: FloatArray, deviations: FloatArray | None = None, guess_mm: FloatArray | None = None
+    ) -> FloatArray:
         """Positions (n, 3) of the tool at actuator values (n, K); NaN where the legs do not close near guess_mm (n, 3).
 
         Without a guess near that of `guess`.
@@ -179,7 +188,9 @@ class Robot(ABC):
         every, near = np.tile(actuators, (len(deviations), 1)), np.tile(guess, (len(deviations), 1))
         return self.measured(self.solve(every, near, twists), twists).reshape(len(deviations), count, 3)
 
-    def mean_distance(self, actuators, nominal_mm, measured_mm):
+    def mean_distance(
+        self, actuators: FloatArray, nominal_mm: FloatArray, measured_mm: FloatArray
+    ) -> Callable[[FloatArray], FloatArray]:
         """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
 
         def evaluate(deviations):
@@ -192,7 +203,9 @@ class Robot(ABC):
         """Derivative (n, 3, K) of the position by the actuator values."""
         return self.map_at(actuators, position_mm, deviations).drive_response
 
-    def parameter_jacobian(self, position_mm, actuators, deviations=None):
+    def parameter_jacobian(
+        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+    ) -> FloatArray:
         """Derivative (n, 3, p) of the position by the parameters."""
         return self.map_at(actuators, position_mm, deviations).columns(self.directions)
 

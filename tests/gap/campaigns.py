@@ -10,8 +10,8 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
 from rrru.effects.protocol import ActiveEffect
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
@@ -66,7 +66,7 @@ def measure(effects=(), noise_mm=NOISE_MM, seed=1, plan=None, deviations=None):
 def gap_mm(effects, plan=None):
     """Rms distance that a calibration leaves without noise."""
     frame = measure(effects, 0.0, plan=plan)
-    return least_squares(Residuals(SIM, rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame))).rms_mm
+    return calibrate(TargetPositions(SIM, rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame))).rms_mm
 
 
 def drawn(name, seed, leg=0):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.gap.settings import GapSettings
 from tests.gap.campaigns import FAST, FORWARD, NOISE_MM, REVERSE, SIM, active, diagnosed, measure, plan_of, strong
 
@@ -20,7 +20,7 @@ def _left(effects):
     """What the calibration leaves (n, 3) of the effects' own, by the exact closure without noise."""
     frame = measure(effects, noise_mm=0.0)
     driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
-    return least_squares(Residuals(SIM, *driven)).residual_mm
+    return calibrate(TargetPositions(SIM, *driven)).residual_mm
 
 
 def _shaken(frame, size_mm, seed=3):
@@ -81,7 +81,7 @@ def test_what_nothing_predicts_is_unexplained():
     budget, found = _budget(frame)
     assert "unexplained" in found.verdict["effects"] and budget.loc["unexplained", "probability"] > 0.9
     driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
-    total = (least_squares(Residuals(SIM, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
+    total = (calibrate(TargetPositions(SIM, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
     assert budget.loc["unexplained", "rms_mm"] ** 2 > 0.5 * total
 
 

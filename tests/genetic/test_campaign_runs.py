@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set, typical_parameters
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
@@ -27,7 +27,7 @@ def study(request):
     actuators = identified.inverse(points)
     measured = identified.forward(actuators, identified.parameters.vector(truth), points)
     measured = measured + np.random.default_rng(1).normal(0.0, 0.02, measured.shape)
-    sets = (Residuals(robot, actuators, measured, points) for robot in (searched, identified))
+    sets = (TargetPositions(robot, actuators, measured, points) for robot in (searched, identified))
     runs = Runs(GeneticSettings(generations=40, stall_generations=0), 3, 5, ("made_up",))
     return searched, study_set(*sets, "lines", runs), truth
 

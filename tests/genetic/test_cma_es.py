@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rrru.fit.least_squares import least_squares
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.fit.mean_distance import least_mean_distance
-from rrru.fit.residuals import Residuals
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 from rrru.robots.rrru3 import Rrru3
@@ -83,8 +83,8 @@ def test_a_calibration_ends_at_the_least_mean_distance():
     theta = robot.inverse(points)
     truth = tied.parameters.vector({"dtheta1": 0.0012, "dL1": 0.3, "dL3": -0.2, "dr": 0.9})
     measured = tied.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.1, points.shape)
-    searched, identified = (Residuals(one, theta, measured, points) for one in (tied, robot))
-    best = least_mean_distance(identified, least_squares(identified).deviations)
+    searched, identified = (TargetPositions(one, theta, measured, points) for one in (tied, robot))
+    best = least_mean_distance(identified, calibrate(identified).deviations)
     bounds = tied.parameters.low, tied.parameters.high
     settings = GeneticSettings(operators="cma_es", generations=400, stall_generations=0)
     for seed in range(3):

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from rrru.errors import ConfigError, FitError
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.genetic.algorithm import BLOCK, minimise
 from rrru.genetic.operators import has_stalled
 from rrru.genetic.settings import OPERATORS, GeneticSettings
@@ -41,7 +41,7 @@ class Lines:
         self.truth = self.robot.parameters.vector(TABLE_5_RAD | TABLE_5_MM)
         noise = np.random.default_rng(5).normal(0.0, 0.3, self.commanded.shape)
         self.measured = self.robot.forward(self.theta, self.truth, self.commanded) + noise
-        self.compiled = Residuals(self.robot, self.theta, self.measured, self.commanded).mean_distance
+        self.compiled = TargetPositions(self.robot, self.theta, self.measured, self.commanded).mean_distance
         self.seen = []
 
     def __call__(self, deviations):

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from rrru.effects.library import library
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import ConfigError
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses
 from rrru.robots.from_file import from_mjcf, from_urdf
@@ -145,7 +145,7 @@ def test_a_full_calibration_finds_a_wrong_robot():
     truth = {name: size * generator.normal() for name, size in sizes.items()}
     twists = robot.twists_of(truth)
     measured = robot.measured(robot.solve(NEAR, np.zeros((len(NEAR), 3)), twists), twists)
-    found = least_squares(Residuals(robot, NEAR, measured, robot.forward(NEAR))).deviations
+    found = calibrate(TargetPositions(robot, NEAR, measured, robot.forward(NEAR))).deviations
     fresh = ROBOT.legs.home_drives + np.random.default_rng(9).uniform(-0.4, 0.4, (40, 10))
     true = robot.measured(robot.solve(fresh, np.zeros((len(fresh), 3)), twists), twists)
     assert np.linalg.norm(ROBOT.forward(fresh) - true, axis=1).mean() > 5.0

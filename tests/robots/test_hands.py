@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from rrru.effects.library import library
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import ConfigError
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.dynamics import GRAVITY_MM_S2, Masses, gravity
 from rrru.robots.geometric_numbers import Reads
@@ -172,7 +172,7 @@ def test_both_hands_tell_a_full_set_of_parameters():
         true[robot.parameters.index(name)] = generator.choice([-1.0, 1.0]) * 0.05
     twists = robot.twists(true)
     seen = robot.measured(robot.solve(DRIVES, _own(), twists), twists, readings)
-    fit = least_squares(Residuals(robot, DRIVES, seen, _own(), replace(readings, position_mm=seen)))
+    fit = calibrate(TargetPositions(robot, DRIVES, seen, _own(), replace(readings, position_mm=seen)))
     assert len(true) > 45 and fit.identifiability.rank == len(true)
     assert np.abs(fit.residual_mm).max() < 1e-6
     np.testing.assert_allclose(fit.deviations / sizes, true / sizes, rtol=0.0, atol=1e-4)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.robots.geometric_numbers import Reads
 from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.readings import Readings, lacking
@@ -125,7 +125,7 @@ def _off(robot, points, actuators, turned):
     sizes = np.array([0.5 if unit == "mm" else 1e-3 for unit in robot.parameters.units])
     values = np.random.default_rng(9).normal(size=len(sizes)) * sizes
     readings = _read(robot, actuators, points, dict(zip(robot.parameters.names, values.tolist(), strict=True)), turned)
-    fit = least_squares(Residuals(robot, actuators, readings.position_mm, points, readings))
+    fit = calibrate(TargetPositions(robot, actuators, readings.position_mm, points, readings))
     arm = np.where(np.array(robot.parameters.units) == "rad", robot.angle_arm_mm, 1.0)
     return robot, fit, np.abs((fit.deviations - values) * arm)
 

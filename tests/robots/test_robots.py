@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rrru.errors import ConfigError, UnreachableError
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.fit.identifiability import analyse
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
 from rrru.robots import singularity
 from rrru.robots.catalogue import MECHANISMS, make_mechanism
 
@@ -132,10 +132,10 @@ def test_closure_jacobians_equal_finite_differences(name, kind):
 @every_set
 def test_errors_are_recovered_or_known_to_be_a_gauge(name, kind):
     mechanism, points, drives, deviations = _clear(name, kind)
-    residuals = Residuals(mechanism, drives, mechanism.forward(drives, deviations, points), points)
+    residuals = TargetPositions(mechanism, drives, mechanism.forward(drives, deviations, points), points)
     seen = analyse(mechanism, residuals.jacobian(mechanism.parameters.nominal)).rank
     assert seen == len(deviations) - GAUGES.get((name, kind), 0)
-    fit = least_squares(residuals)
+    fit = calibrate(residuals)
     assert fit.identifiability.rank == seen and fit.rms_mm < 1e-8
     if seen == len(deviations):
         np.testing.assert_allclose(fit.deviations, deviations, rtol=0.0, atol=1e-6)
@@ -154,7 +154,7 @@ def test_a_batch_of_errors_equals_a_loop(name, kind):
 @every_set
 def test_mean_distance_equals_a_loop(name, kind):
     mechanism, points, drives, deviations = _clear(name, kind, 12)
-    residuals = Residuals(mechanism, drives, mechanism.forward(drives, deviations, points), points)
+    residuals = TargetPositions(mechanism, drives, mechanism.forward(drives, deviations, points), points)
     batch = np.random.default_rng(2).uniform(-1.0, 1.0, (4, len(deviations))) * _size(mechanism)
     slow = []
     for vector in batch:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 
@@ -11,7 +11,7 @@ def _residuals(rich_poses, count=30):
     points, theta = rich_poses
     robot = Rrru3(parameter_set="tied")
     measured = points[:count] + np.random.default_rng(0).normal(0.0, 2.0, (count, 3))
-    return Residuals(robot, theta[:count], measured, points[:count])
+    return TargetPositions(robot, theta[:count], measured, points[:count])
 
 
 def test_mean_distance_equals_the_slow_loop_within_1e_9_mm(rich_poses):

@@ -13,8 +13,9 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from rrru.campaign.measurements import vectors
+from rrru.estimation.observations.distances import Distances
 from rrru.studies.delta.paper import RESULTS
-from rrru.studies.delta.zero_offset import Distances, one_step
+from rrru.studies.delta.zero_offset import one_step
 
 # paper C, 3.2 and 3.3: errors on the plane z = 0 in mm
 _NAMES = ("before_mean", "before_max", "after_mean", "after_max")

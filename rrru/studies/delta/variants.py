@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.campaign.measurements import vectors
-from rrru.fit.least_squares import least_squares, minimise
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.distances import Distances
+from rrru.estimation.observations.shapes import Shape
+from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
+from rrru.fit.calibration import calibrate, estimate_deviations
 from rrru.plant.tracker import measure
-from rrru.studies.delta.zero_offset import Distances, Heights, Shape, one_step, step_fit
+from rrru.studies.delta.zero_offset import one_step, step_fit
 
 
 @dataclass(frozen=True)
@@ -62,19 +64,19 @@ class Variant:
             return Distances(mechanism, actuators, places_mm, alike=self.step)
         if self.measure == "shape":
             return Shape(mechanism, actuators, places_mm)
-        kind = Heights if self.measure == "heights" else Residuals
+        kind = TargetHeights if self.measure == "heights" else TargetPositions
         return kind(mechanism, actuators, places_mm, command_mm)
 
     def zero_errors(self, mechanism, command_mm, places_mm):
         """Zero errors (3,) in rad for commands (n, 3) and places (n, 3)."""
         points = self.residuals(mechanism, command_mm, mechanism.require_reachable(command_mm), places_mm)
-        return one_step(points) if self.step else minimise(points)[0]
+        return one_step(points) if self.step else estimate_deviations(points).values
 
     def fit(self, points):
-        """Fit of its residuals, and the covariance (3, 3) of its deviations in rad^2."""
+        """Calibration by its residuals, and the covariance (3, 3) of its deviations in rad^2."""
         if self.step:
             return step_fit(points)
-        result = least_squares(points)
+        result = calibrate(points)
         return result, result.identifiability.covariance(result.noise_mm)
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.compensate.rbf import choose, fit, grow, make_folds
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 
 # what each method needs to measure
 NEEDS = {
@@ -46,9 +46,9 @@ class Candidates:
 
 
 def measured_points(mechanism, measurements):
-    """Residuals of the usable points of a measurement table; methods choose what is fitted to them."""
+    """TargetPositions of the usable points of a measurement table; methods choose what is fitted to them."""
     frame = measurements[rows.usable(measurements)]
-    return Residuals(mechanism, rows.actuators(frame, mechanism), rows.measured(frame), rows.command(frame))
+    return TargetPositions(mechanism, rows.actuators(frame, mechanism), rows.measured(frame), rows.command(frame))
 
 
 def _with(points, parameter_set):
@@ -65,7 +65,7 @@ def _calibrated(points, result):
 def parameters(points, parameter_set):
     """Least squares of a set of parameters, their bounds those of the mechanism."""
     points = _with(points, parameter_set)
-    return _calibrated(points, least_squares(points))
+    return _calibrated(points, calibrate(points))
 
 
 def genetic(points, settings, seed):
@@ -86,7 +86,7 @@ def rbf_map(points, candidates, generator):
 def rbf_after_parameters(points, candidates, generator):
     """Least squares first, then a network for what it leaves."""
     points = _with(points, points.mechanism.TRACKED)
-    found = least_squares(points)
+    found = calibrate(points)
     answers, numbers = _trained(points.start_mm, points.residual(found.deviations), candidates, generator)
     return Learned(
         lambda path: through_inverse(points.mechanism, path, answers(path), found.deviations),

@@ -60,7 +60,7 @@ class TiltTest:
 
     @cached_property
     def places(self):
-        """Where the nozzle stands, see `HeightResiduals.places`."""
+        """Where the nozzle stands, see `ProbedHeights.places`."""
         return self.result.residuals.places(self.result.fit.deviations)
 
     @cached_property
@@ -103,7 +103,7 @@ class TiltTest:
             scale = np.linalg.norm(columns, axis=0)
             move = np.linalg.lstsq(columns / scale, test._readings * weight[:, 0], rcond=_SEEN)[0] / scale
             deviations = result.fit.deviations + move[:count]
-            result = replace(result, fit=replace(result.fit, deviations=deviations))
+            result = replace(result, fit=result.fit.at(deviations, "with a bent bed"))
         return replace(self, result=result)
 
     def _of_heights(self, columns):

@@ -12,7 +12,7 @@ decimals; three of the endstops, where it applies a Z offset to them.
 
 import numpy as np
 
-from rrru.studies.printers.heights import HeightResiduals
+from rrru.estimation.observations.probed_heights import ProbedHeights
 
 NAMES = ("radius", "angle_a", "angle_b", "endstop_a", "endstop_b", "endstop_c", "arm_a", "arm_b", "arm_c")
 UNITS = ("mm", "deg", "deg", *("mm",) * 6)
@@ -28,7 +28,7 @@ def residuals_of(printer, parameter_set=None):
     heights = probed or len(printer.height_mm)
     weight = _HEIGHTS_COUNT * distances / heights if distances else 1.0
     ways = -printer.height_drop_mm, printer.height_mm, -printer.distance_drop_mm, printer.distance_mm
-    return HeightResiduals(printer.mechanism(parameter_set), *ways, weight)
+    return ProbedHeights(printer.mechanism(parameter_set), *ways, weight)
 
 
 def own_numbers(mechanism, deviations):

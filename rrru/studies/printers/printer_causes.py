@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.fit.least_squares import least_squares
+from rrru.fit.calibration import calibrate
 from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
 
 FOUND, NOT_FOUND, NOT_DECIDABLE = "found", "not found", "not decidable"
@@ -41,7 +41,7 @@ def left_out(result):
     residuals, freedom = result.residuals, result.freedom - 1
     difference, ratio = np.empty(len(residuals)), np.full(len(residuals), np.nan)
     for reading, weight in enumerate(residuals.root_weight):
-        fit = least_squares(residuals.without(reading))
+        fit = calibrate(residuals.without(reading))
         difference[reading] = residuals.measured_mm[reading] - residuals.predicted_mm(fit.deviations)[reading]
         if freedom > 0 and fit.identifiability.rank == len(fit.deviations):
             row = residuals.jacobian(fit.deviations)[reading, 0]
@@ -53,7 +53,7 @@ def left_out(result):
 def without(result, reading):
     """The PrinterFit of all readings but one."""
     residuals = result.residuals.without(reading)
-    return replace(result, residuals=residuals, fit=least_squares(residuals))
+    return replace(result, residuals=residuals, fit=calibrate(residuals))
 
 
 @dataclass(frozen=True)

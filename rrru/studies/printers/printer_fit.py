@@ -7,11 +7,11 @@ import numpy as np
 from scipy import special
 
 from rrru.errors import FitError
+from rrru.estimation.observations.probed_heights import ProbedHeights
+from rrru.fit.calibration import Calibration, calibrate
 from rrru.fit.identifiability import analyse_columns, parameter_scale
-from rrru.fit.least_squares import Fit, least_squares
 from rrru.studies.printers import steps
 from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, rounding, stop
-from rrru.studies.printers.heights import HeightResiduals
 from rrru.studies.printers.printer import Printer
 
 _CONFIDENCE = 0.95
@@ -27,8 +27,8 @@ class PrinterFit:
     """
 
     printer: Printer
-    residuals: HeightResiduals
-    fit: Fit
+    residuals: ProbedHeights
+    fit: Calibration
     stopping_step: float
     step_factors: np.ndarray
 
@@ -97,7 +97,7 @@ def fit_printer(printer, stopping_step, level):
     printer = steps.with_steps(printer, factors)
     try:
         residuals = residuals_of(printer)
-        fit = least_squares(residuals)
+        fit = calibrate(residuals)
         if fit.at_bound.any() or fit.identifiability.rank < len(fit.deviations):
             allowed = "readings over the whole bed, with the steps that the file states"
             raise FitError(f"the readings do not hold its numbers; allowed: {allowed}", fit)
@@ -135,7 +135,7 @@ def _common_arm_error(result, actuators):
     deviations[: len(result.fit.deviations)] = result.fit.deviations
     nothing = np.empty((0, 2, 3))
     mechanism = result.printer.mechanism("distances")
-    heights = HeightResiduals(mechanism, actuators, np.zeros(len(actuators)), nothing, nothing[:, 0, 0])
+    heights = ProbedHeights(mechanism, actuators, np.zeros(len(actuators)), nothing, nothing[:, 0, 0])
     jacobian = heights.jacobian(deviations)
     both = np.concatenate([jacobian[..., :6], jacobian[..., 6:].sum(axis=-1, keepdims=True)], axis=-1)
     seen = analyse_columns((*mechanism.parameters.names[:6], "dL"), parameter_scale(mechanism)[:7], both)

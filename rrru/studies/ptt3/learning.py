@@ -12,8 +12,8 @@ from scipy.interpolate import RBFInterpolator
 
 from rrru.compensate.jacobian import through_inverse, through_jacobian
 from rrru.compensate.rbf import ROUNDING, choose, fit, grow, make_folds
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.studies.ptt3.experiments import Lesson
 
 
@@ -87,7 +87,7 @@ class Learning:
     def calibration(self):
         """Least-squares fit of the mechanism's parameters on the training points."""
         points = (values[self.train] for values in (self.sliders_mm, self.measured_mm, self.command_mm))
-        return least_squares(Residuals(self.mechanism, *points))
+        return calibrate(TargetPositions(self.mechanism, *points))
 
     @cached_property
     def rest(self):

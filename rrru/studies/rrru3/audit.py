@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 from rrru.robots import singularity
@@ -152,7 +152,7 @@ def _radii():
 def _migration():
     """Range of the ten printed objectives, and difference between P_m = 0.1 and 1.0 at the same seed here."""
     points = _line()
-    residuals = Residuals(_TIED, _TIED.inverse(points), points + _predicted(TABLE_5, points), points)
+    residuals = TargetPositions(_TIED, _TIED.inverse(points), points + _predicted(TABLE_5, points), points)
     settings = GeneticSettings(generations=100, stall_generations=0)
     low, high = (
         minimise(residuals.mean_distance, _TIED.parameters.low, _TIED.parameters.high, one, 1).objective

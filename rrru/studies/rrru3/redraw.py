@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.fit.least_squares import least_squares
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.fit.mean_distance import least_mean_distance
-from rrru.fit.residuals import Residuals
 from rrru.plant.driven import non_repeatability
 from rrru.plant.tracker import measure
 from rrru.studies.rrru3 import study_numbers as numbers
@@ -88,8 +88,8 @@ def _draw(campaign, measurements, motion, chosen, method, number):
     measured = _measured(campaign, attained, campaign.generator("redraw", number, "measure"))
     fits, after = [], []
     for calibrated in chosen:
-        residuals = Residuals(mechanism, theta[calibrated], measured[calibrated], target[calibrated])
-        fit = least_squares(residuals)
+        residuals = TargetPositions(mechanism, theta[calibrated], measured[calibrated], target[calibrated])
+        fit = calibrate(residuals)
         if method != "least_squares":
             fit = least_mean_distance(residuals, fit.deviations)
         # the same draw for both calibrations

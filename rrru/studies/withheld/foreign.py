@@ -13,8 +13,8 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.errors import SimulationError, UnreachableError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.plant.driven import SETTLE_S
 from rrru.plant.tracker import Sees
 from rrru.robots.dynamics import Masses
@@ -165,7 +165,7 @@ def noise_free(robot, conditions):
 
 def residual(measurements, conditions):
     """What a calibration leaves (m, 3) of a measurement table."""
-    return least_squares(select(measurements, conditions.seen(measurements), ["*"])).residual_mm
+    return calibrate(select(measurements, conditions.seen(measurements), ["*"])).residual_mm
 
 
 def draw(member, conditions):

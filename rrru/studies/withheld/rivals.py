@@ -13,8 +13,8 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.gap.case import Case
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
@@ -48,7 +48,7 @@ class Campaign:
         """The campaign of a measurement table of a MeasuredRobot, linearised about its calibration."""
         mechanism = sim(known.mechanism)
         case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
-        calibrated = State(least_squares(select(measurements, mechanism, ["*"])).deviations, {})
+        calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
         effects = case.effects
         keys = [(name, k) for name, effect in effects.items() for k in range(len(effect.coordinates.shapes))]
         linear = case.linearise(calibrated, keys)

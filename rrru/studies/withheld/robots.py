@@ -9,8 +9,8 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
 from rrru.effects.protocol import ActiveEffect
 from rrru.errors import FitError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
@@ -211,6 +211,6 @@ def true_gap_mm(robot, conditions):
     if measurements is None:
         return None
     try:
-        return least_squares(select(measurements, conditions.mechanism, ["*"])).rms_mm
+        return calibrate(select(measurements, conditions.mechanism, ["*"])).rms_mm
     except FitError:
         return None

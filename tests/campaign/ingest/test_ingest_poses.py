@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.errors import IngestError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
 from rrru.fit.campaign_noise import campaign_noise
-from rrru.fit.least_squares import least_squares
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.geometric_numbers import direction
@@ -99,7 +99,7 @@ def test_deviations_are_found_beside_frame_tool_and_noise(arm, driven, tmp_path)
     noise = campaign_noise(robot, found.measurements, (None, None))
     assert noise.mm == pytest.approx(_NOISE_MM, rel=0.2) and noise.rad == pytest.approx(_NOISE_RAD, rel=0.2)
     residuals = select(found.measurements, robot, ["*"], True, noise.arm_mm)
-    fit = least_squares(residuals, _NOISE_MM)
+    fit = calibrate(residuals, _NOISE_MM)
     assert fit.rms_mm == pytest.approx(np.sqrt(3.0) * _NOISE_MM, rel=0.15)
     assert fit.turn_rms_rad == pytest.approx(np.sqrt(3.0) * _NOISE_RAD, rel=0.15)
     # what no gauge changes: distances between the reflector's places in fresh poses

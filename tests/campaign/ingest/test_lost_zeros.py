@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.fit.mastering import mastering_notes
 from rrru.robots.hexapod import hexapod
 from rrru.robots.serial import serial
@@ -76,7 +76,7 @@ def _file(folder, made, generator, zeros):
 
 def _calibrated(found, robot):
     robot = robot.reading(rows.reads(found.measurements, (), True))
-    return least_squares(residuals := select(found.measurements, robot, ["*"])), residuals.mechanism
+    return calibrate(residuals := select(found.measurements, robot, ["*"])), residuals.mechanism
 
 
 def _two_far_off(generator, most, farthest):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from rrru.fit.least_squares import least_squares
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.robots.delta import Delta
 from rrru.studies.delta import audit
 
@@ -56,7 +56,7 @@ def test_what_wrong_lengths_leave_by_drawing_robots():
     generator, squares = np.random.default_rng(0), []
     for _ in range(40):
         deviations = np.r_[np.zeros(3), generator.normal(0.0, 0.1, 9)]
-        squares.append(least_squares(Residuals(robot, theta, legs.forward(theta, deviations), points)).rms_mm ** 2)
+        squares.append(calibrate(TargetPositions(robot, theta, legs.forward(theta, deviations), points)).rms_mm ** 2)
     exact, left = _values("best zero offsets")
     assert exact == 0.0 and left == pytest.approx(
         np.sqrt(np.mean(squares)), rel=4.0 * np.sqrt(2.0) / 2.0 / np.sqrt(40.0)

@@ -5,10 +5,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
-from rrru.fit.least_squares import least_squares, minimise
-from rrru.fit.residuals import Residuals
+from rrru.estimation.observations.distances import Distances
+from rrru.estimation.observations.shapes import Shape
+from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
+from rrru.fit.calibration import calibrate, estimate_deviations
 from rrru.robots.delta import Delta
-from rrru.studies.delta.zero_offset import Distances, Heights, Shape, one_step, step_fit, taken_for_errors
+from rrru.studies.delta.zero_offset import one_step, step_fit, taken_for_errors
 
 ROBOT, LEGS = Delta(), Delta(parameter_set="legs")
 COMMAND = np.array([[x, y, 100.0] for x in (-200.0, -70.0, 70.0, 200.0) for y in (-135.0, 0.0, 135.0)])
@@ -26,7 +28,7 @@ def moved(places, seed=1):
 def test_exact_places_in_any_frame_give_the_true_errors(kind):
     places = ROBOT.forward(THETA, TRUE)
     points = kind(ROBOT, THETA, moved(places))
-    fit = least_squares(points)
+    fit = calibrate(points)
     np.testing.assert_allclose(fit.deviations, TRUE, atol=1e-11)
     assert fit.identifiability.rank == 3
     other = kind(ROBOT, THETA, moved(places, seed=2))
@@ -36,11 +38,11 @@ def test_exact_places_in_any_frame_give_the_true_errors(kind):
 
 def test_heights_and_positions_need_the_base_frame_and_give_the_true_errors():
     places = ROBOT.forward(THETA, TRUE)
-    for kind in (Heights, Residuals):
-        np.testing.assert_allclose(least_squares(kind(ROBOT, THETA, places, COMMAND)).deviations, TRUE, atol=1e-11)
+    for kind in (TargetHeights, TargetPositions):
+        np.testing.assert_allclose(calibrate(kind(ROBOT, THETA, places, COMMAND)).deviations, TRUE, atol=1e-11)
 
 
-@pytest.mark.parametrize("kind", [*KINDS, lambda *a: Heights(*a, COMMAND)])
+@pytest.mark.parametrize("kind", [*KINDS, lambda *a: TargetHeights(*a, COMMAND)])
 def test_jacobians_are_those_of_finite_differences(kind):
     points = kind(ROBOT, THETA, ROBOT.forward(THETA, TRUE))
     step = 1e-6
@@ -72,9 +74,9 @@ def test_standard_errors_are_the_scatter_under_noise(kind):
     generator, noise, draws = np.random.default_rng(8), 0.01, 250
     places = moved(ROBOT.forward(THETA, TRUE))
     drawn = [kind(ROBOT, THETA, places + noise * generator.standard_normal(places.shape)) for _ in range(draws)]
-    scatter = np.std([minimise(points)[0] for points in drawn], axis=0)
+    scatter = np.std([estimate_deviations(points).values for points in drawn], axis=0)
     # four standard deviations of an estimated standard deviation
-    expected = least_squares(drawn[0], noise).standard_errors
+    expected = calibrate(drawn[0], noise).standard_errors
     np.testing.assert_allclose(scatter, expected, rtol=4.0 / np.sqrt(2.0 * draws))
 
 
@@ -100,16 +102,16 @@ def test_the_papers_step_is_as_uncertain_as_it_says():
     fit, covariance = fits[0]
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), fit.standard_errors)
     # the condition is that of what the distances hold, not of the paper's weights
-    other = least_squares(Distances(ROBOT, THETA, noisy[0].measured_mm))
+    other = calibrate(Distances(ROBOT, THETA, noisy[0].measured_mm))
     assert fit.identifiability.condition == pytest.approx(other.identifiability.condition, rel=1e-2)
 
 
 def test_what_is_taken_for_zero_errors_is_what_a_fit_finds():
-    for kind in (Distances, Shape, lambda *a: Heights(*a, COMMAND)):
+    for kind in (Distances, Shape, lambda *a: TargetHeights(*a, COMMAND)):
         length = 1e-3
         deviations = np.zeros(12)
         deviations[5] = length
-        found = least_squares(kind(ROBOT, THETA, LEGS.forward(THETA, deviations))).deviations
+        found = calibrate(kind(ROBOT, THETA, LEGS.forward(THETA, deviations))).deviations
         exact = ROBOT.forward(THETA)
         changes = -kind(LEGS, THETA, exact).jacobian(np.zeros(12))[..., [5]]
         np.testing.assert_allclose(
@@ -119,12 +121,10 @@ def test_what_is_taken_for_zero_errors_is_what_a_fit_finds():
 
 def test_too_few_places_are_refused_and_a_second_height_conditions_better():
     with pytest.raises(FitError, match="2 equations; allowed: at least 3"):
-        least_squares(Distances(ROBOT, THETA[:3], ROBOT.forward(THETA[:3], TRUE)))
+        calibrate(Distances(ROBOT, THETA[:3], ROBOT.forward(THETA[:3], TRUE)))
     split = COMMAND - np.outer(np.arange(len(COMMAND)) % 2, [0.0, 0.0, 100.0])
     condition = [
-        least_squares(
-            Distances(ROBOT, ROBOT.inverse(p), ROBOT.forward(ROBOT.inverse(p), TRUE))
-        ).identifiability.condition
+        calibrate(Distances(ROBOT, ROBOT.inverse(p), ROBOT.forward(ROBOT.inverse(p), TRUE))).identifiability.condition
         for p in (COMMAND, split)
     ]
     assert condition[1] < condition[0]

@@ -208,7 +208,7 @@ def test_a_cause_that_passes_by_one_reading_is_not_found(name):
 @pytest.mark.parametrize("printer", [HEIGHTS, DISTANCES], ids=["heights", "distances"])
 def test_columns_of_causes_are_finite_differences(printer):
     result = printer_fit.fit_printer(printer, STEP, LEVEL)
-    saved = replace(result, fit=replace(result.fit, deviations=np.zeros_like(result.fit.deviations)))
+    saved = replace(result, fit=result.fit.at(np.zeros_like(result.fit.deviations), "saved"))
     found, step = cause_tests.cause_columns(saved), 1e-5
     # a tower that leans outwards rises less
     leans = [step * np.eye(6)[k].reshape(2, 3).T * (-1.0 if k < 3 else 1.0) for k in range(6)]

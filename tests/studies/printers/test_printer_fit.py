@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rrru.errors import FitError
-from rrru.fit.least_squares import least_squares
+from rrru.fit.calibration import calibrate
 from rrru.studies.printers import firmware, printer_fit, printer_tables, saved_answers, steps
 from rrru.studies.printers.printer import Refused
 from tests.schemas import check
@@ -131,7 +131,7 @@ def test_heights_alone_hardly_see_the_scale():
     """
     result = printer_fit.fit_printer(simulated(HEIGHTS, np.zeros(9), NOISE_MM, np.random.default_rng(3)), STEP, LEVEL)
     exact = simulated(HEIGHTS, np.zeros(9))
-    longer = least_squares(firmware.residuals_of(replace(exact, arm_mm=exact.arm_mm + 1.0)))
+    longer = calibrate(firmware.residuals_of(replace(exact, arm_mm=exact.arm_mm + 1.0)))
     left_mm = np.linalg.norm(longer.residual_mm)
     assert left_mm < NOISE_MM
     assert printer_fit.common_arm_error(result) == pytest.approx(result.fit.noise_mm / left_mm, rel=0.02)
@@ -148,7 +148,7 @@ def test_heights_in_great_number_hardly_see_the_scale_either():
     inside = square[np.linalg.norm(square, axis=1) < reach][:count]
     places = np.column_stack([inside, np.full(count, HEIGHTS.height_mm.mean())])
     disc = replace(HEIGHTS, height_mm=places[:, 2], height_drop_mm=-robot.inverse(places))
-    left_mm = np.linalg.norm(least_squares(firmware.residuals_of(replace(disc, arm_mm=disc.arm_mm + 1.0))).residual_mm)
+    left_mm = np.linalg.norm(calibrate(firmware.residuals_of(replace(disc, arm_mm=disc.arm_mm + 1.0))).residual_mm)
     error = printer_fit.dense_arm_error(result)
     assert error == pytest.approx(result.fit.noise_mm / left_mm * np.sqrt(count / 100.0), rel=0.1)
     assert 10.0 * result.fit.noise_mm < error < printer_fit.common_arm_error(result)
@@ -207,7 +207,7 @@ def test_a_mistyped_reading_in_a_real_file_is_flagged_and_said_to_be_changed():
     kept = {field: np.delete(getattr(DISTANCES, field), 7, axis=0) for field in ("distance_mm", "distance_drop_mm")}
     residuals = firmware.residuals_of(replace(DISTANCES, **kept))
     residuals = replace(residuals, height_weight=firmware.residuals_of(DISTANCES).height_weight)
-    others = firmware.own_numbers(residuals.mechanism, least_squares(residuals).deviations)[0]
+    others = firmware.own_numbers(residuals.mechanism, calibrate(residuals).deviations)[0]
     np.testing.assert_allclose(frames["printer_parameters"]["without_suspect"], others, atol=1e-6)
     assert readings.loc[readings["flagged"], ["kind", "number"]].to_numpy().tolist() == [["distance", 8]]
     assert (

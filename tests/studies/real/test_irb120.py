@@ -13,10 +13,10 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.fit.mastering import mastering_notes
-from rrru.fit.residuals import Residuals
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
@@ -75,9 +75,9 @@ def test_calibrations_predict_as_the_reference_does(campaign):
     joints, table, held = campaign
     expected = {"cmd": 0.290, "read": 0.569}[joints]
     residuals = select(table, _robot().reading(rows.reads(table, (), True)), ["*"])
-    fit, robot, out = least_squares(residuals), residuals.mechanism, table[held]
+    fit, robot, out = calibrate(residuals), residuals.mechanism, table[held]
     told = rows.actuators(out, robot), rows.measured(out), rows.command(out)
-    left = Residuals(robot, *told, rows.readings(out)).residual(fit.deviations)
+    left = TargetPositions(robot, *told, rows.readings(out)).residual(fit.deviations)
     assert fit.identifiability.rank == len(robot.parameters) == 18 + 15
     assert _rms(left) <= 1.02 * expected and mastering_notes(fit, robot) == ()
 

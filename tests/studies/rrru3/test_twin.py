@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from rrru.errors import ConfigError, UnreachableError
-from rrru.fit.least_squares import least_squares
+from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.fit.calibration import calibrate
 from rrru.fit.mean_distance import least_mean_distance
-from rrru.fit.residuals import Residuals
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
@@ -67,8 +67,8 @@ def test_the_linearised_fit_is_the_pipelines(rich_poses):
     robot = Rrru3()
     truth = np.array([0.004, -0.003, 0.002, 0.8, -0.6, 0.5, 2.0])
     measured = robot.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.3, points.shape)
-    residuals = Residuals(robot, theta, measured, points)
-    fit = least_mean_distance(residuals, least_squares(residuals).deviations)
+    residuals = TargetPositions(robot, theta, measured, points)
+    fit = least_mean_distance(residuals, calibrate(residuals).deviations)
     fast, fast_value = linear_fit(robot, theta, measured[None], points)
     assert fast_value[0] == pytest.approx(fit.mean_mm, abs=1e-4)
     high = robot.parameters.high
@@ -80,8 +80,8 @@ def test_the_linearised_fit_keeps_the_bounds_as_the_pipelines_does(rich_poses):
     robot = make_mechanism("rrru3", {}, parameter_set="identifiable", length_limit_mm=0.5)
     truth = np.array([0.004, -0.003, 0.002, 0.8, -0.2, 0.4, -0.6])
     measured = robot.forward(theta, truth, points) + np.random.default_rng(1).normal(0.0, 0.3, points.shape)
-    residuals = Residuals(robot, theta, measured, points)
-    fit = least_mean_distance(residuals, least_squares(residuals).deviations)
+    residuals = TargetPositions(robot, theta, measured, points)
+    fit = least_mean_distance(residuals, calibrate(residuals).deviations)
     fast, fast_value = linear_fit(robot, theta, np.stack([measured, measured + 0.1]), points)
     assert fit.deviations[3] == pytest.approx(0.5) and fast[0, 3] == pytest.approx(0.5, abs=0.02)
     assert fast_value[0] == pytest.approx(fit.mean_mm, abs=5e-3)

@@ -8,8 +8,8 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
+from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.least_squares import least_squares
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
 from rrru.studies.withheld import draw
@@ -37,7 +37,7 @@ def robots():
     result = {}
     for made in (replace(robot, name="sound"), replace(robot, name="faulty", acting=(acting,))):
         measurements, _ = made.campaign(CONDITIONS).run()
-        fit = least_squares(select(measurements, CONDITIONS.mechanism, ["*"]))
+        fit = calibrate(select(measurements, CONDITIONS.mechanism, ["*"]))
         result[made.name] = (made, measurements, fit.deviations)
     return result
 

@@ -1,32 +1,43 @@
-"""Heights and distances as measurements of a calibration: what a probe and calipers see, one number per reading."""
+"""Heights that a probe touches and distances between two places that calipers see, one number per reading.
+
+Both are one kind because a printer's calibration weighs them against each other by one factor.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.kept import last_kept
+from rrru.robots.robot import Robot
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class HeightResiduals:
+class ProbedHeights:
     """Readings of a robot without points: heights of its platform, and distances between two of its places.
 
-    mechanism: its `parameters` are fitted. height_actuators (n, 3) with height_mm (n,); distance_actuators (m, 2, 3)
-    with distance_mm (m,). height_weight: what a squared height counts against a squared distance. Fits
-    `rrru.fit.least_squares`, with one axis instead of three. Raises FitError where a number is not finite or the
-    nominal robot cannot take a place.
+    mechanism: its `parameters` are estimated. height_actuators (n, 3) with height_mm (n,); distance_actuators (m, 2, 3)
+    with distance_mm (m,). height_weight: what a squared height counts against a squared distance. Raises FitError where
+    a number is not finite or the nominal robot cannot take a place.
     """
 
-    mechanism: object
-    height_actuators: np.ndarray
-    height_mm: np.ndarray
-    distance_actuators: np.ndarray
-    distance_mm: np.ndarray
+    mechanism: Robot
+    height_actuators: FloatArray
+    height_mm: FloatArray
+    distance_actuators: FloatArray
+    distance_mm: FloatArray
     height_weight: float = 1.0
 
-    def __post_init__(self):
+    # ASSUME how well a probe repeats; a calibration takes what the residuals show
+    default_sd: ClassVar[float] = 0.01
+    unit: ClassVar[str] = "mm"
+
+    def __post_init__(self) -> None:
         if not np.isfinite(self.measured_mm).all():
             raise FitError("a height or a distance is not finite")
         lost = np.flatnonzero(~np.isfinite(self.predicted_mm(self.mechanism.parameters.nominal)))
@@ -36,36 +47,36 @@ class HeightResiduals:
                 f"the first is reading {lost[0] + 1}"
             )
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.height_mm) + len(self.distance_mm)
 
     @cached_property
-    def measured_mm(self):
+    def measured_mm(self) -> FloatArray:
         """Readings (n + m,): the heights, then the distances."""
         return np.concatenate([self.height_mm, self.distance_mm])
 
     @cached_property
-    def root_weight(self):
+    def root_weight(self) -> FloatArray:
         """Factor (n + m,) of every reading's residual."""
         return np.where(np.arange(len(self)) < len(self.height_mm), np.sqrt(self.height_weight), 1.0)
 
     @cached_property
-    def actuators(self):
+    def actuators(self) -> FloatArray:
         """Actuator values (n + 2 m, 3) of all places: the heights', then the distances' first and second ones."""
         return np.concatenate([self.height_actuators, self.distance_actuators[:, 0], self.distance_actuators[:, 1]])
 
     @last_kept
-    def places(self, deviations):
+    def places(self, deviations: FloatArray) -> FloatArray:
         """Where the robot stands, (n + 2 m, 3), at `actuators` under deviations (p,)."""
         return self.mechanism.forward(self.actuators, deviations)
 
-    def predicted_mm(self, deviations):
+    def predicted_mm(self, deviations: FloatArray) -> FloatArray:
         """Readings (n + m,) of the robot under deviations (p,)."""
         n, m = len(self.height_mm), len(self.distance_mm)
         places = self.places(deviations)
         return np.concatenate([places[:n, 2], np.linalg.norm(places[n : n + m] - places[n + m :], axis=1)])
 
-    def gradient(self, places):
+    def gradient(self, places: FloatArray) -> FloatArray:
         """Derivative (n + m, n + 2 m, 3) of the readings by the places (n + 2 m, 3) at which the robot stands."""
         n, m = len(self.height_mm), len(self.distance_mm)
         between = places[n : n + m] - places[n + m :]
@@ -76,17 +87,18 @@ class HeightResiduals:
         slope[pairs, pairs + m] = -slope[pairs, pairs]
         return slope
 
-    def residual(self, deviations):
-        """Measured less predicted readings times the roots of their weights, (n + m, 1), under deviations (p,)."""
-        return (self.root_weight * (self.measured_mm - self.predicted_mm(deviations)))[:, None]
+    def residual(self, values: FloatArray, /) -> FloatArray:
+        """Measured minus predicted readings times the roots of their weights, (n + m, 1) in mm, at deviations (p,)."""
+        return (self.root_weight * (self.measured_mm - self.predicted_mm(values)))[:, None]
 
-    def jacobian(self, deviations):
-        """Derivative (n + m, 1, p) of the residual by the deviations."""
-        places = self.places(deviations)
-        moved = self.mechanism.parameter_jacobian(places, self.actuators, deviations)
-        return -self.root_weight[:, None, None] * np.einsum("rna,nap->rp", self.gradient(places), moved)[:, None]
+    def jacobian(self, values: FloatArray, /) -> FloatArray:
+        """Derivative (n + m, 1, p) of the residual by the deviations (p,)."""
+        places = self.places(values)
+        moved = self.mechanism.parameter_jacobian(places, self.actuators, values)
+        slope: FloatArray = np.einsum("rna,nap->rp", self.gradient(places), moved)
+        return -(self.root_weight[:, None] * slope)[:, None]
 
-    def without(self, reading):
+    def without(self, reading: int) -> Self:
         """The same residuals less one reading, counted from 0 over the heights and then the distances."""
         heights, distances = np.split(np.arange(len(self)) != reading, [len(self.height_mm)])
         return replace(

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import fsolve
 
 from rrru.errors import FitError
+from rrru.estimation.observations.probed_heights import ProbedHeights
 from rrru.robots.linear_delta import linear_delta
-from rrru.studies.printers.heights import HeightResiduals
 
 AZIMUTH = np.radians([210.0, 330.0, 90.0])
 ARMS, ENDSTOPS, RADIUS = (215.0, 216.0, 214.5), (236.0, 237.0, 236.5), 101.0
@@ -20,7 +20,7 @@ def residuals(parameter_set="distances", heights=7, distances=5, weight=3.0):
     robot = linear_delta(RADIUS, AZIMUTH, ARMS, ENDSTOPS, parameter_set)
     sliders = robot.inverse(generator.uniform(-50.0, 50.0, (heights + 2 * distances, 3)))
     ends = sliders[heights:].reshape(distances, 2, 3)
-    return HeightResiduals(
+    return ProbedHeights(
         robot,
         sliders[:heights],
         generator.uniform(-1.0, 1.0, heights),

@@ -1,0 +1,90 @@
+"""Distances of places from the first one, seen in a frame that nobody registered (paper C, eqs. 8 to 15).
+
+The robot stood at n actuator triples. With d_j the seen distance of place j from the first, l_j the model's, u_j the
+direction between the two places and J_j the Jacobian by the parameters x,
+
+    d_j - l_j = u_j . (J_j - J_1) dx,   j = 2 .. n
+    (eqs. 9, 13, 14)
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from rrru.errors import FitError
+from rrru.kept import last_kept
+from rrru.robots.robot import Robot
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Distances of n places from the first one.
+
+    mechanism: its `parameters` are estimated; actuators (n, K), measured_mm (n, 3): actuator values and places in any
+    one frame. Every distance carries the first place's noise too; unless `alike`, residuals are multiplied by
+    `whitener`, which leaves them independent and with the noise of one axis each. The paper counts all distances alike.
+    Raises FitError where a number is not finite.
+    """
+
+    mechanism: Robot
+    actuators: FloatArray
+    measured_mm: FloatArray
+    alike: bool = False
+
+    # ASSUME a laser tracker on a small machine, per axis of a place; a calibration takes what the residuals show
+    default_sd: ClassVar[float] = 0.02
+    unit: ClassVar[str] = "mm"
+
+    def __post_init__(self) -> None:
+        require_finite(self.actuators, "actuators")
+        require_finite(self.measured_mm, "measured_mm")
+
+    def __len__(self) -> int:
+        return len(self.actuators) - 1
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Covariance (n-1, n-1) of the distances for unit noise of every axis: I + U U', U the directions."""
+        direction = _from_first(self.measured_mm)[1]
+        return np.eye(len(self)) + direction @ direction.T
+
+    @cached_property
+    def whitener(self) -> FloatArray:
+        """Inverse Cholesky factor (n-1, n-1) of the covariance, or the unit matrix where all count alike."""
+        return np.eye(len(self)) if self.alike else np.linalg.inv(np.linalg.cholesky(self.covariance))
+
+    @last_kept
+    def _model(self, values: FloatArray) -> FloatArray:
+        """Model places (n, 3)."""
+        return self.mechanism.forward(self.actuators, values)
+
+    def residual(self, values: FloatArray, /) -> FloatArray:
+        """Measured minus predicted distances (n-1, 1) in mm at deviations (p,), whitened."""
+        difference = _from_first(self.measured_mm)[0] - _from_first(self._model(values))[0]
+        return (self.whitener @ difference)[:, None]
+
+    def jacobian(self, values: FloatArray, /) -> FloatArray:
+        """Derivative (n-1, 1, p) of the residual by the deviations (p,)."""
+        places = self._model(values)
+        slope = self.mechanism.parameter_jacobian(places, self.actuators, values)
+        rows: FloatArray = np.einsum("na,nap->np", _from_first(places)[1], slope[1:] - slope[0])
+        return -(self.whitener @ rows)[:, None]
+
+
+def require_finite(values: FloatArray, name: str) -> None:
+    """Raise FitError, naming the first row, where values (n, ...) are not finite."""
+    bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    if bad.size:
+        raise FitError(f"{name} is not finite at {bad.size} of {len(values)} places, the first is place {bad[0] + 1}")
+
+
+def _from_first(places_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Distances (n-1,) of places (n, 3) from the first, and the unit directions (n-1, 3)."""
+    step = places_mm[1:] - places_mm[0]
+    distance = np.linalg.norm(step, axis=1)
+    return distance, step / distance[:, None]

@@ -1,0 +1,88 @@
+"""Searches along valleys that readings leave open, and estimates at values that were found elsewhere."""
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+
+from rrru.errors import FitError
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem, WhiteNoise
+from rrru.estimation.solver import estimate_at, solve
+
+
+class Curved:
+    """Readings (n, 1) of y = sin(A x) + (B x)^2."""
+
+    def __init__(self, first, second, read):
+        self._first, self._second, self._read = first, second, read
+
+    def residual(self, values, /):
+        """Read minus predicted (n, 1)."""
+        return (self._read - np.sin(self._first @ values) - (self._second @ values) ** 2)[:, None]
+
+    def jacobian(self, values, /):
+        """Derivative (n, 1, p) of the residual."""
+        sine = np.cos(self._first @ values)[:, None] * self._first
+        return -(sine + 2.0 * (self._second @ values)[:, None] * self._second)[:, None]
+
+
+class Circle:
+    """One reading of the distance of (x, y) from (0, -r): the valley of least squares is an arc."""
+
+    def __init__(self, radius, read):
+        self._radius, self._read = radius, read
+
+    def residual(self, values, /):
+        """Read minus predicted (1, 1)."""
+        return np.array([[self._read - np.hypot(values[0], values[1] + self._radius)]])
+
+    def jacobian(self, values, /):
+        """Derivative (1, 1, 2) of the residual."""
+        step = values + np.array([0.0, self._radius])
+        return -(step / np.linalg.norm(step))[None, None]
+
+
+def _problem(seed):
+    """A Problem of four parameters and 30 readings with noise."""
+    generator = np.random.default_rng(seed)
+    first, second = generator.normal(size=(30, 4)), 0.2 * generator.normal(size=(30, 4))
+    read = np.sin(first @ [0.3, -0.2, 0.1, 0.4]) + (second @ [0.3, -0.2, 0.1, 0.4]) ** 2
+    own = Curved(first, second, read + 0.05 * generator.normal(size=30))
+    sd, mean = np.array([0.5, 2.0, 0.1, 1.0]), np.array([0.0, 0.1, 0.0, -0.1])
+    parameters = Parameters((Block.of("x", "abcd", ("mm",) * 4, sd, mean),))
+    return Problem(own, parameters, WhiteNoise(0.05))
+
+
+@pytest.mark.parametrize("noise", [1e-2, 1e-4, 1e-6])
+def test_what_readings_do_not_determine_does_not_slow_the_search(noise):
+    """The readings hold the arc and the prior the place on it, however narrow the valley of the readings is."""
+    parameters = Parameters((Block.of("x", ("x", "y"), ("mm", "mm"), [3.0, 0.3]),))
+    problem = Problem(Circle(400.0, 401.5), parameters, WhiteNoise(noise))
+    found = solve(problem)
+    assert found.end.converged and found.end.evaluations < 20
+    assert np.abs(found.residual).max() < noise
+    along = null_space(problem.observations.jacobian(found.values)[0])[:, 0]
+    # along the arc the gradient of the prior is zero
+    assert abs(along @ (found.values / parameters.sd**2)) < 1e-3 * np.linalg.norm(along / parameters.sd)
+    assert found.rank == 1 and len(found.null_space) == 1
+
+
+def test_a_parameter_that_no_reading_touches_stays_at_its_prior():
+    problem = _problem(2)
+    own = problem.observations
+    blind = Curved(*(np.pad(one, ((0, 0), (0, 1))) for one in (own._first, own._second)), own._read)
+    blocks = (*problem.parameters.blocks, Block.of("unseen", ("e",), ("rad",), 0.7, 0.2))
+    found = solve(Problem(blind, Parameters(blocks), problem.whiten))
+    assert found.value("e") == pytest.approx(0.2, abs=1e-12) and found.standard_error("e") == pytest.approx(0.7)
+    np.testing.assert_allclose(found.values[:4], solve(problem).values, atol=1e-8)
+
+
+def test_an_estimate_at_values_is_linearised_there():
+    problem = _problem(3)
+    found = solve(problem)
+    again = estimate_at(problem, found.values, "found before", 7)
+    np.testing.assert_allclose(again.covariance, found.covariance, rtol=1e-6)
+    assert again.end.message == "found before" and again.end.evaluations == 7
+    assert again.end.cost == pytest.approx(found.end.cost)
+    with pytest.raises(FitError, match="the model predicts no reading at the values of a search; its end: lost"):
+        estimate_at(problem, np.full(4, np.nan), "lost")
