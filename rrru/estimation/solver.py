@@ -38,7 +38,7 @@ class SolverOptions:
     max_iterations: int = 200
     step_tolerance: float = 1e-7
     cost_tolerance: float = 1e-15
-    first_damping: float = 1e-6
+    first_damping: float = 1e-8
     max_damping: float = 1e12
 
 
