@@ -106,6 +106,11 @@ class Estimate:
         return self.problem.observations.residual(self.values)
 
     @cached_property
+    def jacobian(self) -> FloatArray:
+        """Derivative (n, a, p) of the residual by the parameters, in the readings' unit."""
+        return self.problem.observations.jacobian(self.values)
+
+    @cached_property
     def standardized_residual(self) -> FloatArray:
         """Whitened residuals (n, a): independent with unit variance where the model is complete."""
         return self.problem.whiten(self.residual)

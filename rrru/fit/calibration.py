@@ -55,9 +55,13 @@ class Calibration:
     standard_errors: FloatArray
     identifiability: Identifiability
 
-    def at(self, deviations: npt.ArrayLike, message: str) -> Self:
-        """The same noise and standard errors about other deviations (p,), of which the message says where from."""
-        return replace(self, estimate=estimate_deviations_at(self.observations, deviations, message, 1))
+    def at(self, deviations: npt.ArrayLike, message: str, observations: Any = None) -> Self:
+        """The same noise and standard errors about other deviations (p,), of which the message says where from.
+
+        observations: other readings of the robot, by default its own.
+        """
+        observations = self.observations if observations is None else observations
+        return replace(self, estimate=estimate_deviations_at(observations, deviations, message, 1))
 
     @property
     def observations(self) -> Any:
@@ -170,7 +174,7 @@ def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:
     """The Calibration of an Estimate of `estimate_deviations` or of its namesake; noise_mm as in `calibrate`."""
     observations: Any = estimate.problem.observations
     mechanism, parameters = observations.mechanism, observations.mechanism.parameters
-    residual, jacobian = estimate.residual, observations.jacobian(estimate.values)
+    residual, jacobian = estimate.residual, estimate.jacobian
     identifiability, free = analyse(mechanism, jacobian), np.flatnonzero(~parameters.at_bound(estimate.values))
     freedom = max(residual.size - min(identifiability.rank, len(free)), 1)
     robust = estimate.problem.loss != "linear"

@@ -22,7 +22,7 @@ from scipy import optimize
 
 from rrru.studies.printers.cause_columns import cause_columns
 from rrru.studies.printers.printer_fit import PrinterFit
-from rrru.studies.printers.weighing import Weighing, largest_p, mean_p
+from rrru.studies.printers.weighing import largest_p, mean_p
 
 BAD_READING = "bad_reading"
 # ASSUME noise of a height over that of a distance: a probe is at best four times as good as calipers, at worst as bad
@@ -44,14 +44,9 @@ class CauseTests:
         return cause_columns(self.result)
 
     @cached_property
-    def readings_mm(self):
-        """Readings (n,) less those of the answer."""
-        return self.result.residuals.measured_mm - self.result.residuals.predicted_mm(self.result.fit.deviations)
-
-    @cached_property
     def own_weighing(self):
         """The weighing under the firmware's ratio."""
-        return self._weighing(self.result.residuals.root_weight)
+        return self.result.weighing(self.result.residuals.root_weight)
 
     @cached_property
     def weighings(self):
@@ -67,12 +62,7 @@ class CauseTests:
         """Weighings under ratios of noises; heights alone have none."""
         residuals = self.result.residuals
         height = np.arange(len(residuals)) < len(residuals.height_mm)
-        return [] if height.all() else [self._weighing(np.where(height, 1.0 / ratio, 1.0)) for ratio in ratios]
-
-    def _weighing(self, weight):
-        residuals = self.result.residuals
-        jacobian = residuals.jacobian(self.result.fit.deviations)[:, 0] / residuals.root_weight[:, None]
-        return Weighing.of(jacobian, weight)
+        return [] if height.all() else [self.result.weighing(np.where(height, 1.0 / ratio, 1.0)) for ratio in ratios]
 
     def _bases(self, name, weighing):
         """Bases (b, n, r) of a cause, one, or of a bad reading one per reading, and their volumes'."""
@@ -102,7 +92,7 @@ class CauseTests:
         Of a bad reading it is the mean (..., n), of every reading, times their number (Bonferroni). beside: columns
         (n, k) that are fitted too.
         """
-        readings = self.readings_mm if readings is None else readings
+        readings = self.result.residual_mm if readings is None else readings
         bad = name == BAD_READING
         weighings, bases = (self._likely, self._bad_bases) if bad else (self.weighings, self._all_bases[name])
         if beside is not None:
@@ -114,7 +104,7 @@ class CauseTests:
 
     def p_without_any(self, name):
         """Largest p of a cause with any single reading left out."""
-        return float(np.max([self.p(name, beside=column[:, None]) for column in np.eye(len(self.readings_mm))]))
+        return float(np.max([self.p(name, beside=column[:, None]) for column in np.eye(len(self.result.residual_mm))]))
 
     def imitators(self, name, share, reading=0):
         """Names of the other causes that hold a share of what a cause explains, under the firmware's ratio.
@@ -122,7 +112,7 @@ class CauseTests:
         reading: that of a bad reading.
         """
         basis = self.bases[name][reading if name == BAD_READING else 0]
-        explained = basis @ (basis.T @ self.own_weighing.left(self.readings_mm))
+        explained = basis @ (basis.T @ self.own_weighing.left(self.result.residual_mm))
         held = {
             other: (np.einsum("n,bnr->br", explained, bases) ** 2).sum(axis=-1).max()
             for other, bases in self.bases.items()
@@ -147,7 +137,7 @@ class CauseTests:
         freedom = self.result.freedom - 1
         if block.shape[1] > 1 or freedom < 1:
             return np.nan, np.nan
-        seen, left = one.left(block[:, 0]), one.left(self.readings_mm)
+        seen, left = one.left(block[:, 0]), one.left(self.result.residual_mm)
         value = seen @ left / (seen @ seen)
         return value, np.sqrt(((left - value * seen) ** 2).sum() / freedom / (seen @ seen))
 

@@ -20,17 +20,23 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 
+from rrru.estimation.observations.with_columns import WithColumns
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem, WhiteNoise
+from rrru.estimation.solver import solve
 from rrru.studies.printers.cause_columns import arm_columns, lean_columns
 from rrru.studies.printers.cause_tests import CauseTests
 from rrru.studies.printers.printer_fit import PrinterFit
-from rrru.studies.printers.weighing import Weighing, largest_p
+from rrru.studies.printers.weighing import largest_p
 
 # the difference of an arm's rods that readings have to show
 SHOWN_MM = 0.1
 # ASSUME how well a probe repeats, where the readings do not tell
 PROBE_MM = 0.01
-# Gauss-Newton steps, and the part of the largest singular value from which on the readings see a combination
-_REFITS, _SEEN = 3, 1e-3
+# ASSUME a bed bends by about a millimetre, and the probe's zero is as well known where it was moved: 1 sigma
+BED_MM = 1.0
+# a micrometre: readings without noise leave less
+_LEAST_NOISE_MM = 1e-3
 _CONFIDENCE = 0.95
 # ASSUME noise of a height touched by hand, over that of a probed one
 _HAND = (1.0, 2.0, 4.0)
@@ -89,22 +95,19 @@ class TiltTest:
         return self._of_heights(np.concatenate([zeros, shapes], axis=1))
 
     def with_bent_bed(self):
-        """The test about the answer beside which the bed may be bent, as far as the readings see that.
+        """The test about the answer of a joint estimation with the bed's bending.
 
         An answer that took the bed for flat turns and stretches the places under the probe.
         """
-        result = self.result
-        for _ in range(_REFITS):
-            test = replace(self, result=result)
-            weight, count = result.residuals.root_weight[:, None], len(result.fit.deviations)
-            columns = np.concatenate(
-                [-result.residuals.jacobian(result.fit.deviations)[:, 0], test.bed * weight], axis=1
-            )
-            scale = np.linalg.norm(columns, axis=0)
-            move = np.linalg.lstsq(columns / scale, test._readings * weight[:, 0], rcond=_SEEN)[0] / scale
-            deviations = result.fit.deviations + move[:count]
-            result = replace(result, fit=result.fit.at(deviations, "with a bent bed"))
-        return replace(self, result=result)
+        result, residuals = self.result, self.result.residuals
+        columns = (self.bed * residuals.root_weight[:, None])[:, None]
+        names = [f"bed_{k}" for k in range(columns.shape[-1])]
+        bed = Block.of("bed", names, ["mm"] * len(names), BED_MM)
+        parameters = Parameters((Block.geometry(residuals.mechanism.parameters), bed))
+        noise = WhiteNoise(max(result.fit.noise_mm, _LEAST_NOISE_MM))
+        start = np.append(result.fit.deviations, bed.mean)
+        found = solve(Problem(WithColumns(residuals, columns), parameters, noise), [start])
+        return replace(self, result=replace(result, fit=result.fit.at(found.block("geometry"), "with a bent bed")))
 
     def _of_heights(self, columns):
         """Columns (heights, k) with zeros (n, k) for the distances."""
@@ -112,16 +115,15 @@ class TiltTest:
 
     def _weighing(self, weight, hand):
         """The fit with all rivals, by weight (n,) of the readings and noise by hand over that of the probe."""
-        residuals, touched = self.result.residuals, (self.probe_mm == 0.0).all(axis=1)
+        touched = (self.probe_mm == 0.0).all(axis=1)
         weight = weight / np.where(self._of_heights(touched[:, None])[:, 0], hand, 1.0)
-        jacobian = residuals.jacobian(self.result.fit.deviations)[:, 0] / residuals.root_weight[:, None]
-        return Weighing.of(jacobian, weight).beside(self.rivals)
+        return self.result.weighing(weight).beside(self.rivals)
 
     @cached_property
     def _left(self):
         """Sum of squares in mm^2 of what neither rivals nor tilt explain, and its freedom."""
         free = self._own_weighing.beside(self.columns)
-        return (free.left(self._readings) ** 2).sum(), len(self._readings) - free.absorbed.shape[1]
+        return (free.left(self.result.residual_mm) ** 2).sum(), len(self.result.residual_mm) - free.absorbed.shape[1]
 
     @cached_property
     def noise(self):
@@ -145,10 +147,6 @@ class TiltTest:
         return _HAND if touched.any() and not touched.all() else (1.0,)
 
     @cached_property
-    def _readings(self):
-        return CauseTests(self.result).readings_mm
-
-    @cached_property
     def _weighings(self):
         weights = [one.weight for one in CauseTests(self.result).weighings]
         return [self._weighing(weight, hand) for weight in weights for hand in self._hands]
@@ -168,7 +166,7 @@ class TiltTest:
         """Largest p of columns (n, k) over weighings; NaN where their rank depends on the ratio."""
         bases = [(basis[None], volume) for basis, volume in (one.basis(columns) for one in weighings)]
         ranks = {basis.shape for basis, _ in bases}
-        return float(largest_p(weighings, bases, self._readings)[0]) if len(ranks) == 1 else np.nan
+        return float(largest_p(weighings, bases, self.result.residual_mm)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
         """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
@@ -187,6 +185,6 @@ class TiltTest:
         """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
         column, own = self.columns[:, [arm]], self._own_weighing
         seen = own.left(column[:, 0])
-        size = abs(seen @ own.left(self._readings)) / (seen @ seen)
+        size = abs(seen @ own.left(self.result.residual_mm)) / (seen @ seen)
         beside = [one.beside(column) for one in self._weighings]
         return size, self.noise / np.sqrt(seen @ seen), self._p(beside, np.delete(self.columns, arm, axis=1))

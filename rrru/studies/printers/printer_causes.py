@@ -52,8 +52,7 @@ def left_out(result):
 
 def without(result, reading):
     """The PrinterFit of all readings but one."""
-    residuals = result.residuals.without(reading)
-    return replace(result, residuals=residuals, fit=calibrate(residuals))
+    return replace(result, fit=calibrate(result.residuals.without(reading)))
 
 
 @dataclass(frozen=True)
@@ -170,5 +169,5 @@ def _acting_on_all(tests, level):
 
 def _share(tests, basis):
     """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
-    left = tests.own_weighing.left(tests.readings_mm)
+    left = tests.own_weighing.left(tests.result.residual_mm)
     return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)

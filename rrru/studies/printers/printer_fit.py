@@ -13,6 +13,7 @@ from rrru.fit.identifiability import analyse_columns, parameter_scale
 from rrru.studies.printers import steps
 from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, rounding, stop
 from rrru.studies.printers.printer import Printer
+from rrru.studies.printers.weighing import Weighing
 
 _CONFIDENCE = 0.95
 # heights of the dense probing
@@ -21,16 +22,34 @@ _DENSE = 100
 
 @dataclass(frozen=True)
 class PrinterFit:
-    """A printer, its residuals, their fit and the step at which the firmware's program stops (mm and degrees).
+    """A printer, its calibration and the step at which the firmware's program stops (mm and degrees).
 
     printer: its ways in the steps that its readings were counted in, step_factors (3,) as long as the file says.
     """
 
     printer: Printer
-    residuals: ProbedHeights
     fit: Calibration
     stopping_step: float
     step_factors: np.ndarray
+
+    @property
+    def residuals(self):
+        """Its ProbedHeights."""
+        return self.fit.observations
+
+    @property
+    def residual_mm(self):
+        """Readings (n,) less those of the answer."""
+        return self.fit.residual_mm[:, 0] / self.residuals.root_weight
+
+    @property
+    def columns(self):
+        """Change (n, p) of the readings by the deviations, with the residual's sign."""
+        return self.fit.estimate.jacobian[:, 0] / self.residuals.root_weight[:, None]
+
+    def weighing(self, weight):
+        """The Weighing of its readings by weights (n,), linearised at the answer."""
+        return Weighing.of(self.columns, weight)
 
     @property
     def names(self):
@@ -96,15 +115,14 @@ def fit_printer(printer, stopping_step, level):
     factors = steps.changed_steps(printer, level)
     printer = steps.with_steps(printer, factors)
     try:
-        residuals = residuals_of(printer)
-        fit = calibrate(residuals)
+        fit = calibrate(residuals_of(printer))
         if fit.at_bound.any() or fit.identifiability.rank < len(fit.deviations):
             allowed = "readings over the whole bed, with the steps that the file states"
             raise FitError(f"the readings do not hold its numbers; allowed: {allowed}", fit)
     except (FitError, ValueError, np.linalg.LinAlgError) as error:
         told = "; ".join(filter(None, [str(error), steps.told(factors)]))
         raise FitError(f"{printer.name}: {told}", getattr(error, "result", None)) from None
-    return PrinterFit(printer, residuals, fit, stopping_step, factors)
+    return PrinterFit(printer, fit, stopping_step, factors)
 
 
 def common_arm_error(result):

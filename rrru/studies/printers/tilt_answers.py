@@ -93,4 +93,5 @@ def _with(test, *sets):
         height_mm=np.concatenate([residuals.height_mm, places[:, 2]]),
     )
     probe = np.concatenate([test.probe_mm, *(np.tile(offset, (len(places), 1)) for places, offset in sets)])
-    return TiltTest(replace(test.result, residuals=more), probe, test.noise)
+    fit = test.result.fit.at(test.result.fit.deviations, "with more heights", more)
+    return TiltTest(replace(test.result, fit=fit), probe, test.noise)
