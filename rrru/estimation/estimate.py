@@ -151,7 +151,7 @@ def with_prior(readings: FloatArray, root: FloatArray, off: FloatArray) -> Float
 def _seen_by_readings(columns: FloatArray, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
     """Singular values (p,) of the readings' derivative in units of the prior, and directions (p, p) row by row."""
     length = np.linalg.norm(columns, axis=0)
-    flat = _FLAT / np.maximum(length, 1e-300)
+    flat = _FLAT / np.where(length > 0.0, length, 1.0)
     wide = np.where(np.isfinite(parameters.wide_sd), parameters.wide_sd, parameters.sd)
     scale = np.where(np.isfinite(wide), wide, np.where(length > 0.0, flat, 1.0))
     _, sizes, directions = np.linalg.svd(columns * scale)
