@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rrru.errors import FitError
+from rrru.estimation.starts import starting_values
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
-from rrru.fit.start import start_of
 from rrru.parameters import ParameterSet
 from rrru.robots.readings import Readings
 
@@ -93,14 +93,14 @@ def minimise(residuals: "Residuals", loss: str = "linear", loss_scale_mm: float 
     """Deviations (p,) within the bounds of the least sum of squares, and how many evaluations the search took.
 
     loss: one of LOSSES, with the residual size `loss_scale_mm` at which a robust loss begins to bend. The search moves
-    only along directions that the points see; the others keep the start's value, see `rrru.fit.start`. Raises
+    only along directions that the points see; the others keep the start's value, see `rrru.estimation.starts`. Raises
     FitError, carrying scipy's result, where there are fewer equations than parameters or the search fails.
     """
     parameters = residuals.mechanism.parameters
     equations = residuals.residual(parameters.nominal).size
     if equations < len(parameters):
         raise FitError(f"{len(residuals)} points give {equations} equations; allowed: at least {len(parameters)}")
-    origin, evaluations = start_of(residuals)
+    origin, evaluations = starting_values(residuals)
     start = analyse(residuals.mechanism, residuals.jacobian(origin))
     seen = (start.directions[: start.rank] * start.scale).T
     linear = loss == "linear"

@@ -1,9 +1,9 @@
 """The sim without effects: as its owner believes it to be, and calibrated."""
 
 from rrru.campaign import measurements as rows
+from rrru.estimation.starts import starting_values
 from rrru.fit.least_squares import least_squares
 from rrru.fit.residuals import Residuals
-from rrru.fit.start import start_of
 from rrru.gap.state import State
 
 
@@ -13,8 +13,8 @@ def calibrate(case):
 
 
 def origin(case):
-    """State that the calibration starts from, see `rrru.fit.start`."""
-    return State(start_of(_residuals(case))[0], {})
+    """State that the calibration starts from, see `rrru.estimation.starts`."""
+    return State(starting_values(_residuals(case))[0], {})
 
 
 def _residuals(case):
