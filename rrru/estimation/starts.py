@@ -30,8 +30,9 @@ FloatArray = npt.NDArray[np.float64]
 
 # a median residual above this share of the robot's size is none that the errors of its geometry make
 FAR_SHARE_OF_SIZE = 2e-3
-# a registration that lowers the median residual by less explains too little
-_MAX_SHARE_AFTER = 0.5
+# an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zeros of drives, which
+# `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
+_MAX_SHARE_AFTER = 0.1
 # residual at which a reading begins to count less while zeros of drives are far off
 _BEND_MM = 5.0
 _MIN_READINGS = 3
