@@ -7,7 +7,7 @@ from pathlib import Path
 from benchmarks import harness, page
 from rrru.store import tables
 
-GROUPS = ("objective", "genetic", "least_squares", "kinematics", "sysid", "diagnosis", "workflow")
+GROUPS = ("objective", "genetic", "least_squares", "solver", "kinematics", "sysid", "diagnosis", "workflow")
 
 
 def main(groups):

@@ -13,7 +13,7 @@ _DOCS = RESULTS.parent / "docs"
 _BEGIN, _END = "<!-- measured -->\n", "<!-- end of what was measured -->\n"
 _ROW_MM, _TITLE_ROWS, _AROUND_MM = 4.3, 1.5, 16.0
 # what is told of growth and overheads is in the table
-_NOT_DRAWN = ("diagnosis", "workflow")
+_NOT_DRAWN = ("diagnosis", "solver", "workflow")
 _UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
 

@@ -14,11 +14,12 @@ import numpy.typing as npt
 
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
+from rrru.estimation.explain import explain_end
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import SolverOptions, estimate_at, solve
+from rrru.estimation.starts import starting_values
 from rrru.fit.identifiability import Identifiability, analyse, analyse_columns, parameter_scale
-from rrru.fit.start import start_of
 from rrru.parameters import ParameterSet
 from rrru.robots.readings import Readings
 
@@ -151,10 +152,10 @@ def estimate_deviations(observations: Any, loss: str = "linear", loss_scale_mm: 
     equations = observations.residual(parameters.nominal).size
     if equations < len(parameters):
         raise FitError(f"{len(observations)} points give {equations} equations; allowed: at least {len(parameters)}")
-    start, evaluations = start_of(observations)
+    start, evaluations = starting_values(observations)
     found = solve(least_squares_problem(observations, loss, loss_scale_mm), [start], _OPTIONS)
     if not found.end.converged:
-        raise FitError(f"the calibration does not converge: {found.end.message}", found)
+        raise FitError(explain_end(found, "the calibration"), found)
     return replace(found, end=replace(found.end, evaluations=found.end.evaluations + evaluations))
 
 

@@ -10,6 +10,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError, FitError
 from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.estimation.starts import register_measurements
 from rrru.fit.calibration import Calibration, calibrate
 from rrru.fit.mean_distance import least_mean_distance
 from rrru.robots.robot import Robot
@@ -44,7 +45,7 @@ def select(
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if not chosen.any():
         return None
-    frame = measurements.loc[chosen]
+    frame = register_measurements(measurements.loc[chosen], mechanism)
     actuators, command = rows.actuators(frame, mechanism), rows.command(frame)
     readings = rows.readings(frame, arm_mm)
     mechanism = mechanism.seen_at(actuators, command, readings)

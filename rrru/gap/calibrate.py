@@ -2,8 +2,8 @@
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.observations.target_positions import TargetPositions
+from rrru.estimation.starts import starting_values
 from rrru.fit.calibration import estimate_deviations
-from rrru.fit.start import start_of
 from rrru.gap.state import State
 
 
@@ -13,8 +13,8 @@ def calibrate(case):
 
 
 def origin(case):
-    """State that the calibration starts from, see `rrru.fit.start`."""
-    return State(start_of(_observations(case))[0], {})
+    """State that the calibration starts from, see `rrru.estimation.starts`."""
+    return State(starting_values(_observations(case))[0], {})
 
 
 def _observations(case):

@@ -20,6 +20,7 @@ from rrru.campaign.driven_path import (
 )
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import FitError
+from rrru.estimation.starts import register_measurements
 from rrru.gap.case import Case
 from rrru.gap.unknown import unknown_functions
 from rrru.gap.weight import doubts_of
@@ -43,6 +44,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     """
     if not len(measurements):
         raise FitError("the campaign has no points")
+    measurements = register_measurements(measurements, mechanism)
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     motion_at = partial(make_motion, mechanism, masses, _course(measurements, mechanism, actuators))
     motion = motion_at()

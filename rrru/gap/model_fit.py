@@ -16,6 +16,7 @@ import numpy as np
 from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
+from rrru.estimation.explain import explain_end
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
@@ -291,8 +292,5 @@ def fit_named_effects(case, names, calibrated, times_typical=PRIOR_TIMES_TYPICAL
     scales = np.concatenate([np.zeros(0), *sizes])
     fit = fit_model(case, [calibrated], [Term(name) for name in names], scales, signed=False)
     if not fit.estimate.end.converged:
-        what = ", ".join(names) or "the geometry"
-        raise FitError(
-            f"the fit of {what} does not converge: {fit.estimate.end.message}; measure poses that differ more"
-        )
+        raise FitError(explain_end(fit.estimate, f"the fit of {', '.join(names) or 'the geometry'}"), fit.estimate)
     return fit

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
+from rrru.estimation.starts import register_measurements
 from rrru.plant import virtual_robot
 from rrru.plant.driven import DrivenRobot
 from rrru.plant.tracker import Sees
@@ -41,6 +42,7 @@ def as_measured(robot, measurements, targets=(), registered=False):
     targets: reflectors whose places are stated; registered: the frame was.
     """
     robot = robot.reading(rows.reads(measurements, targets, registered))
+    measurements = register_measurements(measurements, robot)
     known = measurements[rows.usable(measurements)]
     actuators = rows.actuators(known, robot)
     return robot.seen_at(actuators, rows.command(known), rows.readings(known, robot.angle_arm_mm))

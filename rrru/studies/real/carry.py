@@ -24,8 +24,9 @@ from rrru.gap.weight import WEIGHT
 from rrru.robots.robot import Robot
 from rrru.studies import setup
 from rrru.studies.real.arms import NO_MASSES, Studied, nominal_robot
+from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
 from rrru.studies.real.series import Series
-from rrru.studies.real.steps import FRAMES, frames, held_out_mm, placed, rms
+from rrru.studies.real.steps import held_out_mm, rms
 
 _COLUMNS = ("campaign", "carried_from", "frames_rms_mm", "geometry_rms_mm", "causes_rms_mm")
 
@@ -117,6 +118,6 @@ def _row(first: Model, second: Model) -> dict:
 def _left_mm(case: Case, state: State) -> float:
     """Rms that a state with frames of its own leaves on the rows held out, NaN where these are not found."""
     try:
-        return rms(held_out_mm(case, placed(case, state)))
+        return rms(held_out_mm(case, fit_frames(case, state)))
     except FitError:
         return np.nan

@@ -13,21 +13,17 @@ import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.effects.library import find
-from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.effects.protocol import Effect
 from rrru.errors import FitError
 from rrru.estimation.estimate import numerical_rank
 from rrru.gap.calibrate import calibrate
 from rrru.gap.case import Case
 from rrru.gap.model_fit import fit_named_effects
 from rrru.gap.state import State
-from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.geometric_numbers import direction, open_numbers
 from rrru.robots.robot import Robot
+from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
 
-_ROUNDS, _ENOUGH = 30, 1e-9
-# shares of the best seen combination of numbers below which one is not seen
-_SEEN = 1e-9
-FRAMES, _HARMONICS = "frames", "harmonics"
+_HARMONICS = "harmonics"
 # letter, what it adds in words, the effect that does
 _MODELS = (
     ("b", "geometry", ""),
@@ -109,7 +105,7 @@ def steps(case: Case) -> tuple[Step, ...]:
     library = dict(case.library) | _own(case)
     case, began = replace(case, library=library), time.perf_counter()
     none = State(np.zeros(len(case.mechanism.parameters)), {})
-    state = placed(case, none)
+    state = fit_frames(case, none)
     numbers = len(library[FRAMES].coordinates), _identified(case, state, False), time.perf_counter() - began
     result = [Step("a", "frames", state, *numbers, *_left(case, state))]
     names: tuple[str, ...] = ()
@@ -150,26 +146,6 @@ def _left(case: Case, state: State) -> tuple[np.ndarray, np.ndarray]:
     return trained_mm(case, state), held_out_mm(case, state)
 
 
-def placed(case: Case, state: State) -> State:
-    """A state with frames fitted to the used points of a case whose library has `frames`; all else of it stays.
-
-    Gauss-Newton. Raises FitError where the steps do not end.
-    """
-    key, last = (FRAMES, 0), np.inf
-    state = replace(state, effects=dict(state.effects) | {key: np.zeros(len(case.library[FRAMES].coordinates))})
-    for _ in range(_ROUNDS):
-        columns = case.linearise(state, [key]).columns[key]
-        flat, left = columns.reshape(-1, columns.shape[-1]), case.residual(state)
-        size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
-        step = np.linalg.lstsq(flat / size, left.ravel(), rcond=_SEEN)[0] / size
-        state = replace(state, effects=dict(state.effects) | {key: state.effects[key] + step})
-        cost = float((case.residual(state) ** 2).sum())
-        if abs(last - cost) < _ENOUGH * cost:
-            return state
-        last = cost
-    raise FitError(f"frames are not found: {cost:.6g} mm^2 left")
-
-
 def _own(case: Case) -> dict[str, Effect]:
     """The laws that only these models have, as far as a robot has sites for them."""
     result, robot = {FRAMES: frames(case.mechanism)}, case.mechanism
@@ -184,19 +160,3 @@ def laws(robot: Robot) -> dict[str, Effect]:
     """The library's laws of the models, by name, as far as a robot has sites for them."""
     found = {name: find(name, robot) for _, _, name in _MODELS if name and name != _HARMONICS}
     return {name: effect for name, effect in found.items() if effect is not None}
-
-
-def frames(robot: Robot) -> Effect:
-    """Where robot, tool and reflectors lie, as far as a campaign leaves it open: one coordinate a number."""
-    numbers = open_numbers(robot.reads)
-    limits = {"mm": 1000.0, "rad": np.pi}
-    bounds = ((one, limits[one.unit]) for one in numbers)
-    parameters = ParameterSet(tuple(Parameter(one.name, one.unit, 0.0, -most, most, "free") for one, most in bounds))
-    directions = np.stack([direction(robot.legs, one) for one in numbers], axis=-1)
-    typical = [1.0 if one.unit == "mm" else 1e-3 for one in numbers]
-
-    def place(_motion, values):
-        """The constant twists that the numbers make."""
-        return Contribution((directions @ values)[None])
-
-    return Effect(FRAMES, parameters, plain_coordinates(parameters, typical), place)

@@ -1,0 +1,190 @@
+"""Starting values: the frame and the targets in closed form, then a robot's stages, then everything at once.
+
+A search that starts far from the truth ends in another minimum or nowhere. Where the nominal robot predicts the
+readings well no start is needed. Where it does not, `rrru.campaign.target_registration` finds the instrument's frame
+and the targets' places whatever the turn, and the readings are expressed in the robot's frame: deviations stay small
+there, and their priors and bounds keep their meaning. Drives whose zeros are lost are found by the robot's `stages`.
+Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.target_registration import TargetReadings, TargetRegistration, register_targets
+from rrru.errors import FitError
+from rrru.estimation.estimate import Estimate
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem
+from rrru.estimation.solver import solve
+from rrru.robots.geometric_numbers import open_numbers
+from rrru.robots.legs import TOOL, WORLD
+from rrru.robots.readings import Readings, lacking, place_on_platform
+
+FloatArray = npt.NDArray[np.float64]
+
+# a median residual above this share of the robot's size is none that the errors of its geometry make
+FAR_SHARE_OF_SIZE = 2e-3
+# an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zeros of drives, which
+# `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
+_MAX_SHARE_AFTER = 0.1
+# residual at which a reading begins to count less while zeros of drives are far off
+_BEND_MM = 5.0
+_MIN_READINGS = 3
+_AXES = "xyz"
+
+
+def register_poses(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> TargetRegistration:
+    """The TargetRegistration of Readings at Poses under twists (1, sites, 6) of a robot.
+
+    Places of the robot's `reads.fitted` are unknown, the others are where the twists have them. Raises FitError for
+    fewer than three readings at known poses.
+    """
+    _, number, place = _targets(robot, twists, readings)
+    centre, turn = poses.position_mm, poses.turn
+    if readings.on_world is not None:
+        centre = np.where(readings.on_world[:, None], 0.0, centre)
+        turn = np.where(readings.on_world[:, None, None], np.eye(3), turn)
+    known = np.isfinite(centre).all(axis=1) & np.isfinite(readings.position_mm).all(axis=1)
+    if known.sum() < _MIN_READINGS:
+        raise FitError(f"{known.sum()} readings at poses that the robot can take; allowed: at least {_MIN_READINGS}")
+    orientations = None if readings.turn is None else readings.turn[known]
+    arm_mm = readings.arm_mm if np.isfinite(readings.arm_mm) else robot.angle_arm_mm
+    bodies = centre[known], turn[known]
+    targets = readings.position_mm[known], number[known], place, robot.tool_mm
+    return register_targets(TargetReadings(*bodies, *targets, orientations, arm_mm))
+
+
+def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[str], npt.NDArray[np.int_], FloatArray]:
+    """Names (k) of the targets, number (n,) of each reading's, and places (k, 3), NaN where unknown."""
+    count = len(readings)
+    place = np.broadcast_to(place_on_platform(robot, twists, readings), (count, 3))
+    if readings.reflectors is None:
+        return [""], np.zeros(count, dtype=int), np.array(place[:1])
+    names, first, number = np.unique(readings.reflectors.astype(str), return_index=True, return_inverse=True)
+    unknown = np.isin(names, robot.reads.fitted)
+    return names.tolist(), number, np.where(unknown[:, None], np.nan, place[first])
+
+
+def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> dict[str, float]:
+    """What has to be added to twists (1, sites, 6) for readings to fit, by name of the robot's open numbers.
+
+    The exact registration of Readings at Poses, in the names of `rrru.robots.geometric_numbers.open_numbers`. Raises
+    FitError where nothing determines it.
+    """
+    found, numbers = register_poses(robot, poses, twists, readings), robot.legs.site_numbers
+    moved = np.array(twists[:1], dtype=float)
+    moved[0, numbers[WORLD]] = found.frame
+    if {TOOL} & {site for one in open_numbers(robot.reads) for site in one.twists}:
+        moved[0, numbers[TOOL], 3:] = Rotation.from_matrix(found.tool_turn).as_rotvec()
+    for name in robot.reads.fitted:
+        moved[0, numbers[name], :3] = 0.0
+    if robot.reads.fitted:
+        names, number, _ = _targets(robot, moved, readings)
+        rest = place_on_platform(robot, moved, readings)
+        for name in robot.reads.fitted:
+            k = names.index(name)
+            moved[0, numbers[name], :3] = found.place_mm[k] - rest[int(np.argmax(number == k))]
+    change = moved[0] - twists[0]
+    return {
+        one.name: float(sum(twist @ change[numbers[site]] for site, twist in one.twists.items()))
+        for one in open_numbers(robot.reads)
+    }
+
+
+def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFrame:
+    """A measurement table in the frame of a nominal robot, unchanged where it is near or where that frame is known.
+
+    Where the robot's `reads` leave the frame open and its prediction is far off, measured positions and orientations
+    are turned and shifted into the robot's frame, and unknown places of targets are replaced by those found.
+    """
+    used, reads = rows.usable(measurements), getattr(robot, "reads", None)
+    if reads is None or not reads.frame or used.sum() < _MIN_READINGS:
+        return measurements
+    actuators, command = rows.actuators(measurements, robot), rows.command(measurements)
+    poses, twists = robot.solve(actuators, command), robot.twists()
+    readings = rows.readings(measurements, robot.angle_arm_mm) or Readings(rows.measured(measurements))
+    off = np.linalg.norm(lacking(robot, replace(readings, turn=None), poses, twists)[used], axis=1)
+    off = off[np.isfinite(off)]
+    if not len(off) or np.median(off) <= FAR_SHARE_OF_SIZE * robot.size_mm:
+        return measurements
+    try:
+        found = register_poses(robot, poses.of(used), twists, readings.of(used))
+    except FitError:
+        return measurements
+    if found.median_mm > _MAX_SHARE_AFTER * np.median(off):
+        return measurements
+    return _moved(measurements, robot, readings, found)
+
+
+def _moved(measurements: pd.DataFrame, robot: Any, readings: Readings, found: TargetRegistration) -> pd.DataFrame:
+    """The table in the frame of a TargetRegistration."""
+    table = measurements.assign(**rows.vector_columns("measured", found.apply(rows.measured(measurements))))
+    if readings.turn is not None:
+        turns = found.rotation @ readings.turn @ found.tool_turn.T
+        table = table.assign(**rows.turn_columns("measured", turns))
+    if readings.reflectors is not None:
+        names, number, _ = _targets(robot, robot.twists(), readings)
+        free = np.isin(np.array(names)[number], robot.reads.fitted)
+        place = np.where(free[:, None], found.place_mm[number], rows.vectors(measurements, "target"))
+        table = table.assign(**rows.vector_columns("target", place))
+    return table
+
+
+def starting_values(residuals: Any) -> tuple[FloatArray, int]:
+    """Deviations (p,) to start from, and how many evaluations it took to find them.
+
+    residuals: `rrru.estimation.observations.target_positions.TargetPositions` or the like, readings in the robot's
+    frame. The nominal ones where the nominal robot is near; else the robot's `stages` one after the other, such
+    as frames and then with these the drives, robustly. All parameters at once would take steps along what is hardly
+    determined for what large turns leave to the second order.
+    """
+    robot, evaluations = residuals.mechanism, 0
+    found = np.asarray(robot.parameters.nominal)
+    off = np.linalg.norm(residuals.residual(found), axis=1)
+    if not robot.stages or not np.median(off) > FAR_SHARE_OF_SIZE * robot.size_mm:
+        return found, 0
+    for stage in robot.stages:
+        if stage.any():
+            estimate = solve_along(residuals, found, stage)
+            found = found + np.where(stage, _spread(estimate.values, stage), 0.0)
+            evaluations += estimate.end.evaluations
+    return found, evaluations
+
+
+@dataclass(frozen=True, eq=False)
+class _Along:
+    """Observations whose parameters are changes of some deviations (p,) from an origin."""
+
+    residuals: Any
+    origin: FloatArray
+    stage: npt.NDArray[np.bool_]
+
+    def residual(self, values: FloatArray, /) -> FloatArray:
+        """Readings minus prediction (n, 3)."""
+        return np.asarray(self.residuals.residual(self.origin + _spread(values, self.stage)))
+
+    def jacobian(self, values: FloatArray, /) -> FloatArray:
+        """Its derivative (n, 3, k)."""
+        return np.asarray(self.residuals.jacobian(self.origin + _spread(values, self.stage)))[..., self.stage]
+
+
+def solve_along(residuals: Any, origin: FloatArray, stage: npt.NDArray[np.bool_]) -> Estimate:
+    """The robust Estimate of changes (k,) of the deviations of a stage (p,) from an origin (p,)."""
+    parameters = [one for one, chosen in zip(residuals.mechanism.parameters, stage, strict=True) if chosen]
+    sd = np.array([(one.high - one.low) / np.sqrt(12.0) for one in parameters])
+    block = Block.of("stage", [one.name for one in parameters], [one.unit for one in parameters], sd)
+    problem = Problem(_Along(residuals, origin, stage), Parameters((block,)), loss="soft_l1", loss_scale=_BEND_MM)
+    return solve(problem)
+
+
+def _spread(values: FloatArray, stage: npt.NDArray[np.bool_]) -> FloatArray:
+    """Values (k,) at the places of a stage (p,), zeros elsewhere."""
+    result = np.zeros(len(stage))
+    result[stage] = values
+    return result

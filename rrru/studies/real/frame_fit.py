@@ -1,0 +1,106 @@
+"""Fits of where robot, tool and targets are, while the rest of a model stays. Lengths in mm, angles in rad."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.target_registration import PLACE_SD_MM
+from rrru.effects.protocol import Contribution, Effect, plain_coordinates
+from rrru.errors import FitError
+from rrru.estimation.explain import explain_end
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem
+from rrru.estimation.solver import solve
+from rrru.estimation.starts import frame_values
+from rrru.gap.case import Case
+from rrru.gap.state import State
+from rrru.parameters import Parameter, ParameterSet
+from rrru.robots.geometric_numbers import Candidate, direction, open_numbers
+from rrru.robots.legs import WORLD
+from rrru.robots.readings import Readings
+from rrru.robots.robot import Robot
+
+FloatArray = npt.NDArray[np.float64]
+
+FRAMES = "frames"
+# prior standard deviation: an instrument stands within ten metres of the robot
+_INSTRUMENT_SD_MM = 1e4
+
+
+def frames(robot: Robot) -> Effect:
+    """Where robot, tool and reflectors lie, as far as a campaign leaves it open: one coordinate a number."""
+    numbers = open_numbers(robot.reads)
+    limits = {"mm": _INSTRUMENT_SD_MM, "rad": np.pi}
+    bounds = ((one, limits[one.unit]) for one in numbers)
+    parameters = ParameterSet(tuple(Parameter(one.name, one.unit, 0.0, -most, most, "free") for one, most in bounds))
+    directions = _directions(robot, numbers)
+    typical = [1.0 if one.unit == "mm" else 1e-3 for one in numbers]
+
+    def place(_motion, values):
+        """The constant twists that the numbers make."""
+        return Contribution((directions @ values)[None])
+
+    return Effect(FRAMES, parameters, plain_coordinates(parameters, typical), place)
+
+
+def _directions(robot: Robot, numbers: Sequence[Candidate]) -> FloatArray:
+    """Twists (sites, 6, c) of a unit of each number."""
+    return np.stack([direction(robot.legs, one) for one in numbers], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameObservations:
+    """Readings of a Case as `rrru.estimation.problem.Observations` of the coordinates (c,) of its frames alone."""
+
+    case: Case
+    state: State
+    directions: FloatArray
+
+    def state_at(self, values: FloatArray) -> State:
+        """The State with frames at values (c,)."""
+        return replace(self.state, effects=dict(self.state.effects) | {(FRAMES, 0): values})
+
+    def residual(self, values: FloatArray, /) -> FloatArray:
+        """Readings minus prediction (m, 3) in mm."""
+        return np.asarray(self.case.residual(self.state_at(values)))
+
+    def jacobian(self, values: FloatArray, /) -> FloatArray:
+        """Its derivative (m, 3, c), exact for frames of any size."""
+        return -self.case.of_rows(self.case.map_of(self.state_at(values)).columns(self.directions))
+
+    def whiten(self, values: FloatArray) -> FloatArray:
+        """Values (m, 3, ...) in standard deviations of the case's noise."""
+        return values / self.case.noise_mm
+
+
+def fit_frames(case: Case, state: State) -> State:
+    """A state with frames fitted to the used points of a case whose library has `frames`; all else of it stays.
+
+    The search starts at the closed-form registration, so that no turn of the instrument is too large. Raises FitError
+    where it does not converge, naming the parameters that the readings do not determine.
+    """
+    numbers = open_numbers(case.mechanism.reads)
+    observations = _FrameObservations(case, state, _directions(case.mechanism, numbers))
+    sd = [np.inf if one.unit == "rad" else _INSTRUMENT_SD_MM if WORLD in one.twists else PLACE_SD_MM for one in numbers]
+    block = Block.of(FRAMES, [one.name for one in numbers], [one.unit for one in numbers], sd)
+    problem = Problem(observations, Parameters((block,)), observations.whiten)
+    estimate = solve(problem, [_start(observations, numbers)])
+    if not estimate.end.converged:
+        raise FitError(explain_end(estimate, "the fit of frame and targets"), estimate)
+    return observations.state_at(estimate.values)
+
+
+def _start(observations: _FrameObservations, numbers: Sequence[Candidate]) -> FloatArray:
+    """Coordinates (c,) of the frames by registration of the used points; zero where nothing determines them."""
+    case, nothing = observations.case, np.zeros(len(numbers))
+    if case.mechanism.reads.frame:
+        poses, twists = case.posed(observations.state_at(nothing))
+        readings = case.readings or Readings(rows.measured(case.measurements))
+        with suppress(FitError):
+            found = frame_values(case.mechanism, poses.of(case.used), twists, readings.of(case.used))
+            return np.array([found[one.name] for one in numbers])
+    return nothing
