@@ -33,8 +33,8 @@ from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readi
 from rrru.errors import FitError
 from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
+from rrru.gap.model_fit import GEOMETRY
 from rrru.gap.settings import GapSettings
-from rrru.gap.uncertainty import covariance_of
 from rrru.seeds import stream
 
 FOLDER = RESULTS / "benchmarks" / "coverage"
@@ -71,14 +71,14 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     known = MeasuredRobot(campaign.mechanism, campaign.masses, noise_mm)
     settings = GapSettings(effects=campaign.library.offered, draws=draws)
     found = diagnose(frame, known, settings, details=False)
-    one, count = found.attribution, len(campaign.mechanism.parameters)
-    terms = one.hypothesis.terms
+    one, estimate = found.attribution, found.attribution.fit.estimate
+    terms, geometry = one.hypothesis.terms, estimate.parameters.places[GEOMETRY]
     prediction = one.held_out.predict(terms, one.hypothesis.strengths_of(terms, one.level), one.level)
     expected = np.sum(prediction.left_mm2, axis=1) + prediction.uncertainty_mm2
     names = found.verdict["effects"].split("+")
     return Statement(
         found.tables["gap_parameters"],
-        covariance_of(one)[:count, :count],
+        estimate.covariance[geometry, geometry],
         frozenset(names) - {"none", "unexplained"},
         found.verdict,
         float(np.sqrt(expected.mean())),
