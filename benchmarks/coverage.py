@@ -23,7 +23,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import argparse
 import time
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -40,6 +39,7 @@ from rrru.seeds import stream
 FOLDER = RESULTS / "benchmarks" / "coverage"
 QUANTILE_95 = 1.959964
 _SEED, _RESAMPLES = 7, 20
+_TABLES = ("parameters", "directions", "summaries")
 # kinds of parameters by the name that `gap_parameters` has in its column effect; all others are effects
 _KINDS = {"calibration": "geometry", "weight": "nuisance"}
 
@@ -214,9 +214,8 @@ def coverage(z, draw):
 def summarize(parameters, directions, summaries):
     """One row per cell and kind of parameter; directions: of the geometric parameters, independent."""
     result = []
-    summaries = summaries.assign(failed=summaries["failed"].fillna(""))
     for (robot, scene), own in summaries.groupby(["robot", "scene"], sort=False):
-        good = own[own["failed"] == ""]
+        good = own[_done(own)]
         head = {"robot": robot, "scene": scene, "draws": len(own), "failed": len(own) - len(good)}
         head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
         for kind in ("directions", "geometry", "effect", "nuisance"):
@@ -236,6 +235,11 @@ def summarize(parameters, directions, summaries):
             row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z, kind)
             result.append(row)
     return pd.DataFrame(result)
+
+
+def _done(summaries):
+    """Which draws (n,) have a diagnosis; an empty text comes back from a file as NaN."""
+    return summaries["failed"].isna() | (summaries["failed"] == "")
 
 
 def _of_cell(table, robot, scene):
@@ -258,7 +262,7 @@ def predictions(summaries):
     Root mean squares over the draws, and the medians of the draws' own ratios.
     """
     result = []
-    good = summaries[summaries["failed"].fillna("") == ""]
+    good = summaries[_done(summaries)]
     for (robot, scene), own in good.groupby(["robot", "scene"], sort=False):
         row = {"robot": robot, "scene": scene, "draws": len(own)}
         for name, told, seen in (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm")):
@@ -270,40 +274,41 @@ def predictions(summaries):
     return pd.DataFrame(result)
 
 
-@cache
-def _folder():
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    return FOLDER
-
-
 def main(arguments=None):
-    """Measure cells, one file each, and print what all files of the folder show."""
+    """Measure cells, three files each, and print what they show."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draws", type=int, default=200)
     parser.add_argument("--robot", action="append", choices=ROBOTS)
     parser.add_argument("--scene", action="append", choices=SCENES)
     parser.add_argument("--size", type=float, default=1.0, help="share of the usual number of poses")
     parser.add_argument("--label", default="now", help="folder of the results, such as before or after")
+    parser.add_argument("--show", action="store_true", help="print what the files of the folder show, measure nothing")
     asked = parser.parse_args(arguments)
-    folder = _folder() / asked.label
+    folder = FOLDER / asked.label
     folder.mkdir(parents=True, exist_ok=True)
-    for scene in asked.scene or SCENES:
-        for robot in asked.robot or ROBOTS:
-            tables = cell(robot, scene, asked.draws, asked.size)
-            for name, table in zip(("parameters", "directions", "summaries"), tables, strict=True):
-                table.to_csv(folder / f"{robot}-{scene}-{name}.csv", index=False)
-            print_cells([robot], [scene], tables)
+    cells = [(robot, scene) for scene in asked.scene or SCENES for robot in asked.robot or ROBOTS]
+    if asked.show:
+        print_cells([pd.concat(_stored(folder, name, cells)) for name in _TABLES])
+        return
+    for robot, scene in cells:
+        tables = cell(robot, scene, asked.draws, asked.size)
+        for name, table in zip(_TABLES, tables, strict=True):
+            table.to_csv(folder / f"{robot}-{scene}-{name}.csv", index=False)
+        print_cells(tables)
 
 
-def print_cells(robots, scenes, tables):
-    """Print what tables show of some cells."""
+def _stored(folder, name, cells):
+    """Tables of a name that a folder holds of some cells."""
+    paths = [folder / f"{robot}-{scene}-{name}.csv" for robot, scene in cells]
+    return [pd.read_csv(path) for path in paths if path.exists() and path.stat().st_size > 1]
+
+
+def print_cells(tables):
+    """Print what tables of parameters, directions and summaries show."""
     parameters, directions, summaries = tables
-    with pd.option_context("display.width", 220, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
+    with pd.option_context("display.width", 250, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
         for table in (summarize(parameters, directions, summaries), predictions(summaries)):
-            if len(table):
-                print(
-                    table[table["robot"].isin(robots) & table["scene"].isin(scenes)].to_string(index=False), flush=True
-                )
+            print(table.to_string(index=False), flush=True)
 
 
 if __name__ == "__main__":

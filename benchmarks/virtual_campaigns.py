@@ -123,17 +123,19 @@ SCENES = {
 @dataclass(frozen=True)
 class Library:
     """acting: the effect that acts where one does; offered: names that the diagnosis is offered; removed: a law that
-    is not among them.
+    is not among them; strong: factor by which the effect exceeds its typical size, so that the readings decide whether
+    it is alike on all legs.
     """
 
     acting: str
     offered: tuple[str, ...]
     removed: str = ""
+    strong: float = 1.0
 
 
 _LIBRARIES = {
     "rrru3": Library("backlash", ("backlash", "thermal_growth", "transmission_error"), "encoder_eccentricity"),
-    "hexapod": Library("backlash", ("backlash", "base_drift", "read_before_rest"), "thermal_growth"),
+    "hexapod": Library("backlash", ("backlash", "base_drift", "read_before_rest"), "thermal_growth", 4.0),
     "arm7": Library("encoder_eccentricity", ("encoder_eccentricity", "backlash", "thermal_growth"), "encoder_ovality"),
 }
 _UNDER_PAYLOAD = Library("drive_compliance", ("drive_compliance", "backlash", "thermal_growth"))
@@ -388,7 +390,8 @@ def draw_truth(campaign, generator, acts=True):
         truth = replace(truth, payload=_draw_payload(campaign, generator))
     if acts:
         effect = find(campaign.library.acting, campaign.mechanism)
-        truth = replace(truth, effects=(_active(effect, _draw_coordinates(effect, generator)),))
+        coordinates = campaign.library.strong * _draw_coordinates(effect, generator)
+        truth = replace(truth, effects=(_active(effect, coordinates),))
     if campaign.library.removed:
         truth = replace(truth, discrepancy=(_draw_discrepancy(campaign, generator),))
     return truth
