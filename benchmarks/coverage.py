@@ -1,0 +1,315 @@
+"""Coverage of 95 % intervals, and predicted over observed errors of predictions: `make bench GROUPS=coverage`.
+
+Every draw of a cell (robot, scene) has new true parameters and new noise, and goes through the whole diagnosis. Of all
+numbers that the diagnosis states in `gap_parameters` the error (estimate minus truth) is compared with the stated
+standard error s:
+
+    coverage   share of the intervals estimate +- 1.96 s that hold the truth
+    ratio      rms of error / s, 1 where s is right, 2 where s is half of what it should be
+
+Parameters of one draw are correlated. Where the covariance C is known, coverage and ratio are also taken along the
+independent directions u = L^-1 error, L L' = C, of the combinations that the poses identify: of them the binomial
+standard error of the coverage holds. Of parameters it is taken over draws.
+
+    python -m benchmarks.coverage --draws 200 --robot arm7 --scene ar1 --scene white
+"""
+
+import os
+
+# matrices are small: more threads than one only wait for each other
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.harness import RESULTS
+from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
+from rrru.errors import FitError
+from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
+from rrru.gap.make_case import make_case
+from rrru.gap.model_fit import GEOMETRY
+from rrru.gap.settings import GapSettings
+from rrru.seeds import stream
+
+FOLDER = RESULTS / "benchmarks" / "coverage"
+QUANTILE_95 = 1.959964
+_SEED, _RESAMPLES = 7, 20
+_TABLES = ("parameters", "directions", "summaries")
+# kinds of parameters by the name that `gap_parameters` has in its column effect; all others are effects
+_KINDS = {"calibration": "geometry", "weight": "nuisance"}
+
+
+# --- what a diagnosis states: the one place that knows how the package names it
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What a diagnosis states.
+
+    table: `gap_parameters`; covariance (p, p): of the geometric parameters; effects: in the verdict; held_out_mm:
+    predicted rms distance of held-out readings, noise included; gap_after_mm: without noise; legs: of each term of the
+    hypothesis; predict: from another table of readings to what the corrected model leaves of it.
+    """
+
+    table: pd.DataFrame
+    covariance: np.ndarray
+    effects: frozenset
+    verdict: dict
+    held_out_mm: float
+    gap_after_mm: float
+    legs: str
+    predict: object
+
+
+def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
+    """The Statement of a diagnosis of a table of readings. Raises FitError where there is no diagnosis."""
+    known = MeasuredRobot(campaign.mechanism, campaign.masses, noise_mm)
+    settings = GapSettings(effects=campaign.library.offered, draws=draws)
+    found = diagnose(frame, known, settings, details=False)
+    one, estimate = found.attribution, found.attribution.fit.estimate
+    terms, geometry = one.hypothesis.terms, estimate.parameters.places[GEOMETRY]
+    prediction = one.held_out.predict(terms, one.hypothesis.strengths_of(terms, one.level), one.level)
+    expected = np.sum(prediction.left_mm2, axis=1) + prediction.uncertainty_mm2
+    names = found.verdict["effects"].split("+")
+    return Statement(
+        found.tables["gap_parameters"],
+        estimate.covariance[geometry, geometry],
+        frozenset(names) - {"none", "unexplained"},
+        found.verdict,
+        float(np.sqrt(expected.mean())),
+        found.verdict["gap_after_rms_mm"],
+        ",".join(str(term.legs) for term in terms),
+        lambda frame: _residual(campaign, frame, one),
+    )
+
+
+def _residual(campaign, frame, attribution):
+    """What the corrected model leaves (n, 3) of another table of readings, where a diagnosis would use them."""
+    case = make_case(frame, sim(campaign.mechanism), campaign.masses, 1.0, {})
+    case = replace(case, library=attribution.case.library).standing(attribution.state)
+    return np.where(case.used[:, None], case.left(attribution.state), np.nan)
+
+
+# --- one draw
+
+
+def one_draw(robot, scene, number, size=1.0):
+    """What one draw shows: rows of its parameters, of its independent directions, and its summary.
+
+    The effect of the library acts in every second draw; with payload and tilt unknown, in all.
+    """
+    campaign = virtual_campaign(robot, scene, size)
+    generators = [stream(_SEED, robot, scene, what, number) for what in ("truth", "noise", "fresh")]
+    acts = bool(number % 2) or campaign.scene.payload
+    truth = draw_truth(campaign, generators[0], acts)
+    frame = measure(campaign, truth, generators[1])
+    began = time.process_time()
+    summary = {"draw": number, "acts": acts, "failed": "", "effects": ""}
+    try:
+        stated = state_of(campaign, frame, campaign.scene.noise.mean_mm)
+    except (FitError, np.linalg.LinAlgError) as problem:
+        return [], [], summary | {"failed": str(problem)[:200], "seconds": time.process_time() - began}
+    seconds = time.process_time() - began
+    parameters = _parameter_rows(stated, campaign, truth)
+    directions = _directions(stated, campaign, truth)
+    exact, noisy = (exact_readings(campaign, truth, fresh=True), measure(campaign, truth, generators[2], fresh=True))
+    left = stated.predict(noisy)
+    errors = noisy[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy() - exact
+    acting = {active.effect.name for active in truth.effects}
+    summary |= {
+        "effects": stated.verdict["effects"],
+        "right": stated.effects == acting,
+        "noise_mm": stated.verdict["noise_rms_mm"] / np.sqrt(3.0),
+        "noise_runs_mm": stated.verdict["noise_runs_mm"],
+        "noise_correlation": stated.verdict["noise_correlation"],
+        "points": stated.verdict["points"],
+        "held_out_mm": stated.held_out_mm,
+        "fresh_mm": _rms(left),
+        "gap_after_mm": stated.gap_after_mm,
+        "fresh_gap_mm": _rms(left - errors),
+        "legs": stated.legs,
+        "share_closed": stated.verdict["share_closed"],
+        "unstated": ",".join(sorted(stated.effects - set(stated.table["effect"]))),
+        "seconds": seconds,
+    }
+    return parameters, directions, summary
+
+
+def _rms(vectors):
+    """Root mean square length of vectors (n, 3), those that are not known apart."""
+    return float(np.sqrt(np.nanmean((vectors**2).sum(axis=1))))
+
+
+def _parameter_rows(stated, campaign, truth):
+    """Rows of all stated parameters: kind, name, truth, value and standard error."""
+    geometry = dict(zip(campaign.mechanism.parameters.names, truth.deviations, strict=True))
+    inside = np.linalg.norm(campaign.identifiable, axis=1) > 1.0 - 1e-3
+    identified = dict(zip(geometry, inside, strict=True))
+    effects = {active.effect.name: active.values for active in truth.effects}
+    result = []
+    for row in stated.table.itertuples():
+        kind = _KINDS.get(row.effect, "effect")
+        if kind == "geometry":
+            true = geometry[row.parameter] if identified[row.parameter] else None
+        elif kind == "nuisance":
+            true = truth.payload.get(row.parameter, 0.0)
+        else:
+            # of an effect that does not act its sizes are zero, of its shape there is no truth
+            true = effects[row.effect].get(row.parameter) if row.effect in effects else 0.0
+        if true is None or (kind == "effect" and np.isnan(row.standard_error)):
+            continue
+        error = row.value - true
+        if row.parameter.startswith("phase"):
+            error = (error + np.pi) % (2.0 * np.pi) - np.pi
+        named = {"kind": kind, "name": row.parameter if kind == "geometry" else f"{row.effect} {row.parameter}"}
+        result.append(named | {"truth": true, "error": error, "standard_error": row.standard_error})
+    return result
+
+
+def _directions(stated, campaign, truth):
+    """Errors over standard errors (r,) along the independent directions of the identifiable combinations."""
+    names = list(campaign.mechanism.parameters.names)
+    table = stated.table[stated.table["effect"] == "calibration"].set_index("parameter")
+    error = (table.loc[names, "value"].to_numpy() - truth.deviations) / campaign.scale
+    onto = campaign.identifiable
+    covariance = onto.T @ (stated.covariance / np.outer(campaign.scale, campaign.scale)) @ onto
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    value, turned = np.linalg.eigh(covariance / np.outer(size, size))
+    value = np.where(value > 1e-12 * value[-1], value, np.nan)
+    return list(turned.T @ (onto.T @ error / size) / np.sqrt(value))
+
+
+# --- cells
+
+
+def cell(robot, scene, draws, size=1.0, first=0):
+    """Tables of parameters, directions and summaries of so many draws of a cell."""
+    parameters, directions, summaries = [], [], []
+    for number in range(first, first + draws):
+        own, independent, summary = one_draw(robot, scene, number, size)
+        parameters += [row | {"draw": number} for row in own]
+        directions += [{"draw": number, "direction": k, "z": z} for k, z in enumerate(independent)]
+        summaries.append(summary)
+    tables = [pd.DataFrame(part) for part in (parameters, directions, summaries)]
+    return [table.assign(robot=robot, scene=scene) for table in tables]
+
+
+def coverage(z, draw):
+    """Of errors over standard errors (n,) in draws (n,): coverage, its standard error over draws, rms ratio.
+
+    A standard error that is not a number covers nothing.
+    """
+    covered = pd.Series(np.abs(z) < QUANTILE_95).groupby(np.asarray(draw))
+    rate, count = float(np.mean(np.abs(z) < QUANTILE_95)), covered.ngroups
+    own = covered.mean()
+    error = float(own.std(ddof=1) / np.sqrt(count)) if count > 1 else np.nan
+    return rate, error, float(np.sqrt(np.nanmean(np.square(z))))
+
+
+def summarize(parameters, directions, summaries):
+    """One row per cell and kind of parameter; directions: of the geometric parameters, independent."""
+    result = []
+    for (robot, scene), own in summaries.groupby(["robot", "scene"], sort=False):
+        good = own[_done(own)]
+        head = {"robot": robot, "scene": scene, "draws": len(own), "failed": len(own) - len(good)}
+        head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
+        for kind in ("directions", "geometry", "effect", "nuisance"):
+            if kind == "directions":
+                some = _of_cell(directions, robot, scene)
+                z = some["z"].to_numpy(dtype=float) if len(some) else np.zeros(0)
+            else:
+                some = _of_cell(parameters, robot, scene)
+                some = some[some["kind"] == kind] if len(some) else some
+                z = (some["error"] / some["standard_error"]).to_numpy(dtype=float) if len(some) else np.zeros(0)
+            if not len(z):
+                continue
+            rate, error, ratio = coverage(z, some["draw"])
+            binomial = np.sqrt(0.95 * 0.05 / len(z))
+            row = head | {"kind": kind, "intervals": len(z), "coverage": rate, "coverage_se": max(error, binomial)}
+            row |= {"ratio": ratio, "ratio_68": float(np.nanquantile(np.abs(z), 0.6827))}
+            row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z, kind)
+            result.append(row)
+    return pd.DataFrame(result)
+
+
+def _done(summaries):
+    """Which draws (n,) have a diagnosis; an empty text comes back from a file as NaN."""
+    return summaries["failed"].isna() | (summaries["failed"] == "")
+
+
+def _of_cell(table, robot, scene):
+    """The rows of a table of one cell."""
+    return table[(table["robot"] == robot) & (table["scene"] == scene)] if len(table) else table
+
+
+def _worst(some, z, kind):
+    """The parameter of the largest and of the smallest rms of z (n,)."""
+    if kind == "directions":
+        return {"worst": "", "worst_ratio": np.nan, "least": "", "least_ratio": np.nan}
+    sizes = pd.Series(z**2).groupby(some["name"].to_numpy()).mean() ** 0.5
+    ends = sizes.idxmax(), sizes.idxmin()
+    return {"worst": ends[0], "worst_ratio": sizes.max(), "least": ends[1], "least_ratio": sizes.min()}
+
+
+def predictions(summaries):
+    """One row per cell: predicted over observed rms, of held-out readings with noise and of the gap without it.
+
+    Root mean squares over the draws, and the medians of the draws' own ratios.
+    """
+    result = []
+    good = summaries[_done(summaries)]
+    for (robot, scene), own in good.groupby(["robot", "scene"], sort=False):
+        row = {"robot": robot, "scene": scene, "draws": len(own)}
+        for name, told, seen in (("held_out", "held_out_mm", "fresh_mm"), ("gap", "gap_after_mm", "fresh_gap_mm")):
+            row[f"{name}_ratio"] = float(np.sqrt((own[told] ** 2).mean() / (own[seen] ** 2).mean()))
+            row[f"{name}_median"] = float((own[told] / own[seen]).median())
+        row["noise_mm"], row["noise_runs_mm"] = own["noise_mm"].median(), own["noise_runs_mm"].median()
+        row["seconds"] = own["seconds"].median()
+        result.append(row)
+    return pd.DataFrame(result)
+
+
+def main(arguments=None):
+    """Measure cells, three files each, and print what they show."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=200)
+    parser.add_argument("--robot", action="append", choices=ROBOTS)
+    parser.add_argument("--scene", action="append", choices=SCENES)
+    parser.add_argument("--size", type=float, default=1.0, help="share of the usual number of poses")
+    parser.add_argument("--label", default="now", help="folder of the results, such as before or after")
+    parser.add_argument("--show", action="store_true", help="print what the files of the folder show, measure nothing")
+    asked = parser.parse_args(arguments)
+    folder = FOLDER / asked.label
+    folder.mkdir(parents=True, exist_ok=True)
+    cells = [(robot, scene) for scene in asked.scene or SCENES for robot in asked.robot or ROBOTS]
+    if asked.show:
+        print_cells([pd.concat(_stored(folder, name, cells)) for name in _TABLES])
+        return
+    for robot, scene in cells:
+        tables = cell(robot, scene, asked.draws, asked.size)
+        for name, table in zip(_TABLES, tables, strict=True):
+            table.to_csv(folder / f"{robot}-{scene}-{name}.csv", index=False)
+        print_cells(tables)
+
+
+def _stored(folder, name, cells):
+    """Tables of a name that a folder holds of some cells."""
+    paths = [folder / f"{robot}-{scene}-{name}.csv" for robot, scene in cells]
+    return [pd.read_csv(path) for path in paths if path.exists() and path.stat().st_size > 1]
+
+
+def print_cells(tables):
+    """Print what tables of parameters, directions and summaries show."""
+    parameters, directions, summaries = tables
+    with pd.option_context("display.width", 250, "display.max_columns", 40, "display.float_format", "{:.3g}".format):
+        for table in (summarize(parameters, directions, summaries), predictions(summaries)):
+            print(table.to_string(index=False), flush=True)
+
+
+if __name__ == "__main__":
+    main()
