@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import dct
 from scipy.linalg import qr, toeplitz
+from scipy.special import expit
 
 from rrru.campaign.noise import along_runs
 
@@ -33,12 +34,16 @@ FloatArray = npt.NDArray[np.float64]
 
 _CORRELATIONS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9])
 _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
-# degrees of freedom that a stated size is worth: 30 % off, 1 sigma; that all axes being alike is worth
-_STATED, _ALIKE = 5.6, 10.0
+# degrees of freedom that a stated size is worth: 30 % off, 1 sigma
+_STATED = 5.6
+# share of the mean variance that no axis is below
+_LEAST_AXIS = 1e-4
 # a stated noise is this factor off at most: 1 sigma of what is believed of it; beyond, it is contradicted
 CONTRADICTED = 1.3
 # numbers that have to be left when everything that may be fitted is, for the noise to be estimated within some 20 %
 MIN_FREE_NUMBERS = 15.0
+# free means of series, of three numbers each, for offsets between them to show: those of two series
+MIN_FREE_MEANS = 6.0
 # offsets of a smaller share of the noise's variance are none
 _NO_OFFSET = 0.05
 # prior probability of no correlation, and of no offsets: many campaigns have neither, and readings that cannot tell
@@ -265,14 +270,21 @@ class _Seen:
         """Numbers that are left of the readings when everything that may be fitted is."""
         return float(self.freedom.sum())
 
+    @property
+    def _shows_offsets(self) -> bool:
+        """Whether the means of the series are free enough to show offsets between them."""
+        return float(self.freedom[self.wave == 0].sum()) >= MIN_FREE_MEANS
+
     def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
         white, largest = self._axes(1.0, known)[0], (CONTRADICTED * instrument_mm) ** 2
         correlated = np.minimum(1.0, largest / white)
-        offsets = _OFFSETS[_OFFSETS * white.mean() <= largest]
-        grid = [(correlation, offset) for correlation in _CORRELATIONS for offset in offsets]
+        # what few numbers cannot show is taken as none
+        offsets = _OFFSETS[_OFFSETS * white.mean() <= largest] if self._shows_offsets else _OFFSETS[:1]
+        correlations = _CORRELATIONS if self.free >= MIN_FREE_NUMBERS else _CORRELATIONS[:1]
+        grid = [(correlation, offset) for correlation in correlations for offset in offsets]
         value = np.array([self._value(*pair, correlated, known) for pair in grid])
-        prior = np.outer(_spike_and_slab(1.0 - _CORRELATIONS), _spike_and_slab(np.exp(-offsets)))
+        prior = np.outer(_spike_and_slab(1.0 - correlations), _spike_and_slab(np.exp(-offsets)))
         weight = prior.ravel() * np.exp(value - value.max())
         weight /= weight.sum()
         correlation, offset = weight @ np.array(grid)
@@ -296,14 +308,18 @@ class _Seen:
     def _axes(self, shape: FloatArray | float, known: Sequence[tuple[float, float]]) -> tuple[FloatArray, float]:
         """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior.
 
+        Averaged over two models of even odds: one variance for all axes, and one of each axis.
         known: statements (variance in mm^2, degrees of freedom that it is worth).
         """
         sums, freedom = (self.squares / shape).sum(axis=0), self.freedom.sum(axis=0)
         stated = sum(worth for _, worth in known)
         pooled = (sums.sum() + sum(worth * variance for variance, worth in known)) / (freedom.sum() + stated)
-        axes = (sums + _ALIKE * pooled) / (freedom + _ALIKE)
-        value = -0.5 * (freedom * np.log(axes) + sums / axes).sum()
-        value -= 0.5 * _ALIKE * (np.log(axes / pooled) + pooled / axes - 1.0).sum()
+        own = np.maximum(np.where(freedom > 0.0, sums / np.maximum(freedom, 1e-9), pooled), _LEAST_AXIS * pooled)
+        equal = -0.5 * float((freedom * np.log(pooled) + sums / pooled).sum())
+        # axes of their own have two numbers more (Schwarz, Annals of Statistics 6, 1978)
+        apart = -0.5 * float((freedom * np.log(own) + sums / own).sum()) - np.log(max(freedom.sum(), 1.0))
+        share = float(expit(apart - equal))
+        value = float(np.logaddexp(equal, apart))
         for variance, worth in known:
             value -= 0.5 * worth * (np.log(pooled / variance) + variance / pooled - 1.0)
-        return axes, value
+        return share * own + (1.0 - share) * pooled, value
