@@ -11,11 +11,10 @@ import pytest
 
 from rrru.effects.protocol import Coordinates
 from rrru.gap.advise import NOTHING, advise
-from rrru.gap.attribute import Attribution, attribute
+from rrru.gap.attribute import Attribution, attribute, fit_hypothesis
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import averaged
 from rrru.gap.posterior import posterior
-from rrru.gap.refine import refine
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.settings import Prior
 from rrru.gap.state import State
@@ -93,6 +92,12 @@ def test_every_effect_alone_is_always_weighed():
     assert single >= {term for effect in EFFECTS.values() for term in variants(effect)}
 
 
+def _fitted(case, start, *terms):
+    """ModelFit of a hypothesis from a start."""
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    return fit_hypothesis(case, evidence, (start,), (_hypothesis(*terms), 0))
+
+
 def _hypothesis(*terms):
     """A hypothesis of strong terms."""
     return Hypothesis(terms, np.zeros(len(LEVELS)), np.full((len(LEVELS), len(terms)), 30.0))
@@ -103,7 +108,8 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     truth = 3.0 * drawn(name, 7)
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
-    state, covariance = refine(case, (start,), _hypothesis(Term(name)), 0)
+    fit = _fitted(case, start, Term(name))
+    state, covariance = fit.state, fit.effect_covariance(Term(name))[1]
     before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth),) * 2
@@ -116,7 +122,7 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
     true = replace(active("thermal_growth", [8e-4]), values={"strain": 8e-4, "time_constant": 380.0})
     case = case_of(measure((true,)), {"thermal_growth": effect})
     shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
-    state, _ = refine(case, (calibrate(case),), _hypothesis(Term("thermal_growth", shape)), 0)
+    state = _fitted(case, calibrate(case), Term("thermal_growth", shape)).state
     assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
     assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
 
@@ -124,9 +130,10 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
 def test_an_exact_fit_from_another_fit_keeps_what_both_share():
     both = (strong("servo_lag", 4.0), strong("leg_asymmetry", 4.0))
     case = case_of(measure(both), _library("servo_lag", "leg_asymmetry"))
-    one, _ = refine(case, (calibrate(case),), _hypothesis(Term("servo_lag")), 0)
-    two, covariance = refine(case, (one,), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
-    direct, _ = refine(case, (calibrate(case),), _hypothesis(Term("servo_lag"), Term("leg_asymmetry")), 0)
+    one = _fitted(case, calibrate(case), Term("servo_lag")).state
+    fit = _fitted(case, one, Term("servo_lag"), Term("leg_asymmetry"))
+    two, covariance = fit.state, fit.effect_covariance(Term("servo_lag"))[1]
+    direct = _fitted(case, calibrate(case), Term("servo_lag"), Term("leg_asymmetry")).state
     error = np.sqrt(np.diag(covariance)[:3])
     assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
     left = np.sqrt((case.residual(two) ** 2).mean())
