@@ -11,6 +11,7 @@ from rrru.gap import poses
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
+from rrru.gap.model_fit import fit_model
 from rrru.gap.posterior import posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
@@ -96,7 +97,7 @@ def between():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), Prior())
-    found = Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return advise(found, verdict, MASSES)

@@ -14,6 +14,7 @@ from rrru.gap.advise import NOTHING, advise
 from rrru.gap.attribute import Attribution, attribute, fit_hypothesis
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import averaged
+from rrru.gap.model_fit import fit_model
 from rrru.gap.posterior import posterior
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.settings import Prior
@@ -109,10 +110,10 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
     fit = _fitted(case, start, Term(name))
-    state, covariance = fit.state, fit.effect_covariance(Term(name))[1]
+    state, (shapes, covariance) = fit.state, fit.effect_covariance(Term(name))
     before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
-    assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth),) * 2
+    assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth) + len(shapes),) * 2
     # the motion read from the columns is not quite the one driven
     np.testing.assert_allclose(state.effects[name, 0], truth, atol=0.03 * np.abs(truth).max())
 
@@ -166,7 +167,7 @@ def twins():
     case, calibrated = _twins()
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), Prior())
-    found = Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
     verdict = decide(found, {})
     return found, verdict, advise(found, verdict, MASSES).runs
 

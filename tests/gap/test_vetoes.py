@@ -11,6 +11,7 @@ from rrru.gap import diagnose
 from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import ModelEvidence
+from rrru.gap.model_fit import fit_model
 from rrru.gap.posterior import NEGLIGIBLE, posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
@@ -85,7 +86,7 @@ def attribution():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = posterior(evidence, search(evidence), PRIOR)
-    return Attribution(case, calibrated, calibrated, calibrated, np.zeros((0, 0)), evidence, beliefs, *beliefs.best())
+    return Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
 
 
 def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypatch):
