@@ -95,6 +95,16 @@ def gained(problem, scale):
     return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
 
 
+def evidence_error(problem, scale):
+    """How far (levels, m) `gained` may be off at prior deviations (m, k): the size of the correction in it.
+
+    It comes from the probability of the coefficients that cannot be negative, see `rrru.gap.orthant`.
+    """
+    gram, moment = np.ascontiguousarray(problem.gram), problem.moment - problem.gram @ problem.about
+    correction = kernels.log_evidence_and_correction(gram, moment, np.ascontiguousarray(scale), problem.positive)[1]
+    return np.abs(correction)
+
+
 def posterior_mean(problem, scale):
     """The mean (k,) of a Projected problem of one level at prior deviations (k,).
 

@@ -9,6 +9,10 @@ effect acts that gives way:
 It is one weight for all effects, and no effect itself: where nothing gives way it changes nothing. Evidence is averaged
 over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
 
+The columns of the weight are a linearisation about the coefficients found under weak priors. `nuisance_evidence` has
+the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over strengths, is 0.25 nats off at most
+where the effect acts that bears the loads, and 1.2 nats where another one acts or none.
+
 ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
 at the platform; where nothing was told there, by a tenth of all that moves, as an arm is made to carry); the robot
 stands level within a tenth of a degree, or it leans by a degree.
@@ -155,6 +159,11 @@ def _in_cases(problem, scale):
     each = np.repeat(scale, len(log), axis=0)
     each[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
     return log, each
+
+
+def cases_of(names):
+    """Log probabilities (c,) of all cases, and standard deviations (c, q) of the parameters of these names."""
+    return _cases(tuple(name != _EXTRA for name in names))
 
 
 @cache

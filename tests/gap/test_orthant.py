@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 from rrru.gap.evidence_kernels import log_evidence, log_evidence_and_correction
 from rrru.gap.orthant import log_orthant, truncated_moments
+from rrru.gap.projected import evidence_error
 from tests.gap.evidence_problems import COUNT, problems
 from tests.reference.truncated_normal import posterior, sample_evidence
 
@@ -98,7 +99,9 @@ def test_the_evidence_is_that_of_importance_sampling(number):
         grids = [[strength] for strength in problem.strengths]
         value, _ = problem.evidence.over_strengths(problem.terms, grids, [problem.level])
         found = value[0, 0] - problem.evidence.none[problem.level]
-    assert abs(found - sampled.log) < _MAX_ERROR_NATS
+    error = abs(found - sampled.log)
+    assert error < _MAX_ERROR_NATS
+    assert error < evidence_error(own, scale[None])[0, 0] + 4.0 * sampled.error + 1e-3
 
 
 @pytest.mark.parametrize("number", range(COUNT))
