@@ -163,8 +163,9 @@ def triangle_of(rows: FloatArray) -> FloatArray:
         except np.linalg.LinAlgError:
             # columns that depend on each other: by orthogonal transformations instead
             pass
-    short = max(rows.shape[1] - len(rows), 0)
-    return np.asarray(np.linalg.qr(np.pad(rows, ((0, short), (0, 0))), mode="r"))
+    if (short := rows.shape[1] - len(rows)) > 0:
+        rows = np.pad(rows, ((0, short), (0, 0)))
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def with_prior(readings: FloatArray, root: FloatArray, off: FloatArray) -> FloatArray:
