@@ -11,6 +11,10 @@ Parameters of one draw are correlated. Where the covariance C is known, coverage
 independent directions u = L^-1 error, L L' = C, of the combinations that the poses identify: of them the binomial
 standard error of the coverage holds. Of parameters it is taken over draws.
 
+The noise of a few draws may happen to be kind: where nothing acts the directions have a row "oracle" for the linear
+generalised least squares of the same readings under the true covariance, whose ratio is 1 but for that, and a row
+"same draws" for the diagnosis.
+
     python -m benchmarks.coverage --draws 200 --robot arm7 --scene ar1 --scene white
 """
 
@@ -29,6 +33,7 @@ import pandas as pd
 
 from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
+from rrru.campaign.measurements import series
 from rrru.errors import FitError
 from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
@@ -63,6 +68,7 @@ class Statement:
     held_out_mm: float
     gap_after_mm: float
     legs: str
+    used: np.ndarray
     predict: object
 
 
@@ -84,6 +90,7 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
         float(np.sqrt(expected.mean())),
         found.verdict["gap_after_rms_mm"],
         ",".join(str(term.legs) for term in terms),
+        one.case.used,
         lambda frame: _residual(campaign, frame, one),
     )
 
@@ -116,7 +123,10 @@ def one_draw(robot, scene, number, size=1.0):
         return [], [], summary | {"failed": str(problem)[:200], "seconds": time.process_time() - began}
     seconds = time.process_time() - began
     parameters = _parameter_rows(stated, campaign, truth)
-    directions = _directions(stated, campaign, truth)
+    directions = [{"z": z} for z in _directions(stated, campaign, truth)]
+    if not truth.effects + truth.discrepancy:
+        for row, z in zip(directions, oracle(campaign, frame, truth, stated.used), strict=True):
+            row["oracle"] = z
     exact, noisy = (exact_readings(campaign, truth, fresh=True), measure(campaign, truth, generators[2], fresh=True))
     left = stated.predict(noisy)
     errors = noisy[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy() - exact
@@ -151,6 +161,12 @@ def _parameter_rows(stated, campaign, truth):
     inside = np.linalg.norm(campaign.identifiable, axis=1) > 1.0 - 1e-3
     identified = dict(zip(geometry, inside, strict=True))
     effects = {active.effect.name: active.values for active in truth.effects}
+    unseen = {
+        (active.effect.name, parameter.name)
+        for active in truth.effects
+        for parameter in active.effect.parameters
+        if parameter.leg in campaign.still
+    }
     result = []
     for row in stated.table.itertuples():
         kind = _KINDS.get(row.effect, "effect")
@@ -161,6 +177,7 @@ def _parameter_rows(stated, campaign, truth):
         else:
             # of an effect that does not act its sizes are zero, of its shape there is no truth
             true = effects[row.effect].get(row.parameter) if row.effect in effects else 0.0
+            true = None if (row.effect, row.parameter) in unseen else true
         if true is None or (kind == "effect" and np.isnan(row.standard_error)):
             continue
         error = row.value - true
@@ -184,6 +201,22 @@ def _directions(stated, campaign, truth):
     return list(turned.T @ (onto.T @ error / size) / np.sqrt(value))
 
 
+def oracle(campaign, frame, truth, used):
+    """Errors over standard errors (r,) of linear generalised least squares under the true covariance; used (n,)."""
+    error = frame[[f"measured_{axis}_mm" for axis in "xyz"]].to_numpy() - exact_readings(campaign, truth)
+    rows_of_run = pd.Series(np.arange(len(frame))).groupby(series(frame)).indices
+    columns = campaign.jacobian * campaign.scale @ campaign.identifiable
+    white, data = [], []
+    for place in rows_of_run.values():
+        chosen = used[place]
+        for axis, covariance in enumerate(campaign.scene.noise.covariances(len(place))):
+            factor = np.linalg.cholesky(covariance[np.ix_(chosen, chosen)])
+            white.append(np.linalg.solve(factor, columns[place[chosen], axis]))
+            data.append(np.linalg.solve(factor, error[place[chosen], axis]))
+    basis, _ = np.linalg.qr(np.concatenate(white))
+    return basis.T @ np.concatenate(data)
+
+
 # --- cells
 
 
@@ -193,7 +226,7 @@ def cell(robot, scene, draws, size=1.0, first=0):
     for number in range(first, first + draws):
         own, independent, summary = one_draw(robot, scene, number, size)
         parameters += [row | {"draw": number} for row in own]
-        directions += [{"draw": number, "direction": k, "z": z} for k, z in enumerate(independent)]
+        directions += [row | {"draw": number, "direction": k} for k, row in enumerate(independent)]
         summaries.append(summary)
     tables = [pd.DataFrame(part) for part in (parameters, directions, summaries)]
     return [table.assign(robot=robot, scene=scene) for table in tables]
@@ -218,23 +251,28 @@ def summarize(parameters, directions, summaries):
         good = own[_done(own)]
         head = {"robot": robot, "scene": scene, "draws": len(own), "failed": len(own) - len(good)}
         head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
-        for kind in ("directions", "geometry", "effect", "nuisance"):
-            if kind == "directions":
-                some = _of_cell(directions, robot, scene)
-                z = some["z"].to_numpy(dtype=float) if len(some) else np.zeros(0)
-            else:
-                some = _of_cell(parameters, robot, scene)
-                some = some[some["kind"] == kind] if len(some) else some
-                z = (some["error"] / some["standard_error"]).to_numpy(dtype=float) if len(some) else np.zeros(0)
-            if not len(z):
-                continue
+        for kind, some, z in _errors_by_kind(_of_cell(parameters, robot, scene), _of_cell(directions, robot, scene)):
             rate, error, ratio = coverage(z, some["draw"])
             binomial = np.sqrt(0.95 * 0.05 / len(z))
             row = head | {"kind": kind, "intervals": len(z), "coverage": rate, "coverage_se": max(error, binomial)}
             row |= {"ratio": ratio, "ratio_68": float(np.nanquantile(np.abs(z), 0.6827))}
-            row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z, kind)
+            row |= {"nan": int(np.isnan(z).sum())} | _worst(some, z)
             result.append(row)
     return pd.DataFrame(result)
+
+
+def _errors_by_kind(parameters, directions):
+    """Kind, rows and errors over standard errors (n,) of what tables of one cell hold."""
+    if len(directions):
+        yield "directions", directions, directions["z"].to_numpy(dtype=float)
+    if "oracle" in directions and directions["oracle"].notna().any():
+        known = directions[directions["oracle"].notna()]
+        yield "same draws", known, known["z"].to_numpy(dtype=float)
+        yield "oracle", known, known["oracle"].to_numpy(dtype=float)
+    for kind in ("geometry", "effect", "nuisance"):
+        some = parameters[parameters["kind"] == kind] if len(parameters) else parameters
+        if len(some):
+            yield kind, some, (some["error"] / some["standard_error"]).to_numpy(dtype=float)
 
 
 def _done(summaries):
@@ -247,9 +285,9 @@ def _of_cell(table, robot, scene):
     return table[(table["robot"] == robot) & (table["scene"] == scene)] if len(table) else table
 
 
-def _worst(some, z, kind):
+def _worst(some, z):
     """The parameter of the largest and of the smallest rms of z (n,)."""
-    if kind == "directions":
+    if "name" not in some:
         return {"worst": "", "worst_ratio": np.nan, "least": "", "least_ratio": np.nan}
     sizes = pd.Series(z**2).groupby(some["name"].to_numpy()).mean() ** 0.5
     ends = sizes.idxmax(), sizes.idxmin()

@@ -64,6 +64,14 @@ class Noise:
         """Standard deviation per axis, root mean square over the axes, without offsets and discrepancy."""
         return float(np.sqrt(np.mean(np.square(self.axis_mm))))
 
+    def covariances(self, count):
+        """Covariances (3, count, count) of the errors of each axis along a run of so many readings."""
+        wave = np.arange(count)
+        cosines = idct(np.eye(count), axis=0, norm="ortho")
+        both = self.smooth_mm**2 * (cosines * _smooth_density(count)) @ cosines.T + self.run_mm**2
+        along = self.correlation ** np.abs(wave[:, None] - wave) if self.correlation else np.eye(count)
+        return np.square(self.axis_mm)[:, None, None] * along + both
+
     def draw(self, run, generator):
         """Errors (n, 3) of readings in runs (n,)."""
         result = np.empty((len(run), 3))
@@ -86,9 +94,14 @@ def autoregressive(white, correlation):
 
 def smooth_function(count, generator):
     """A smooth function (count, 3) of unit mean variance: half its spectral density is lost at the third half-wave."""
-    density = 1.0 / (1.0 + (np.arange(count) / 3.0) ** 2)
-    waves = np.sqrt(density / density.mean())[:, None] * generator.standard_normal((count, 3))
+    waves = np.sqrt(_smooth_density(count))[:, None] * generator.standard_normal((count, 3))
     return idct(waves, axis=0, norm="ortho")
+
+
+def _smooth_density(count):
+    """Variances (count,) of a smooth function by half-wave number, 1 on average."""
+    density = 1.0 / (1.0 + (np.arange(count) / 3.0) ** 2)
+    return density / density.mean()
 
 
 @dataclass(frozen=True)
@@ -183,7 +196,8 @@ class VirtualCampaign:
     """A campaign before anything is measured.
 
     mechanism: with the parameters that are fitted; commands: table of n readings without measured columns; fresh: that
-    of other runs of the same kind; library: what acts and what the diagnosis is offered.
+    of other runs, along the same paths or at other poses of the same range; library: what acts and what is
+    offered to the diagnosis.
     """
 
     robot: str
@@ -217,6 +231,12 @@ class VirtualCampaign:
         return np.where(np.array(self.mechanism.parameters.units) == "mm", 1.0, 1.0 / self.mechanism.angle_arm_mm)
 
     @cached_property
+    def still(self):
+        """Numbers from 1 on of the drives that stand still: the calibration explains an effect of such a drive."""
+        drive = rows.actuators(self.commands, self.mechanism)
+        return frozenset((1 + np.flatnonzero(np.ptp(drive, axis=0) == 0.0)).tolist())
+
+    @cached_property
     def identifiable(self):
         """Orthonormal combinations (p, r), in units of `scale`, that the readings identify: see IDENTIFIABLE_MM."""
         flat = self.jacobian.reshape(-1, len(self.scale)) * self.scale
@@ -230,7 +250,7 @@ def virtual_campaign(robot, scene, size=1.0):
     one, library = SCENES[scene], _LIBRARIES[robot]
     if one.payload:
         library = _UNDER_PAYLOAD
-    commands, fresh = (_commands(robot, one, size, seed) for seed in (1, 2))
+    commands, fresh = (_commands(robot, one, size, seed) for seed in (1, 1 if one.paths else 2))
     mechanism = _with_parameters(robot, one, commands)
     library = library if one.removed else replace(library, removed="")
     return VirtualCampaign(robot, one, mechanism, _MASSES[robot], commands, fresh, library)

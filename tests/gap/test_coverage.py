@@ -6,7 +6,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.coverage import coverage, one_draw
+from benchmarks.coverage import coverage, one_draw, oracle
 from benchmarks.target_folds import predicted_and_exact_mm
 from benchmarks.virtual_campaigns import (
     NOISE_MM,
@@ -34,6 +34,23 @@ def test_noise_has_the_stated_axes_correlation_and_offsets():
     smooth = Noise((1e-9,) * 3, smooth_mm=0.4).draw(run, generator)
     assert smooth.std() == pytest.approx(0.4, rel=0.05)
     assert np.diff(smooth.reshape(200, 50, 3), axis=1).std() < 0.5 * smooth.std()
+
+
+@pytest.mark.parametrize("noise", [Noise((0.1, 0.2, 0.3), 0.7, 0.2, 0.4), Noise()])
+def test_the_stated_covariance_is_that_of_the_draws(noise):
+    run, generator = np.repeat(np.arange(20000), 6), np.random.default_rng(8)
+    errors = noise.draw(run, generator).reshape(-1, 6, 3)
+    for axis, expected in enumerate(noise.covariances(6)):
+        found = errors[..., axis].T @ errors[..., axis] / len(errors)
+        np.testing.assert_allclose(found, expected, atol=0.05 * expected.max())
+
+
+def test_the_oracle_is_right_about_its_errors():
+    campaign = virtual_campaign("rrru3", "ar1", 0.5)
+    truth, generator = draw_truth(campaign, np.random.default_rng(9), acts=False), np.random.default_rng(10)
+    used = np.arange(len(campaign.commands)) % 7 > 0
+    z = np.concatenate([oracle(campaign, measure(campaign, truth, generator), truth, used) for _ in range(60)])
+    assert np.sqrt((z**2).mean()) == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * len(z)))
 
 
 def test_an_autoregression_starts_in_its_stationary_distribution():
@@ -95,5 +112,5 @@ def test_held_out_errors_of_two_targets_in_one_run_each_are_those_of_a_fit(seed)
 @pytest.mark.parametrize("scene", ["white", "axes", "targets"])
 def test_errors_of_an_arm_are_as_large_as_stated(scene):
     """Along independent directions, where nothing acts: 31 or more of each of six draws, of which the rms is 1."""
-    z = np.concatenate([one_draw("arm7", scene, number)[1] for number in range(0, 12, 2)])
+    z = np.array([row["z"] for number in range(0, 12, 2) for row in one_draw("arm7", scene, number)[1]])
     assert np.sqrt((z**2).mean()) == pytest.approx(1.0, abs=4.0 / np.sqrt(2.0 * len(z)))
