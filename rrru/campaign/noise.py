@@ -63,33 +63,15 @@ def read_noise(measurements):
     return typical(known.to_numpy().T) if len(known) else None
 
 
-def estimate(measurements, residual_mm, columns, readings=None):
-    """Noise per axis in mm, of orientations at their arm, and where they are from.
+def quieter_repeats(measurements, noise_mm, correlation=0.0):
+    """Noise per axis in mm of poses measured again where it is clearly less than an estimate, None where it is not.
 
-    measurements: the n points used; residual_mm (m, 3): what a calibration leaves of the readings there, by default
-    their positions; columns (m, 3, k): whatever may still be fitted. "high_frequency": what these leave in the upper
-    half of the half-wave numbers along each run; a gap that is smooth along the path leaves it alone, as time and
-    hysteresis, which spoil repeats, do. "repeats" where these say clearly less. NaN for orientations that were not
-    read.
+    correlation: of the noise from reading to reading; what is correlated is worth fewer degrees of freedom.
     """
-    run = reading_series(measurements, readings)
-    flat = columns.reshape(-1, columns.shape[-1])
-    size = np.linalg.norm(flat, axis=0)
-    unit = flat / np.where(size > 0.0, size, 1.0)
-    fitted, _, rank, _ = np.linalg.lstsq(unit, residual_mm.ravel(), rcond=1e-9)
-    cosines, wave = along_runs((residual_mm.ravel() - unit @ fitted).reshape(-1, 3), run)
-    length = np.array([np.count_nonzero(run == label) for label in run])
-    upper, freedom = wave > 0.5 * length, max(1.0 - rank / flat.shape[0], 0.1)
-    positions = np.arange(len(run)) < len(measurements)
-
-    def rough(chosen):
-        return float(np.sqrt((cosines[upper & chosen] ** 2).mean() / freedom)) if (upper & chosen).any() else np.nan
-
-    noise_mm, turned = rough(positions), rough(~positions)
     repeated, count = repeat_noise(measurements)
-    if count >= ENOUGH_REPEATS and 0.0 < repeated < noise_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
-        return repeated, turned, "repeats"
-    return noise_mm, turned, "high_frequency"
+    count *= (1.0 - correlation**2) / (1.0 + correlation**2)
+    clearly = count >= ENOUGH_REPEATS and 0.0 < repeated < noise_mm * (1.0 - 3.0 / np.sqrt(2.0 * count))
+    return repeated if clearly else None
 
 
 def reading_series(measurements, readings=None):

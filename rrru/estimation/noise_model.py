@@ -183,12 +183,27 @@ def fit_noise(
         if repeats and repeats[1] and seen.free < MIN_FREE_NUMBERS:
             known.append((repeats[0] ** 2, float(repeats[1])))
             instrument_mm = instrument_mm or repeats[0]
-        instrument_mm = instrument_mm or seen.rough_mm
+        instrument_mm = instrument_mm or float(np.nan_to_num(seen.rough()))
         last, model = model, seen.most_likely(instrument_mm, known)
         new, old = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
         if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
     return model
+
+
+def high_frequency_noise(
+    data: FloatArray, columns: FloatArray, series: npt.NDArray[np.generic], chosen: npt.NDArray[np.bool_]
+) -> float:
+    """Standard deviation per axis of chosen rows (m,) by the upper half of the frequencies along each series (m,).
+
+    data (m, 3) of which columns (m, 3, k) may fit whatever they can. What is smooth along a path and has no column, as
+    the effects that a calibration lacks, leaves these frequencies alone. NaN where less than one number is free there.
+    """
+    together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
+    flat = together.reshape(-1, together.shape[-1])
+    left, share = _left(flat[:, -1], flat[:, :-1])
+    seen = _Seen((left**2).reshape(-1, 3), share.reshape(-1, 3), wave, lengths(series))
+    return seen.rough(chosen)
 
 
 def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
@@ -259,11 +274,11 @@ class _Seen:
         self.squares = np.where(self.freedom > 0.0, squares, 0.0)
         self.wave, self.length = wave, length
 
-    @property
-    def rough_mm(self) -> float:
-        """Deviation per axis by the upper half of the frequencies."""
-        upper = self.wave > 0.5 * self.length
-        return float(np.sqrt(self.squares[upper].sum() / max(self.freedom[upper].sum(), 1e-9)))
+    def rough(self, chosen: npt.NDArray[np.bool_] | bool = True) -> float:
+        """Deviation per axis by the upper half of the frequencies of chosen rows (m,), NaN where none is free."""
+        upper = (self.wave > 0.5 * self.length) & chosen
+        freedom = self.freedom[upper].sum()
+        return float(np.sqrt(self.squares[upper].sum() / freedom)) if freedom >= 1.0 else np.nan
 
     @property
     def free(self) -> float:

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.noise import estimate, read_noise
+from rrru.campaign.noise import quieter_repeats, read_noise, reading_series
 from rrru.errors import ConfigError
+from rrru.estimation.noise_model import high_frequency_noise
 from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
 from rrru.robots.robot import Robot
@@ -32,7 +33,7 @@ def campaign_noise(
     given: tuple[float | None, float | None],
     use_near_singularity: bool = True,
 ) -> Noise:
-    """The Noise of a campaign: of what is not given, see `rrru.campaign.noise`.
+    """The Noise of a campaign: of what is not given, see `rrru.estimation.noise_model`.
 
     given: of positions in mm and of orientations in rad, None where nobody states it. Raises ConfigError where there
     are too few points to estimate it.
@@ -49,6 +50,12 @@ def campaign_noise(
         raise ConfigError("too few usable points to estimate noise_mm; give it")
     fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
     left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
-    found_mm, found_turned, source = estimate(used, left, columns, residuals.readings)
-    found_rad = noise_rad or found_turned / robot.angle_arm_mm
-    return Noise(found_mm, found_rad, source) if noise_mm is None else Noise(noise_mm, found_rad, known)
+    series, positions = reading_series(used, residuals.readings), np.arange(len(left)) < len(used)
+    found_rad = noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.angle_arm_mm
+    if noise_mm is not None:
+        return Noise(noise_mm, found_rad, known)
+    found_mm = high_frequency_noise(left, columns, series, positions)
+    if np.isnan(found_mm):
+        raise ConfigError("too few usable points to estimate noise_mm; give it")
+    repeated = quieter_repeats(used, found_mm)
+    return Noise(found_mm, found_rad, "high_frequency") if repeated is None else Noise(repeated, found_rad, "repeats")

@@ -5,9 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.campaign import measurements as rows
 from rrru.campaign import noise
-from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise
+from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
 from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
@@ -71,8 +70,11 @@ class Attribution:
 def with_arm(case, noise_mm=None, noise_rad=None):
     """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
     if not (noise_mm and noise_rad):
-        positions, turned, _ = _rough(case, calibrate(case))
-        noise_mm, noise_rad = noise_mm or positions, noise_rad or turned / case.arm_mm
+        linear, columns = _few(case, calibrate(case))
+        both = (case.positions, ~case.positions)
+        found, turned = (high_frequency_noise(linear.data, columns, case.series, chosen) for chosen in both)
+        noise_mm = noise_mm or noise.quieter_repeats(case.measurements[case.used], found) or found
+        noise_rad = noise_rad or turned / case.arm_mm
     return replace(case, arm_mm=noise_mm / noise_rad)
 
 
@@ -98,10 +100,8 @@ def with_noise(case, linear, stated_mm):
     columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
     model = fit_noise(linear.data, columns, case.series, stated_mm, repeats)
     model = replace(model, alike=alike(linear.data, columns, case.stop, case.kind))
-    repeated, count = repeats
-    # what is correlated tells less
-    count *= (1.0 - model.correlation**2) / (1.0 + model.correlation**2)
-    if count >= noise.ENOUGH_REPEATS and 0.0 < repeated < model.mean_mm * (1.0 - 3.0 / np.sqrt(2.0 * count)):
+    repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
+    if repeated is not None:
         return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
     return case.under(model), "fitted"
 
@@ -121,13 +121,6 @@ def _noise_columns(case, linear, known):
         if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, _LEAST_FREE * linear.data.size):
             return columns
     return columns if known else linear.base
-
-
-def _rough(case, calibrated):
-    """`rrru.campaign.noise.estimate` of a case with everything fitted that may be."""
-    linear, columns = _few(case, calibrated)
-    used = case.measurements[case.used]
-    return noise.estimate(used, linear.data, columns, rows.readings(used, case.arm_mm))
 
 
 def _few(case, calibrated):
