@@ -99,6 +99,8 @@ def _start(observations: _FrameObservations, numbers: Sequence[Candidate]) -> Fl
     case, nothing = observations.case, np.zeros(len(numbers))
     if case.mechanism.reads.frame:
         poses, twists = case.posed(observations.state_at(nothing))
+        # those of effects differ from row to row; a start may take their mean
+        twists = (twists[case.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)
         readings = case.readings or Readings(rows.measured(case.measurements))
         with suppress(FitError):
             found = frame_values(case.mechanism, poses.of(case.used), twists, readings.of(case.used))
