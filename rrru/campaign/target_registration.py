@@ -15,9 +15,13 @@ squares. Lengths in mm, angles in rad.
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int_]
 
 # prior standard deviation of an unknown place about the tool: no target is farther from the tool than a few metres
 PLACE_SD_MM = 1000.0
@@ -45,25 +49,19 @@ class TargetReadings:
     that makes these comparable with positions.
     """
 
-    body_mm: np.ndarray
-    body_turn: np.ndarray
-    measured_mm: np.ndarray
-    target: np.ndarray
-    place_mm: np.ndarray
-    centre_mm: np.ndarray | tuple = (0.0, 0.0, 0.0)
-    turn: np.ndarray | None = None
+    body_mm: FloatArray
+    body_turn: FloatArray
+    measured_mm: FloatArray
+    target: IntArray
+    place_mm: FloatArray
+    centre_mm: npt.ArrayLike = (0.0, 0.0, 0.0)
+    turn: FloatArray | None = None
     arm_mm: float = np.nan
 
     @property
-    def unknown(self):
+    def unknown(self) -> IntArray:
         """Numbers (u,) of the targets whose places are unknown."""
         return np.flatnonzero(np.isnan(self.place_mm).any(axis=1))
-
-    def places_of(self, unknown_mm):
-        """Places (k, 3) of all targets, those of the unknown (u, 3) among them."""
-        result = self.place_mm.copy()
-        result[self.unknown] = unknown_mm
-        return result
 
 
 @dataclass(frozen=True)
@@ -75,30 +73,30 @@ class TargetRegistration:
     (j, 3): axes about which the readings do not determine the turn.
     """
 
-    rotation: np.ndarray
-    shift_mm: np.ndarray
-    place_mm: np.ndarray
-    tool_turn: np.ndarray
-    residual_mm: np.ndarray
-    undetermined: np.ndarray
+    rotation: FloatArray
+    shift_mm: FloatArray
+    place_mm: FloatArray
+    tool_turn: FloatArray
+    residual_mm: FloatArray
+    undetermined: FloatArray
 
     @property
-    def median_mm(self):
+    def median_mm(self) -> float:
         """Median distance of the readings from the poses."""
         return float(np.median(np.linalg.norm(self.residual_mm, axis=1)))
 
     @property
-    def frame(self):
+    def frame(self) -> FloatArray:
         """Twist (6,), shift before rotation vector, of the instrument's frame: what takes the robot's frame into it."""
         back = self.rotation.T
         return np.concatenate([-back @ self.shift_mm, Rotation.from_matrix(back).as_rotvec()])
 
-    def apply(self, position_mm):
+    def apply(self, position_mm: FloatArray) -> FloatArray:
         """Positions (n, 3) of the instrument's frame in the robot's."""
-        return position_mm @ self.rotation.T + self.shift_mm
+        return np.asarray(position_mm @ self.rotation.T + self.shift_mm)
 
 
-def register_targets(readings, mirrored=False):
+def register_targets(readings: TargetReadings, mirrored: bool = False) -> TargetRegistration:
     """The TargetRegistration of least robust sum of distances of TargetReadings.
 
     mirrored: over improper rotations instead, as an instrument with a left-handed frame needs. An unknown place has a
@@ -107,18 +105,16 @@ def register_targets(readings, mirrored=False):
     """
     if len(readings.measured_mm) < 3:
         raise FitError(f"{len(readings.measured_mm)} readings of targets; allowed: at least 3, not on one line")
-    weights, rotation, last = np.ones(len(readings.measured_mm)), None, np.inf
+    linear = _eliminated(readings, np.ones(len(readings.measured_mm)))
+    starts = _starts(linear)
+    found = _completed(readings, linear, _best_rotation(linear, -starts if mirrored else starts))
     for _ in range(_MAX_REWEIGHTINGS):
-        linear = _eliminated(readings, weights)
-        starts = _starts(linear) if rotation is None else rotation[None]
-        rotation = _best_rotation(linear, -starts if mirrored and rotation is None else starts)
-        found = _completed(readings, linear, rotation)
-        if np.abs(found.residual_mm - last).max() < _MOVE_TOLERANCE_MM:
-            break
-        last = found.residual_mm
         off = np.linalg.norm(found.residual_mm, axis=1)
         bend = max(_BEND * float(np.median(off)), _MIN_BEND_MM)
-        weights = 1.0 / np.sqrt(1.0 + (off / bend) ** 2)
+        linear, last = _eliminated(readings, 1.0 / np.sqrt(1.0 + (off / bend) ** 2)), found.residual_mm
+        found = _completed(readings, linear, _best_rotation(linear, found.rotation[None]))
+        if np.abs(found.residual_mm - last).max() < _MOVE_TOLERANCE_MM:
+            break
     return found
 
 
@@ -129,24 +125,24 @@ class _Eliminated:
     centre_mm (3,): of the measured positions, which Q turns about.
     """
 
-    upper: np.ndarray
-    cross: np.ndarray
-    aim: np.ndarray
-    rest: np.ndarray
-    left: np.ndarray
-    centre_mm: np.ndarray
+    upper: FloatArray
+    cross: FloatArray
+    aim: FloatArray
+    rest: FloatArray
+    left: FloatArray
+    centre_mm: FloatArray
 
-    def residual(self, rotations):
+    def residual(self, rotations: FloatArray) -> FloatArray:
         """Residuals (m, r) of rotations (m, 3, 3)."""
-        return rotations.reshape(-1, 9) @ self.rest.T - self.left
+        return np.asarray(rotations.reshape(-1, 9) @ self.rest.T - self.left)
 
-    def slopes(self, rotations):
+    def slopes(self, rotations: FloatArray) -> FloatArray:
         """Derivative (m, r, 3) of the residual by a small turn, exp(w) Q, of rotations (m, 3, 3)."""
         generators = np.cross(_EYE[:, None, :], rotations.transpose(0, 2, 1)[:, None]).transpose(0, 1, 3, 2)
-        return np.einsum("rk,mjk->mrj", self.rest, generators.reshape(len(rotations), 3, 9))
+        return np.asarray(np.einsum("rk,mjk->mrj", self.rest, generators.reshape(len(rotations), 3, 9)))
 
 
-def _eliminated(readings, weights):
+def _eliminated(readings: TargetReadings, weights: FloatArray) -> _Eliminated:
     """The _Eliminated of TargetReadings under weights (n,) of their squares."""
     count, unknown = len(readings.measured_mm), readings.unknown
     root, centre = np.sqrt(weights)[:, None, None], np.average(readings.measured_mm, axis=0, weights=weights)
@@ -157,70 +153,64 @@ def _eliminated(readings, weights):
         columns[its, :, 3 + 3 * k : 6 + 3 * k] = readings.body_turn[its]
     known = np.nan_to_num(readings.place_mm)[readings.target]
     body = readings.body_mm + np.einsum("nij,nj->ni", readings.body_turn, known)
-    entries = _entries(readings.measured_mm - centre)
-    rows = [np.concatenate([columns, -entries, -body[:, :, None]], axis=2) * root]
+    rows = [np.concatenate([columns, -_entries(readings.measured_mm - centre), -body[:, :, None]], axis=2) * root]
     if len(unknown):
-        prior = np.zeros((len(unknown), 3, 12 + 3 * len(unknown) + 1))
         share = _READING_SD_MM / PLACE_SD_MM
-        for k in range(len(unknown)):
-            prior[k, :, 3 + 3 * k : 6 + 3 * k] = share * _EYE
+        prior = np.zeros((len(unknown), 3, 13 + 3 * len(unknown)))
+        prior[:, :, 3:-10] = share * np.eye(3 * len(unknown)).reshape(len(unknown), 3, -1)
         prior[:, :, -1] = share * np.asarray(readings.centre_mm)
         rows.append(prior)
     matrix = np.concatenate(rows).reshape(-1, 13 + 3 * len(unknown))
-    if (turned := _turned(readings)).size:
-        matrix = _with_turns(matrix, readings, turned, weights)
-    linear = matrix.shape[1] - 10
-    triangle = np.linalg.qr(np.pad(matrix, ((0, max(0, matrix.shape[1] - len(matrix))), (0, 0))), mode="r")
+    if readings.turn is not None and np.isfinite(readings.turn).all(axis=(1, 2)).any():
+        matrix = _with_turns(matrix, readings, readings.turn, weights)
+    linear, short = matrix.shape[1] - 10, max(0, matrix.shape[1] - len(matrix))
+    triangle: FloatArray = np.asarray(np.linalg.qr(np.pad(matrix, ((0, short), (0, 0))), mode="r"))
     parts = triangle[:linear, :linear], triangle[:linear, linear:-1], triangle[:linear, -1]
     return _Eliminated(*parts, triangle[linear:, linear:-1], triangle[linear:, -1], centre)
 
 
-def _entries(vectors):
+def _entries(vectors: FloatArray) -> FloatArray:
     """Derivative (n, 3, 9) of Q v by the entries of Q, row by row, of vectors (n, 3)."""
-    return np.einsum("ij,nk->nijk", _EYE, vectors).reshape(-1, 3, 9)
+    return np.asarray(np.einsum("ij,nk->nijk", _EYE, vectors).reshape(-1, 3, 9))
 
 
-def _turned(readings):
-    """Rows (k,) whose orientation is measured."""
-    if readings.turn is None:
-        return np.zeros(0, dtype=int)
-    return np.flatnonzero(np.isfinite(readings.turn).all(axis=(1, 2)))
+def _with_turns(matrix: FloatArray, readings: TargetReadings, turn: FloatArray, weights: FloatArray) -> FloatArray:
+    """The equations of positions with nine more columns, of X, before those of Q, and those of orientations (n, 3, 3).
 
-
-def _with_turns(matrix, readings, rows, weights):
-    """The equations of positions with nine more columns, of X, before those of Q, and the equations of orientations."""
-    linear = matrix.shape[1] - 10
+    Orientations are NaN where none was measured.
+    """
+    linear, rows = matrix.shape[1] - 10, np.flatnonzero(np.isfinite(turn).all(axis=(1, 2)))
     spread = np.insert(matrix, [linear], np.zeros((len(matrix), 9)), axis=1)
     turns = np.zeros((len(rows), 3, 3, spread.shape[1]))
     for column in range(3):
         # column by column of T X - Q M = 0
         turns[:, :, column, linear + column : linear + 9 : 3] = readings.body_turn[rows]
-        turns[:, :, column, linear + 9 : linear + 18] = -_entries(readings.turn[rows][:, :, column])
+        turns[:, :, column, linear + 9 : linear + 18] = -_entries(turn[rows][:, :, column])
     scale = readings.arm_mm * np.sqrt(weights[rows])
     return np.concatenate([spread, (turns * scale[:, None, None, None]).reshape(-1, spread.shape[1])])
 
 
-def _starts(linear):
+def _starts(linear: _Eliminated) -> FloatArray:
     """Rotations (m, 3, 3) to start from: a grid of all, and the rotation next to the linear solution."""
-    entries = np.linalg.lstsq(linear.rest, linear.left, rcond=1e-9)[0].reshape(3, 3)
-    return np.concatenate([_GRID, _nearest_rotation(entries)[None]])
+    entries = np.asarray(np.linalg.lstsq(linear.rest, linear.left, rcond=1e-9)[0], dtype=float)
+    return np.concatenate([_GRID, _nearest_rotation(entries.reshape(3, 3))[None]])
 
 
-def _nearest_rotation(matrix):
+def _nearest_rotation(matrix: FloatArray) -> FloatArray:
     """The rotation (3, 3) nearest to a matrix (3, 3)."""
     left, _, right = np.linalg.svd(matrix)
-    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
-def _best_rotation(linear, rotations):
+def _best_rotation(linear: _Eliminated, rotations: FloatArray) -> FloatArray:
     """The rotation (3, 3) of least cost of searches from rotations (m, 3, 3), by damped Gauss-Newton steps."""
     if len(rotations) > 1:
         rotations, cost = _descended(linear, rotations, _GRID_ITERATIONS)
         rotations = rotations[[cost.argmin()]]
-    return _descended(linear, rotations, _MAX_ITERATIONS)[0][0]
+    return np.asarray(_descended(linear, rotations, _MAX_ITERATIONS)[0][0])
 
 
-def _descended(linear, rotations, iterations):
+def _descended(linear: _Eliminated, rotations: FloatArray, iterations: int) -> tuple[FloatArray, FloatArray]:
     """Rotations (m, 3, 3) and costs (m,) after so many steps of Levenberg's and Marquardt's method."""
     residual = linear.residual(rotations)
     cost, damping = (residual**2).sum(axis=1), np.full(len(rotations), 1e-3)
@@ -241,14 +231,14 @@ def _descended(linear, rotations, iterations):
     return rotations, cost
 
 
-def _completed(readings, linear, rotation):
+def _completed(readings: TargetReadings, linear: _Eliminated, rotation: FloatArray) -> TargetRegistration:
     """The TargetRegistration of a rotation: what is linear follows from it."""
     aim = linear.aim - linear.cross @ rotation.ravel()
     unit = 1.0 / np.maximum(np.linalg.norm(linear.upper, axis=0), 1e-300)
     numbers = unit * np.linalg.lstsq(linear.upper * unit, aim, rcond=1e-12)[0]
     unknown = readings.unknown
-    place = readings.places_of(numbers[3 : 3 + 3 * len(unknown)].reshape(-1, 3))
-    tool = np.eye(3)
+    place, tool = readings.place_mm.copy(), np.eye(3)
+    place[unknown] = numbers[3 : 3 + 3 * len(unknown)].reshape(-1, 3)
     if len(numbers) > 3 + 3 * len(unknown):
         tool = _nearest_rotation(numbers[-9:].reshape(3, 3))
     shift = numbers[:3] - rotation @ linear.centre_mm

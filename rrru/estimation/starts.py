@@ -39,11 +39,13 @@ _MIN_READINGS = 3
 _AXES = "xyz"
 
 
-def register_poses(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> TargetRegistration:
+def register_poses(
+    robot: Any, poses: Any, twists: FloatArray, readings: Readings, mirrored: bool = False
+) -> TargetRegistration:
     """The TargetRegistration of Readings at Poses under twists (1, sites, 6) of a robot.
 
-    Places of the robot's `reads.fitted` are unknown, the others are where the twists have them. Raises FitError for
-    fewer than three readings at known poses.
+    Places of the robot's `reads.fitted` are unknown, the others are where the twists have them; mirrored: of an
+    instrument with a left-handed frame. Raises FitError for fewer than three readings at known poses.
     """
     _, number, place = _targets(robot, twists, readings)
     centre, turn = poses.position_mm, poses.turn
@@ -57,7 +59,7 @@ def register_poses(robot: Any, poses: Any, twists: FloatArray, readings: Reading
     arm_mm = readings.arm_mm if np.isfinite(readings.arm_mm) else robot.angle_arm_mm
     bodies = centre[known], turn[known]
     targets = readings.position_mm[known], number[known], place, robot.tool_mm
-    return register_targets(TargetReadings(*bodies, *targets, orientations, arm_mm))
+    return register_targets(TargetReadings(*bodies, *targets, orientations, arm_mm), mirrored)
 
 
 def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[str], npt.NDArray[np.int_], FloatArray]:
@@ -101,7 +103,8 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     """A measurement table in the frame of a nominal robot, unchanged where it is near or where that frame is known.
 
     Where the robot's `reads` leave the frame open and its prediction is far off, measured positions and orientations
-    are turned and shifted into the robot's frame, and unknown places of targets are replaced by those found.
+    are turned and shifted into the robot's frame, and unknown places of targets are replaced by those found. Raises
+    FitError where they fit in a left-handed frame alone.
     """
     used, reads = rows.usable(measurements), getattr(robot, "reads", None)
     if reads is None or not reads.frame or used.sum() < _MIN_READINGS:
@@ -113,13 +116,19 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     off = off[np.isfinite(off)]
     if not len(off) or np.median(off) <= FAR_SHARE_OF_SIZE * robot.size_mm:
         return measurements
+    seen, most = (robot, poses.of(used), twists, readings.of(used)), _MAX_SHARE_AFTER * float(np.median(off))
     try:
-        found = register_poses(robot, poses.of(used), twists, readings.of(used))
+        found = register_poses(*seen)
     except FitError:
         return measurements
-    if found.median_mm > _MAX_SHARE_AFTER * np.median(off):
-        return measurements
-    return _moved(measurements, robot, readings, found)
+    if found.median_mm <= most:
+        return _moved(measurements, robot, readings, found)
+    if (flipped := register_poses(*seen, mirrored=True).median_mm) <= most:
+        raise FitError(
+            f"measured positions are {found.median_mm:.3g} mm off in a right-handed frame, {flipped:.3g} mm in a "
+            "left-handed one (medians); allowed: a right-handed frame: change the sign of one measured axis"
+        )
+    return measurements
 
 
 def _moved(measurements: pd.DataFrame, robot: Any, readings: Readings, found: TargetRegistration) -> pd.DataFrame:

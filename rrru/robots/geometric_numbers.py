@@ -19,7 +19,7 @@ class Candidate:
     name: str
     unit: str
     leg: int
-    twists: dict
+    twists: dict[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Reads:
     frame: bool = False
 
 
-def open_numbers(reads):
+def open_numbers(reads: Reads) -> tuple[Candidate, ...]:
     """Candidates that Reads leave open: places of reflectors, the tool's pose where orientations tell it, the frame."""
     first = 3 if reads.fitted else 0
     tool = range(first, 6) if reads.turned and reads.frame else ()

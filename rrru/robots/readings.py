@@ -54,13 +54,13 @@ class Readings:
         """Pose (m,) of each row of a residual."""
         return np.concatenate([np.arange(len(self)), self.turned])
 
-    def of(self, rows):
+    def of(self, rows: npt.NDArray[Any]) -> "Readings":
         """The readings of some poses."""
         parts = {f.name: getattr(self, f.name) for f in fields(self)}
         return Readings(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
 
 
-def place_on_platform(robot, twists, readings=None):
+def place_on_platform(robot: Any, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
     """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
 
     Of reflectors that are fixed to the world in the robot's.

@@ -18,8 +18,9 @@ from rrru.gap.make_case import make_case
 from rrru.gap.model_fit import EffectModel, fit_named_effects
 from rrru.gap.state import State
 from rrru.robots.dynamics import Masses
+from rrru.robots.geometric_numbers import open_numbers
 from rrru.studies import setup
-from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
+from rrru.studies.real.frame_fit import FRAMES, FrameObservations, fit_frames, frame_directions, frames
 from tests.estimation.random_robots import NOISE_MM, draw_campaign
 
 SAME = 1e-6
@@ -142,11 +143,8 @@ def outcome_of(kind, seed, **options):
 
 def _least_of_frames(campaign, case, nominal):
     """Least sum of squares of frames alone, from the true ones."""
-    from rrru.robots.geometric_numbers import open_numbers
-    from rrru.studies.real.frame_fit import _directions, _FrameObservations
-
     numbers = open_numbers(case.mechanism.reads)
-    observations = _FrameObservations(case, nominal, _directions(case.mechanism, numbers))
+    observations = FrameObservations(case, nominal, frame_directions(case.mechanism))
     whole = replace(case.mechanism, among=(), sample=None, parameter_set="frame")
     true = whole.parameters.mapping(true_deviations(campaign, replace(case, mechanism=whole)))
     return least_from(observations, np.array([true[one.name] for one in numbers]))[1]

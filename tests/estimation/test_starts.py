@@ -70,6 +70,13 @@ def test_what_a_gantry_does_not_determine_stays_at_nominal():
     assert squares(case, state) < 3.0 * len(case) * (1.2 * NOISE_MM) ** 2
 
 
+def test_a_left_handed_frame_is_refused():
+    campaign = draw_campaign("arm", 4)
+    campaign.measured_mm[:, 1] *= -1.0
+    with pytest.raises(FitError, match=r"left-handed one .* allowed: a right-handed frame: change the sign of one"):
+        case_of(campaign)
+
+
 class _Line:
     """Readings of the sum of two parameters."""
 

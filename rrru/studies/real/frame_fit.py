@@ -37,7 +37,7 @@ def frames(robot: Robot) -> Effect:
     limits = {"mm": _INSTRUMENT_SD_MM, "rad": np.pi}
     bounds = ((one, limits[one.unit]) for one in numbers)
     parameters = ParameterSet(tuple(Parameter(one.name, one.unit, 0.0, -most, most, "free") for one, most in bounds))
-    directions = _directions(robot, numbers)
+    directions = frame_directions(robot)
     typical = [1.0 if one.unit == "mm" else 1e-3 for one in numbers]
 
     def place(_motion, values):
@@ -47,13 +47,13 @@ def frames(robot: Robot) -> Effect:
     return Effect(FRAMES, parameters, plain_coordinates(parameters, typical), place)
 
 
-def _directions(robot: Robot, numbers: Sequence[Candidate]) -> FloatArray:
-    """Twists (sites, 6, c) of a unit of each number."""
-    return np.stack([direction(robot.legs, one) for one in numbers], axis=-1)
+def frame_directions(robot: Robot) -> FloatArray:
+    """Twists (sites, 6, c) of a unit of each coordinate of `frames`."""
+    return np.stack([direction(robot.legs, one) for one in open_numbers(robot.reads)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameObservations:
+class FrameObservations:
     """Readings of a Case as `rrru.estimation.problem.Observations` of the coordinates (c,) of its frames alone."""
 
     case: Case
@@ -84,7 +84,7 @@ def fit_frames(case: Case, state: State) -> State:
     where it does not converge, naming the parameters that the readings do not determine.
     """
     numbers = open_numbers(case.mechanism.reads)
-    observations = _FrameObservations(case, state, _directions(case.mechanism, numbers))
+    observations = FrameObservations(case, state, frame_directions(case.mechanism))
     sd = [np.inf if one.unit == "rad" else _INSTRUMENT_SD_MM if WORLD in one.twists else PLACE_SD_MM for one in numbers]
     block = Block.of(FRAMES, [one.name for one in numbers], [one.unit for one in numbers], sd)
     problem = Problem(observations, Parameters((block,)), observations.whiten)
@@ -94,11 +94,13 @@ def fit_frames(case: Case, state: State) -> State:
     return observations.state_at(estimate.values)
 
 
-def _start(observations: _FrameObservations, numbers: Sequence[Candidate]) -> FloatArray:
+def _start(observations: FrameObservations, numbers: Sequence[Candidate]) -> FloatArray:
     """Coordinates (c,) of the frames by registration of the used points; zero where nothing determines them."""
     case, nothing = observations.case, np.zeros(len(numbers))
     if case.mechanism.reads.frame:
         poses, twists = case.posed(observations.state_at(nothing))
+        # those of effects differ from row to row; a start may take their mean
+        twists = (twists[case.used] if len(twists) > 1 else twists).mean(axis=0, keepdims=True)
         readings = case.readings or Readings(rows.measured(case.measurements))
         with suppress(FitError):
             found = frame_values(case.mechanism, poses.of(case.used), twists, readings.of(case.used))
