@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 FAR_SHARE_OF_SIZE = 2e-3
 # an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zeros of drives, which
 # `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
-_MAX_SHARE_AFTER = 0.1
+_MAX_SHARE_AFTER = 0.02
 # residual at which a reading begins to count less while zeros of drives are far off
 _BEND_MM = 5.0
 _MIN_READINGS = 3
@@ -116,7 +116,8 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     off = off[np.isfinite(off)]
     if not len(off) or np.median(off) <= FAR_SHARE_OF_SIZE * robot.size_mm:
         return measurements
-    seen, most = (robot, poses.of(used), twists, readings.of(used)), _MAX_SHARE_AFTER * float(np.median(off))
+    seen = robot, poses.of(used), twists, readings.of(used)
+    most = max(FAR_SHARE_OF_SIZE * robot.size_mm, _MAX_SHARE_AFTER * float(np.median(off)))
     try:
         found = register_poses(*seen)
     except FitError:
