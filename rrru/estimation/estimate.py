@@ -45,7 +45,7 @@ class Estimate:
 
     values (p,); covariance (p, p): of the posterior, linearised at the values, zero for a parameter at a bound and inf
     on the diagonal of one that neither readings nor prior determine; at_bound (p,): which parameters a bound holds;
-    end: how the search ended; readings_triangle (p + 1, p + 1): of the whitened readings, derivative and residual.
+    end: how the search ended.
     """
 
     problem: Problem
@@ -53,17 +53,24 @@ class Estimate:
     covariance: FloatArray
     at_bound: BoolArray
     end: SearchEnd
-    readings_triangle: FloatArray
 
     @classmethod
-    def at(cls, problem: Problem, values: FloatArray, readings: FloatArray, free: BoolArray, end: SearchEnd) -> Self:
-        """The Estimate at values (p,) from the readings' triangle there; free (p,): what no bound holds.
+    def at(cls, problem: Problem, values: FloatArray, white: FloatArray, free: BoolArray, end: SearchEnd) -> Self:
+        """The Estimate at values (p,) from whitened derivative and residual (n, p + 1) there.
+
+        free (p,): what no bound holds.
 
         Where a prior is a mixture the values move to the mean over its components, each weighted by its evidence on
         the linearisation, and the covariance is that of the mixture.
         """
-        moved, covariance = _over_mixtures(readings, problem.parameters, values, free)
-        return cls(problem, problem.parameters.clipped(values + moved), covariance, ~free, end, readings)
+        moved, covariance = _over_mixtures(white, problem.parameters, values, free)
+        return cls(problem, problem.parameters.clipped(values + moved), covariance, ~free, end)
+
+    @cached_property
+    def readings_triangle(self) -> FloatArray:
+        """Triangle (p + 1, p + 1) of the whitened readings' derivative by the parameters and of their residual."""
+        columns = self.problem.whiten(self.problem.observations.jacobian(self.values)).reshape(-1, len(self.values))
+        return triangle_of(np.column_stack([columns, self.standardized_residual.ravel()]))
 
     @cached_property
     def _seen(self) -> tuple[FloatArray, FloatArray]:
@@ -168,10 +175,12 @@ def triangle_of(rows: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
-def with_prior(readings: FloatArray, root: FloatArray, off: FloatArray) -> FloatArray:
-    """The triangle (p + 1, p + 1) of readings together with priors: roots (p,) of precisions, means missed by off."""
+def with_prior(white: FloatArray, root: FloatArray, off: FloatArray) -> FloatArray:
+    """The triangle (p + 1, p + 1) of whitened readings (n, p + 1) and priors: roots (p,) of precisions, means missed
+    by off (p,).
+    """
     prior = np.column_stack([np.diag(root), off])[root > 0.0]
-    return triangle_of(np.concatenate([readings, prior]))
+    return triangle_of(np.concatenate([white, prior]))
 
 
 def _seen_by_readings(columns: FloatArray, parameters: Parameters) -> tuple[FloatArray, FloatArray]:
@@ -186,7 +195,7 @@ def _seen_by_readings(columns: FloatArray, parameters: Parameters) -> tuple[Floa
 
 
 def _over_mixtures(
-    readings: FloatArray, parameters: Parameters, values: FloatArray, free: BoolArray
+    white: FloatArray, parameters: Parameters, values: FloatArray, free: BoolArray
 ) -> tuple[FloatArray, FloatArray]:
     """Step (p,) from the values to the posterior mean, zero without mixtures, and the covariance (p, p).
 
@@ -195,7 +204,7 @@ def _over_mixtures(
     """
     mixed = np.flatnonzero(np.isfinite(parameters.wide_sd) & free)
     sd = np.where(np.isfinite(parameters.wide_sd), parameters.wide_sd, parameters.sd)
-    step, covariance = _posterior(readings, sd, parameters.mean - values, free)
+    step, covariance = _posterior(white, sd, parameters.mean - values, free)
     if not len(mixed):
         return np.zeros(len(values)), covariance
     own, off = covariance[np.ix_(mixed, mixed)], (parameters.mean - values - step)[mixed]
@@ -218,17 +227,16 @@ def _over_mixtures(
     return mean, covariance - taken + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _posterior(
-    readings: FloatArray, sd: FloatArray, mean: FloatArray, free: BoolArray
-) -> tuple[FloatArray, FloatArray]:
+def _posterior(white: FloatArray, sd: FloatArray, mean: FloatArray, free: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Mean step (p,) and covariance (p, p) of the linearised problem.
 
     sd, mean (p,): of the normal priors, the mean as a step from where it is linearised; free (p,): the others are held.
     """
     root = 1.0 / sd
     count = len(sd)
-    triangle = with_prior(readings, root, -root * np.where(np.isfinite(sd), mean, 0.0))
-    triangle = triangle_of(triangle[:, [*np.flatnonzero(free), count]])
+    triangle = with_prior(white, root, -root * np.where(np.isfinite(sd), mean, 0.0))
+    if not free.all():
+        triangle = triangle_of(triangle[:, [*np.flatnonzero(free), count]])
     columns, target = triangle[:-1, :-1], triangle[:-1, -1]
     length = np.linalg.norm(columns, axis=0)
     unit = 1.0 / np.where(length > 0.0, length, 1.0)

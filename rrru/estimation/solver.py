@@ -112,29 +112,34 @@ class _Search:
         cost = 0.5 * scale**2 * float(loss((white / scale) ** 2).sum())
         return white, cost + self._problem.parameters.prior_cost(values)
 
-    def _linearized(self) -> tuple[FloatArray, FloatArray]:
-        """Triangle (p + 1, p + 1) of the whitened readings, and of these with the prior, linearised where it stands.
+    def _linearized(self) -> FloatArray:
+        """Derivative and residual (n a, p + 1) of the whitened readings where the search stands.
 
-        The last column is the residual's. Readings under a robust loss have the weight rho' (iteratively reweighted
-        least squares).
+        Readings under a robust loss have the weight rho' (iteratively reweighted least squares).
         """
-        problem, values, count = self._problem, self.values, len(self.values)
-        columns = problem.whiten(problem.observations.jacobian(values)).reshape(-1, count)
+        problem, count = self._problem, len(self.values)
+        columns = problem.whiten(problem.observations.jacobian(self.values)).reshape(-1, count)
         white = np.column_stack([columns, self.residual.ravel()])
         if problem.loss != "linear":
             squares = (self.residual.ravel() / problem.loss_scale) ** 2
             white = white * np.sqrt(_LOSSES[problem.loss][1](squares))[:, None]
-        readings = triangle_of(white)
-        root = np.sqrt(problem.parameters.prior_precision(values))
-        return readings, with_prior(readings, root, root * (values - problem.parameters.mean))
+        return white
+
+    def _penalized(self, white: FloatArray) -> FloatArray:
+        """Triangle (p + 1, p + 1) of whitened readings (n a, p + 1) and the priors."""
+        parameters = self._problem.parameters
+        root = np.sqrt(parameters.prior_precision(self.values))
+        return with_prior(white, root, root * (self.values - parameters.mean))
 
     def run(self) -> None:
         """Search until the options say that it has ended."""
         options, damping, growth = self._options, self._options.first_damping, 2.0
         for _ in range(options.max_iterations):
-            _, triangle = self._linearized()
+            triangle = self._penalized(self._linearized())
             free = np.flatnonzero(self._free(triangle))
-            own, sd = triangle_of(triangle[:, [*free, len(self.values)]]), self._problem.parameters.sd[free]
+            own, sd = triangle, self._problem.parameters.sd[free]
+            if len(free) < len(self.values):
+                own = triangle_of(triangle[:, [*free, len(self.values)]])
             least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
             if _step(own, sd, _LEAST_DAMPING)[1] <= least:
                 self._end()
@@ -174,9 +179,9 @@ class _Search:
 
     def estimate(self, evaluations: int) -> Estimate:
         """The Estimate of where the search ended."""
-        readings, triangle = self._linearized()
+        white = self._linearized()
         end = SearchEnd(self.converged, self.straight, self.message, self.cost, evaluations)
-        return Estimate.at(self._problem, self.values, readings, self._free(triangle), end)
+        return Estimate.at(self._problem, self.values, white, self._free(self._penalized(white)), end)
 
 
 def _step(triangle: FloatArray, sd: FloatArray, damping: float) -> tuple[FloatArray, float]:

@@ -20,7 +20,7 @@ from rrru.estimation.explain import explain_end
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
-from rrru.estimation.solver import solve
+from rrru.estimation.solver import SolverOptions, solve
 from rrru.gap.state import State
 from rrru.gap.terms import Term, spread
 from rrru.gap.weight import NARROW_SHARE, WEIGHT
@@ -32,6 +32,8 @@ GEOMETRY = "geometry"
 _STEP, _NOTHING = 1e-4, 1e-3
 # ASSUME an effect's coefficients are rarely more than this many times their typical size
 PRIOR_TIMES_TYPICAL = 20.0
+# a thousandth of a standard error is far below what any verdict depends on
+_OPTIONS = SolverOptions(step_tolerance=1e-3)
 # fits whose log posterior densities differ by less are equally good
 _EQUAL_NATS = 1.0
 
@@ -274,7 +276,7 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
         candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
-        fits.append(solve(problem, [candidate]))
+        fits.append(solve(problem, [candidate], _OPTIONS))
         if fits[-1].end.straight and fits[-1].end.converged:
             break
     enough = min(one.end.cost for one in fits) + _EQUAL_NATS
