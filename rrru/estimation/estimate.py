@@ -22,6 +22,8 @@ _FLAT = 1e9
 _AS_PRIOR = 1.0
 # more columns than this are factored by their products, many times faster, with half the digits of the least seen ones
 _MANY = 200
+# added to their scaled products, about the rounding of these
+_RIDGE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,8 @@ def triangle_of(rows: FloatArray) -> FloatArray:
         squares = rows.T @ rows
         size = np.sqrt(np.maximum(np.diag(squares), 1e-300))
         try:
-            return np.asarray(np.linalg.cholesky(squares / np.outer(size, size)).T * size)
+            scaled = squares / np.outer(size, size) + _RIDGE * np.eye(len(size))
+            return np.asarray(np.linalg.cholesky(scaled).T * size)
         except np.linalg.LinAlgError:
             # columns that depend on each other: by orthogonal transformations instead
             pass

@@ -137,15 +137,18 @@ class _Search:
         for _ in range(options.max_iterations):
             triangle = self._penalized(self._linearized())
             free = np.flatnonzero(self._free(triangle))
-            own, sd = triangle, self._problem.parameters.sd[free]
-            if len(free) < len(self.values):
-                own = triangle_of(triangle[:, [*free, len(self.values)]])
+            own = _Linearized(
+                triangle if len(free) == len(self.values) else triangle_of(triangle[:, [*free, len(self.values)]]),
+                self._problem.parameters.sd[free],
+                (self._problem.parameters.low - self.values)[free],
+                (self._problem.parameters.high - self.values)[free],
+            )
             least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
-            if _step(own, sd, _LEAST_DAMPING)[1] <= least:
+            if own.step(_LEAST_DAMPING)[1] <= least:
                 self._end()
                 return
             while True:
-                change, foreseen = _step(own, sd, damping)
+                change, foreseen = own.step(damping)
                 step = np.zeros(len(self.values))
                 step[free] = change
                 trial = self._problem.parameters.clipped(self.values + step)
@@ -184,18 +187,36 @@ class _Search:
         return Estimate.at(self._problem, self.values, white, self._free(self._penalized(white)), end)
 
 
-def _step(triangle: FloatArray, sd: FloatArray, damping: float) -> tuple[FloatArray, float]:
-    """Damped Gauss-Newton step (k,) of a linearised problem (k + 1, k + 1), and by how much it lowers the objective.
+@dataclass(frozen=True, eq=False)
+class _Linearized:
+    """A linearised problem: triangle (k + 1, k + 1), priors' sd (k,), and bounds low, high (k,) of the step."""
 
-    sd (k,): of the priors, in which the parameters count; those of flat priors count by the length of their column.
-    damping: as a share of the largest curvature.
-    """
-    columns, target, count = triangle[:, :-1], triangle[:, -1], triangle.shape[1] - 1
-    length = np.linalg.norm(columns, axis=0)
-    unit = np.where(np.isfinite(sd), sd, 1.0 / np.where(length > 0.0, length, 1.0))
-    size = np.sqrt(damping) * max(float((length * unit).max(initial=0.0)), 1e-300)
-    brake = np.column_stack([size * np.eye(count), np.zeros(count)])
-    damped = triangle_of(np.concatenate([np.column_stack([columns * unit, target]), brake]))
-    step = -unit * solve_triangular(damped[:count, :count], damped[:count, -1])
-    moved = columns @ step
-    return step, -float(target @ moved + 0.5 * moved @ moved)
+    triangle: FloatArray
+    sd: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def step(self, damping: float) -> tuple[FloatArray, float]:
+        """Damped Gauss-Newton step (k,) within the bounds, and by how much it lowers the objective.
+
+        Parameters count in units of their priors, those of flat priors by the length of their column. damping: as a
+        share of the largest curvature. A parameter that would leave its bounds is put there, and the others follow.
+        """
+        columns, target, count = self.triangle[:, :-1], self.triangle[:, -1], len(self.sd)
+        length = np.linalg.norm(columns, axis=0)
+        unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
+        size = np.sqrt(damping) * max(float((length * unit).max(initial=0.0)), 1e-300)
+        free, step = np.ones(count, dtype=bool), np.zeros(count)
+        while free.any():
+            rest = target + columns[:, ~free] @ step[~free]
+            own = np.column_stack([columns[:, free] * unit[free], rest])
+            brake = np.column_stack([size * np.eye(int(free.sum())), np.zeros(int(free.sum()))])
+            damped = triangle_of(np.concatenate([own, brake]))
+            step[free] = -unit[free] * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
+            beyond = free & ((step < self.low) | (step > self.high))
+            if not beyond.any():
+                break
+            step[beyond] = np.clip(step, self.low, self.high)[beyond]
+            free &= ~beyond
+        moved = columns @ step
+        return step, -float(target @ moved + 0.5 * moved @ moved)
