@@ -127,11 +127,13 @@ class Estimate:
 def triangle_of(rows: FloatArray) -> FloatArray:
     """Upper triangle (k, k) with the same sums of squares and products as rows (n, k)."""
     short = max(rows.shape[1] - len(rows), 0)
-    return np.asarray(np.linalg.qr(np.pad(rows, ((0, short), (0, 0))), mode="r"))
+    return np.asarray(np.linalg.qr(np.pad(rows, ((0, short), (0, 0))) if short else rows, mode="r"))
 
 
 def with_prior(readings: FloatArray, root: FloatArray, off: FloatArray) -> FloatArray:
     """The triangle (p + 1, p + 1) of readings together with priors: roots (p,) of precisions, means missed by off."""
+    if not root.any():
+        return readings
     prior = np.column_stack([np.diag(root), off])[root > 0.0]
     return triangle_of(np.concatenate([readings, prior]))
 
