@@ -65,7 +65,7 @@ class LengthFit:
     @cached_property
     def places_mm(self) -> FloatArray:
         """Places (N, d), measured or estimated."""
-        return self.lengths.places(self.values)
+        return np.asarray(self.lengths.places(self.values))
 
     @property
     def residual_mm(self) -> FloatArray:
@@ -115,7 +115,7 @@ class LengthFit:
         covariance = np.where(np.isinf(self.estimate.covariance), 0.0, self.estimate.covariance)
         leverage = self.lengths.place_leverage(self.values) + np.einsum("ikp,pq,ikq->ik", slopes, covariance, slopes)
         # the error of a reading left out and of its prediction add
-        return np.where(self.used, 1.0 - leverage, 1.0 + leverage)
+        return np.asarray(np.where(self.used, 1.0 - leverage, 1.0 + leverage))
 
     @property
     def bad(self) -> npt.NDArray[np.int_]:

@@ -66,7 +66,7 @@ class Lengths:
     def dimensions(self) -> int:
         """Number of coordinates d of a place."""
         readings, anchors = self.routing.shape
-        return (len(self.origin) - 2 * readings) // anchors
+        return int((len(self.origin) - 2 * readings) // anchors)
 
     @property
     def eliminated(self) -> int:
@@ -81,7 +81,7 @@ class Lengths:
     @property
     def redundancy(self) -> int:
         """Number of readings in use above that of all parameters, the rows' included."""
-        return int(self.weight.sum()) - self.eliminated * len(self) - self.basis.shape[1]
+        return int(self.weight.sum()) - self.eliminated * len(self) - int(self.basis.shape[1])
 
     def rows(self, chosen: npt.NDArray[np.bool_ | np.int_]) -> "Lengths":
         """The rows that a mask (N,) or their numbers choose."""
@@ -120,7 +120,8 @@ class Lengths:
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Read less modelled lengths (N, k) in mm at values (p,)."""
         anchors, start, factor = self.machine(values)
-        return start + factor * self.counted - self._distances(anchors, self.places(values))[1] @ self.routing.T
+        modelled = self._distances(anchors, self.places(values))[1] @ self.routing.T
+        return np.asarray(start + factor * self.counted - modelled)
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
         """Derivative (N, k, p) of the residual by the values, the eliminated places following."""
@@ -141,7 +142,7 @@ class Lengths:
         if not self.eliminated:
             return columns
         by_place, gain = self._places_gain(values)
-        return columns - by_place @ (gain @ columns)
+        return np.asarray(columns - by_place @ (gain @ columns))
 
     def place_leverage(self, values: FloatArray) -> FloatArray:
         """Share (N, k) of every reading's variance that the eliminated place of its row takes, at values (p,)."""

@@ -16,7 +16,7 @@ from tests.estimation.observations.machines import machine, starts, values_of
 
 @pytest.mark.parametrize(("count", "dimensions"), [(3, 2), (4, 2), (7, 3)])
 def test_slopes_are_finite_differences(count, dimensions):
-    lengths, anchors, places = machine(1, count, dimensions, common=True)
+    lengths, _, places = machine(1, count, dimensions, common=True)
     full = np.eye(len(lengths.origin))
     routing = np.random.default_rng(2).integers(0, 3, (count, count)).astype(float)
     lengths = replace(lengths, basis=full, routing=routing, places_mm=places)
