@@ -149,7 +149,7 @@ class Lengths:
         if not self.eliminated:
             return np.zeros(self.counted.shape)
         by_place = self.slopes(values)[1]
-        return np.einsum("ikd,ide,ike->ik", by_place, _inverse(by_place, self.weight), by_place)
+        return np.asarray(np.einsum("ikd,ide,ike->ik", by_place, _inverse(by_place, self.weight), by_place))
 
     def normalization(self, values: FloatArray) -> tuple[int, float]:
         """Number of readings in use less that of eliminated places' coordinates, and the log of a constant factor.

@@ -59,7 +59,7 @@ class Multilateration:
         if len(found) == 1:
             return found[0][0]
         best = np.array([loss for _, loss in found]).argmin(axis=0)
-        return np.array([places for places, _ in found])[best, np.arange(len(self.lengths))]
+        return np.asarray(np.array([places for places, _ in found])[best, np.arange(len(self.lengths))])
 
     def least_cauchy(self, cauchy_mm: float) -> FloatArray:
         """Places (N, d) of least Cauchy loss, which bends at cauchy_mm."""
