@@ -30,7 +30,6 @@ _MIN_CHECKED = 0.02
 _STANDS_OUT = 5.0
 # probability from which a smooth error is named, and the logarithm of its odds
 _SURE, _ODDS = 0.9, np.log(9.0)
-_DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,26 +241,3 @@ def predict_held_out(fit, held_out=None):
         checked = 1.0 - out.place_leverage(values)
         errors[part] = out.residual(values) / np.sqrt(np.where(checked > _MIN_CHECKED, checked, np.nan))
     return np.where(fit.used, errors, np.nan)
-
-
-def rms(values):
-    """Root mean square of the values that are not NaN."""
-    return float(np.sqrt(np.nanmean(values**2)))
-
-
-def share_closed(before, after, noise_mm):
-    """Share of the gap that errors (N, k) close, and its 95 % interval by drawing blocks of neighbouring rows."""
-    generator = np.random.default_rng(_SEED)
-    blocks = np.array_split(np.arange(len(before)), min(_BLOCKS, len(before)))
-    counts = np.array([np.isfinite(before[block]).sum() for block in blocks])
-    first, second = (np.array([np.nansum(one[block] ** 2) for block in blocks]) for one in (before, after))
-    drawn = generator.integers(len(counts), size=(_DRAWS, len(counts)))
-
-    def share(chosen):
-        total = np.maximum(counts[chosen].sum(axis=-1), 1)
-        gaps = [np.sqrt(np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0)) for one in (first, second)]
-        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-12), -1.0), 0.0)
-
-    value = float(share(np.arange(len(counts))))
-    low, high = np.quantile(share(drawn), [0.025, 0.975])
-    return value, float(min(low, value)), float(max(high, value))

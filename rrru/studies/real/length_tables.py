@@ -3,10 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.real.length_laws import UNEXPLAINED, predict_held_out, rms, share_closed
+from rrru.studies.real.length_laws import UNEXPLAINED, predict_held_out
 
 # rows that a note names
 _NAMED = 10
+# of the bootstrap of blocks of rows
+_DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
 def parameter(name, unit, value, standard_error, nominal, note):
@@ -113,3 +115,26 @@ def points(case, chosen, readings, rows):
         columns |= {f"{prefix}{axis}_mm": np.repeat(places[:, k], count) for k, axis in enumerate("xyz")}
         columns |= {f"{prefix}residual_mm": fit.residual_mm.ravel()}
     return pd.DataFrame(columns | {"used": case.used.ravel(), "stands_out": case.suspect.ravel()})
+
+
+def rms(values):
+    """Root mean square of the values that are not NaN."""
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def share_closed(before, after, noise_mm):
+    """Share of the gap that errors (N, k) close, and its 95 % interval by drawing blocks of neighbouring rows."""
+    generator = np.random.default_rng(_SEED)
+    blocks = np.array_split(np.arange(len(before)), min(_BLOCKS, len(before)))
+    counts = np.array([np.isfinite(before[block]).sum() for block in blocks])
+    first, second = (np.array([np.nansum(one[block] ** 2) for block in blocks]) for one in (before, after))
+    drawn = generator.integers(len(counts), size=(_DRAWS, len(counts)))
+
+    def share(chosen):
+        total = np.maximum(counts[chosen].sum(axis=-1), 1)
+        gaps = [np.sqrt(np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0)) for one in (first, second)]
+        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-12), -1.0), 0.0)
+
+    value = float(share(np.arange(len(counts))))
+    low, high = np.quantile(share(drawn), [0.025, 0.975])
+    return value, float(min(low, value)), float(max(high, value))
