@@ -139,5 +139,7 @@ class Parameters:
         plain = np.isfinite(self.sd) & np.isnan(self.wide_sd)
         cost = 0.5 * float(((off[plain] / self.sd[plain]) ** 2).sum())
         mixed = np.isfinite(self.wide_sd)
+        if not mixed.any():
+            return cost
         sds = np.stack([self.sd[mixed], self.wide_sd[mixed]])
         return cost - float(logsumexp(-0.5 * (off[mixed] / sds) ** 2 - np.log(sds), axis=0).sum())

@@ -20,8 +20,8 @@ import numpy as np
 import pandas as pd
 from scipy import linalg
 
-from rrru.fit.lengths_model import LengthModel
-from rrru.fit.lengths_start import starts as length_starts
+from rrru.estimation.observations.length_starts import propose_anchors
+from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
 from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, frame_columns, ways_of
 from rrru.studies.real.lengths_section import MM, Section, held_out, numbers, row_numbers
@@ -79,8 +79,7 @@ def length_case(frame, read):
         read.refuse("unit", told, "belts longer than their heights_mm")
     basis, _ = frame_columns(count, dimensions, count)
     origin = np.append(np.zeros(count * dimensions + count), np.ones(count))
-    names = tuple(f"frame_{number}" for number in range(basis.shape[1]))
-    bare = LengthModel(counted, np.eye(count), heights, origin, basis, names)
+    bare = Lengths(counted, np.eye(count), heights, origin, basis)
     return LengthCase(bare, {MISSING: _missing(bare, belts), SCALE: _scale(bare)}, _starts), belts
 
 
@@ -103,12 +102,12 @@ def _scale(bare):
     return ways_of(SCALE, told, lambda columns: np.full(columns.shape[1], _SCALE_RANGE))
 
 
-def _starts(model):
-    """Starts (theta, places) out of the lengths themselves."""
-    inverse = np.linalg.pinv(model.basis)
-    for anchors, places, missing in length_starts(model.counted, model.heights_mm, model.dimensions):
+def _starts(lengths):
+    """Values (p,) to start from, out of the lengths themselves."""
+    inverse = np.linalg.pinv(lengths.basis)
+    for anchors, missing in propose_anchors(lengths.counted, lengths.heights_mm, lengths.dimensions):
         full = np.concatenate([anchors.ravel(), np.full(len(anchors), missing), np.ones(len(anchors))])
-        yield inverse @ (full - model.origin), places
+        yield inverse @ (full - lengths.origin)
 
 
 def _chain(case, chosen):
@@ -122,7 +121,7 @@ def _chain(case, chosen):
 def _first_missing(hypothesis):
     """Missing length of the first belt in mm and its standard error."""
     fit = hypothesis.fit
-    return fit.model.numbers(fit.theta)[1][0], length_tables.split(fit, hypothesis.standard_errors)[1][0]
+    return fit.lengths.machine(fit.values)[1][0], fit.lengths.split(hypothesis.standard_errors)[1][0]
 
 
 def _common(case, chosen):
@@ -134,8 +133,8 @@ def _common(case, chosen):
 def _parameters(case, chosen, belts):
     """Rows of real_parameters: anchors, missing lengths and scales under the chosen laws."""
     fit = chosen.fit
-    _, missing, scale = fit.model.numbers(fit.theta)
-    _, missing_errors, scale_errors = length_tables.split(fit, chosen.standard_errors)
+    _, missing, scale = fit.lengths.machine(fit.values)
+    _, missing_errors, scale_errors = fit.lengths.split(chosen.standard_errors)
     rows = length_tables.anchors(case, chosen, belts, "in the frame of the first two anchors")
     common = _common(case, chosen)
     if common is not None:
@@ -161,7 +160,7 @@ def _alike_words(hypothesis):
     """What the standard error of a missing length would be, were it not that neighbouring rows err alike."""
     if not hypothesis.alike:
         return ""
-    error = length_tables.split(hypothesis.fit, hypothesis.fit.standard_errors)[1][0]
+    error = hypothesis.fit.lengths.split(hypothesis.fit.standard_errors)[1][0]
     return f"+- {error:.1f} mm if neighbouring rows did not err alike, which they do"
 
 
@@ -181,7 +180,7 @@ def _words(case, verdict, belts):
     if SCALE in effects:
         where.append("scale of each belt")
         rivals += ["belt_stretch", "drum_radius"]
-        scale = chosen.fit.model.numbers(chosen.fit.theta)[2] - 1.0
+        scale = chosen.fit.lengths.machine(chosen.fit.values)[2] - 1.0
         low, high = int(scale.argmin()), int(scale.argmax())
         notes.append(
             f"Belt {belts[high]} is longer than counted by {1e3 * scale[high]:.2f} mm per m and {belts[low]} by"
@@ -192,7 +191,7 @@ def _words(case, verdict, belts):
         rivals.append(SCALE)
     if UNEXPLAINED in effects:
         notes.append(
-            f"{chosen.evidence.smooth_mm:.1f} mm are left that follow the place smoothly and that no law here explains"
+            f"{chosen.smooth_mm:.1f} mm are left that follow the place smoothly and that no law here explains"
             " (tension, arms that swing and heights are not measured)."
         )
     next_runs = "one tape measurement between two anchors: lengths alone do not tell a scale that all belts share"
@@ -208,8 +207,8 @@ def _misses(laws):
 
 def _missing_words(case, chosen, law, belts):
     """What misses, and how wrong the frame is without it."""
-    _, missing, _ = chosen.fit.model.numbers(chosen.fit.theta)
-    error = length_tables.split(chosen.fit, chosen.standard_errors)[1]
+    _, missing, _ = chosen.fit.lengths.machine(chosen.fit.values)
+    error = chosen.fit.lengths.split(chosen.standard_errors)[1]
     acting = np.flatnonzero(error > 0.0)
     if law is case.laws[MISSING][0]:
         side = "longer" if missing[0] > 0.0 else "shorter"
@@ -243,5 +242,5 @@ def _none_missing_words(case, chosen):
 
 def _size_mm(fit):
     """Distance between the first two anchors in mm."""
-    first, second, *_ = fit.model.numbers(fit.theta)[0]
+    first, second, *_ = fit.lengths.machine(fit.values)[0]
     return float(np.linalg.norm(second - first))

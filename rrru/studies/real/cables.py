@@ -22,7 +22,7 @@ radii larger by this factor: lengths do not tell the two apart.
 import numpy as np
 import pandas as pd
 
-from rrru.fit.lengths_model import LengthModel
+from rrru.estimation.observations.lengths import Lengths
 from rrru.studies.real import length_tables
 from rrru.studies.real.length_laws import UNEXPLAINED, LengthCase, ways_of
 from rrru.studies.real.lengths_section import MM, RAD, Section, held_out, numbers, row_numbers
@@ -78,10 +78,9 @@ def cable_case(frame, read):
     places = MM[read.choice("unit", "mm", tuple(MM))] * values[:, len(drums) :]
     free, count = len(anchors) * len(columns) + len(drums), len(drums)
     origin = np.append(np.zeros(free), radii)
-    names = tuple(f"frame_{number}" for number in range(free))
     heights = read.heights("heights_mm", anchors)
     _check_lengths(read, wanted, angles * radii, routing, places)
-    bare = LengthModel(angles, routing, heights, origin, np.eye(free + count)[:, :free], names, places)
+    bare = Lengths(angles, routing, heights, origin, np.eye(free + count)[:, :free], places)
     return LengthCase(bare, {RADIUS: _radii(bare, tuple(drums), np.array(radii))}, _starts), tuple(drums), anchors
 
 
@@ -132,24 +131,24 @@ def _radii(bare, drums, radii):
     return ways_of(RADIUS, told, lambda columns: np.full(columns.shape[1], reach))
 
 
-def _starts(model):
-    """Starts (theta, places): anchors anywhere about the seen places, start lengths as these ask."""
-    generator, inverse = np.random.default_rng(_SEED), np.linalg.pinv(model.basis)
-    middle, span = model.places_mm.mean(axis=0), np.ptp(model.places_mm, axis=0).max()
-    readings, count = model.routing.shape
+def _starts(lengths):
+    """Values (p,) to start from: anchors anywhere about the seen places, start lengths as these ask."""
+    generator, inverse = np.random.default_rng(_SEED), np.linalg.pinv(lengths.basis)
+    middle, span = lengths.places_mm.mean(axis=0), np.ptp(lengths.places_mm, axis=0).max()
+    readings, count = lengths.routing.shape
     for _ in range(_STARTS):
-        anchors = middle + span * generator.uniform(-_FAR, _FAR, (count, model.dimensions)) * generator.uniform()
-        full = np.concatenate([anchors.ravel(), np.zeros(readings), model.origin[-readings:]])
-        left = model.residual(inverse @ (full - model.origin), model.places_mm)
+        anchors = middle + span * generator.uniform(-_FAR, _FAR, (count, lengths.dimensions)) * generator.uniform()
+        full = np.concatenate([anchors.ravel(), np.zeros(readings), lengths.origin[-readings:]])
+        left = lengths.residual(inverse @ (full - lengths.origin))
         full[-2 * readings : -readings] = -left.mean(axis=0)
-        yield inverse @ (full - model.origin), model.places_mm
+        yield inverse @ (full - lengths.origin)
 
 
 def _parameters(case, chosen, drums, anchors):
     """Rows of real_parameters: anchors and start lengths under the verdict's laws, radii each free."""
     fit = chosen.fit
-    parameter, start = length_tables.parameter, fit.model.numbers(fit.theta)[1]
-    start_errors = length_tables.split(fit, chosen.standard_errors)[1]
+    parameter, start = length_tables.parameter, fit.lengths.machine(fit.values)[1]
+    start_errors = fit.lengths.split(chosen.standard_errors)[1]
     rows = length_tables.anchors(case, chosen, anchors, "in the camera's frame")
     rows += [
         parameter(f"{drum}_start", "mm", start[k], start_errors[k], np.nan, "cable at the drum's zero")
@@ -159,8 +158,8 @@ def _parameters(case, chosen, drums, anchors):
     if free is None:
         return rows
     note = "" if free is chosen else "with all radii free, which is not the verdict"
-    radius = free.fit.model.numbers(free.fit.theta)[2]
-    spread = length_tables.split(free.fit, free.standard_errors)[2]
+    radius = free.fit.lengths.machine(free.fit.values)[2]
+    spread = free.fit.lengths.split(free.standard_errors)[2]
     nominal = case.bare.origin[-len(drums) :]
     return rows + [
         parameter(f"{drum}_radius", "mm", radius[k], spread[k], nominal[k], note) for k, drum in enumerate(drums)
@@ -170,15 +169,15 @@ def _parameters(case, chosen, drums, anchors):
 def _words(case, verdict, drums):
     """Notes (sentences), where, next_runs and what is confusable, of a verdict."""
     effects, _, chosen = verdict
-    possible, poses = case.laws[RADIUS], len(case.weight)
+    possible, poses = case.laws[RADIUS], len(case.used)
     off = case.probability_of(lambda laws: bool(laws))
     notes, where, rivals, runs = [], "", [], []
     if RADIUS in effects:
         law = chosen.laws[0]
         settled = case.probability_of(lambda laws: law in laws) > 0.9 * off
         where = law.where if settled else ""
-        changed = chosen.fit.model.numbers(chosen.fit.theta)[2] - case.bare.origin[-len(drums) :]
-        error = length_tables.split(chosen.fit, chosen.standard_errors)[2]
+        changed = chosen.fit.lengths.machine(chosen.fit.values)[2] - case.bare.origin[-len(drums) :]
+        error = chosen.fit.lengths.split(chosen.standard_errors)[2]
         said = [f"{drums[k]} by {changed[k]:+.2f} +- {error[k]:.2f} mm" for k in np.flatnonzero(error > 0.0)]
         notes.append(f"The radii are off, likeliest {', '.join(said)}.")
         if not settled:
@@ -198,5 +197,5 @@ def _words(case, verdict, drums):
             runs.append("the cable that ten turns of each drum take up, by a tape")
     notes.append("A scale error of the camera would act as a common factor of the radii.")
     if UNEXPLAINED in effects:
-        notes.append(f"{chosen.evidence.smooth_mm:.1f} mm are left that follow the place smoothly, by no law here.")
+        notes.append(f"{chosen.smooth_mm:.1f} mm are left that follow the place smoothly, by no law here.")
     return notes, where, "; ".join(runs), ", ".join(dict.fromkeys(rivals))

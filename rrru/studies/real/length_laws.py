@@ -1,9 +1,11 @@
 """Machines of which lengths are known: which laws beside the frame their readings speak for.
 
 Each law may act or not; every combination is fitted and weighed by its evidence, with independent noise alone and with
-a smooth error that no law explains beside it (`rrru.fit.lengths_evidence`).
+a smooth discrepancy that no law explains (`rrru.estimation.evidence`). Neighbouring rows err alike wherever a law is
+lacking; F tests or BIC, which count them as independent, then find whatever term resembles the discrepancy.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
@@ -11,47 +13,58 @@ from itertools import islice
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.fit.lengths_evidence import evidence
-from rrru.fit.lengths_model import frame_basis
-from rrru.fit.lengths_only import fit_lengths, stands_out
-from rrru.fit.lengths_search import search
+from rrru.estimation.evidence import MarginalLikelihood
+from rrru.estimation.observations.length_starts import free_coordinates
+from rrru.estimation.observations.lengths import Lengths
+from rrru.estimation.parameters import Block, Parameters
+from rrru.fit.lengths import LengthFit, fit_lengths, refit, standing_out
 
 UNEXPLAINED = "unexplained"
 # starts beside the fit that judged the readings; readings that a law's fit leaves free at least
 _STARTS, _FREEDOM = 3, 3
-# rows are foretold from the others in so many parts of every tenth row
+# rows are predicted from the others in so many parts of every tenth row
 _FOLDS, _FEW = 10, 20
+# readings that the others of their row check by a smaller share of their variance are not predicted
+_MIN_CHECKED = 0.02
 # standard deviations from which a reading is named
 _STANDS_OUT = 5.0
 # probability from which a smooth error is named, and the logarithm of its odds
 _SURE, _ODDS = 0.9, np.log(9.0)
-_DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
     """One way for a law to act: effect, where in words, what it adds in words.
 
-    columns (n d + 2 k, c): what its numbers `names` (c,) change of the machine's; ranges (c,): 1 sigma of how far
-    they may go. believed: probability of acting this way before any reading.
+    columns (n d + 2 k, c): what its parameters (c,) change of the machine's numbers; ranges (c,): their prior standard
+    deviations. believed: prior probability of acting this way.
     """
 
     effect: str
     where: str
     adds: str
     columns: np.ndarray
-    names: tuple
     ranges: np.ndarray
     believed: float
+
+    @property
+    def block(self):
+        """Its parameters, in mm where they are start lengths, else factors."""
+        names = [f"{self.effect}_{k}" for k in range(len(self.ranges))]
+        return Block.of(self.effect, names, [Lengths.unit] * len(names), self.ranges)
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A combination of laws with its fit and evidence; smooth: whether a smooth error that none explains is beside."""
+    """A combination of laws, its fit, and its marginal likelihoods: None where the readings do not determine it.
+
+    independent: with noise alone; smooth: with noise and a smooth discrepancy.
+    """
 
     laws: tuple
-    fit: object
-    evidence: object
+    fit: LengthFit
+    independent: MarginalLikelihood | None
+    smooth: MarginalLikelihood | None
 
     @property
     def effects(self):
@@ -60,67 +73,85 @@ class Hypothesis:
 
     @property
     def alike(self):
-        """Whether neighbouring rows err alike: whether a smooth error beside is all but sure."""
-        return self.evidence is not None and self.evidence.smooth - self.evidence.independent > _ODDS
+        """Whether neighbouring rows err alike: whether a smooth discrepancy is all but sure."""
+        return self.smooth is not None and self.smooth.log_evidence - self.independent.log_evidence > _ODDS
+
+    @property
+    def noise_mm(self):
+        """Noise of a reading where there is a smooth discrepancy."""
+        return self.smooth.noise_scale * self.fit.noise_mm
+
+    @property
+    def smooth_mm(self):
+        """Standard deviation of the smooth discrepancy."""
+        return self.smooth.discrepancy_scale * self.fit.noise_mm
 
     @property
     def standard_errors(self):
-        """Of the numbers as `LengthFit` has them, where neighbouring rows err alike those beside the smooth error."""
-        return self.evidence.standard_errors if self.alike else self.fit.standard_errors
+        """Of the machine's numbers as `LengthFit` has them, under a smooth discrepancy where neighbours err alike."""
+        if not self.alike:
+            return self.fit.standard_errors
+        half = self.fit.lengths.basis @ self.smooth.covariance
+        return np.sqrt((half * self.fit.lengths.basis).sum(axis=1))
 
     def logs(self):
-        """Log evidence without and with a smooth error, each half believed beside the laws' own beliefs; (2,)."""
-        if self.evidence is None:
+        """Log evidence without and with a smooth discrepancy, each half as probable before; (2,)."""
+        if self.smooth is None:
             return np.full(2, -np.inf)
-        return np.array([self.evidence.independent, self.evidence.smooth]) + np.log(0.5)
+        return np.array([self.independent.log_evidence, self.smooth.log_evidence]) + np.log(0.5)
 
 
 @dataclass(frozen=True)
 class LengthCase:
     """What a set of lengths is fitted with.
 
-    bare: LengthModel of the frame without any law. laws: {effect: Laws}, at most one of each effect acts. starts:
-    function of a LengthModel that yields (theta, places).
+    bare: Lengths of the frame without any law. laws: {effect: Laws}, at most one of each effect acts. starts: function
+    of Lengths that yields values (p,) to start from.
     """
 
-    bare: object
+    bare: Lengths
     laws: dict
-    starts: object
+    starts: Callable
 
     def model(self, laws):
-        """The LengthModel under some laws."""
+        """The Lengths under some laws."""
         columns = [self.bare.basis, *(law.columns for law in laws)]
-        names = (*self.bare.names, *(name for law in laws for name in law.names))
-        return replace(self.bare, basis=np.concatenate(columns, axis=1), names=names)
+        return replace(self.bare, basis=np.concatenate(columns, axis=1))
+
+    def parameters(self, laws):
+        """The Parameters under some laws: flat priors of the frame's, which all combinations share."""
+        names = [f"frame_{number}" for number in range(self.bare.basis.shape[1])]
+        frame = Block.of("frame", names, [Lengths.unit] * len(names), np.inf)
+        return Parameters((frame, *(law.block for law in laws)))
 
     @cached_property
     def _judged(self):
-        """The fit under all laws, with most numbers that the readings tell, that judges the readings."""
-        largest = [max(ways, key=lambda law: len(law.names)) for ways in self.laws.values()]
+        """The fit under all laws, with most parameters that the readings tell, that judges the readings."""
+        largest = [max(ways, key=lambda law: len(law.ranges)) for ways in self.laws.values()]
         for count in range(len(largest), -1, -1):
             model = self.model(largest[:count])
-            if count and model.redundant < len(model.names):
+            if count and model.redundancy < model.basis.shape[1]:
                 continue
             fit = fit_lengths(model, self.starts(model))
-            if fit.identifiability.rank == len(model.names) or not count:
+            if fit.determined or not count:
                 return fit
 
     @property
-    def weight(self):
-        """Flags (N, k), 0 of bad readings."""
-        return self._judged.weight
+    def used(self):
+        """Flags (N, k), False of bad readings."""
+        return self._judged.used
 
     @property
     def suspect(self):
         """Flags (N, k) of readings that stand out but not so far that they are left out."""
-        return stands_out(self._judged, _STANDS_OUT) & (self.weight > 0.0)
+        return standing_out(self._judged, _STANDS_OUT) & self.used
 
     def _fit(self, laws):
         """The fit under some laws, begun from the fit under all and from a few of the starts."""
         model, judged = self.model(laws), self._judged
-        full = judged.model.origin + judged.model.basis @ judged.theta
-        near = np.linalg.pinv(model.basis) @ (full - model.origin), judged.places
-        return fit_lengths(model, [near, *islice(self.starts(model), _STARTS)], self.weight)
+        full = judged.lengths.origin + judged.lengths.basis @ judged.values
+        near = np.linalg.pinv(model.basis) @ (full - model.origin)
+        return fit_lengths(model, [near, *islice(self.starts(model), _STARTS)], self.used)
 
     def _believed(self, laws):
         """Probability of a combination before any reading."""
@@ -140,12 +171,11 @@ class LengthCase:
             combinations += [(*laws, law) for laws in combinations for law in ways]
         found, logs, untried = [], [], 0.0
         for laws in combinations:
-            if self.model(laws).redundant < (_FREEDOM if laws else 1):
+            if self.model(laws).redundancy < (_FREEDOM if laws else 1):
                 untried += self._believed(laws)
                 continue
             fit = self._fit(laws)
-            ranges = np.concatenate([np.full(len(self.bare.names), np.inf), *(law.ranges for law in laws)])
-            found.append(Hypothesis(laws, fit, evidence(fit, ranges)))
+            found.append(Hypothesis(laws, fit, *fit.marginals(self.parameters(laws)) or (None, None)))
             logs.append(found[-1].logs() + np.log(self._believed(laws)))
         logs = np.array(logs).reshape(-1, 2)
         if not np.isfinite(logs).any():
@@ -184,66 +214,30 @@ def ways_of(effect, told, reach):
     """Laws of an effect from (where, adds, columns, believed); reach(columns): how far its numbers may go, 1 sigma."""
     laws = []
     for where, adds, columns, believed in told:
-        names = tuple(f"{effect}_{k}" for k in range(columns.shape[1]))
-        laws.append(Law(effect, where, adds, columns, names, reach(columns), believed))
+        laws.append(Law(effect, where, adds, columns, reach(columns), believed))
     return tuple(laws)
 
 
 def frame_columns(count, dimensions, readings):
     """Columns (n d + 2 k, c) of the anchors' free coordinates and their places in the machine's numbers."""
-    free = np.flatnonzero(frame_basis(count, dimensions))
+    free = np.flatnonzero(free_coordinates(count, dimensions))
     return np.eye(count * dimensions + 2 * readings)[:, free], free
 
 
-def foretold(fit, held_out=None):
-    """Errors (N, k) in mm of every length as the other rows and the other lengths of its row foretell it.
+def predict_held_out(fit, held_out=None):
+    """Held-out errors (N, k) in mm: of every length as predicted by other rows and the other lengths of its row.
 
     Each over the root of the share of its variance that the others check, so that noise alone gives its own size; NaN
     for readings left out and for those that nothing checks. Machines are fitted to every tenth row's complement, or
-    without one row where there are at most 20. held_out (N,): the rows to foretell where they are given.
+    without one row where there are at most 20. held_out (N,): the rows to hold out where they are given.
     """
-    rows = len(fit.weight)
+    rows = len(fit.lengths)
     folds = np.arange(rows) % min(rows if rows <= _FEW else _FOLDS, rows)
     parts = [folds == fold for fold in range(folds.max() + 1)] if held_out is None else [held_out]
-    errors = np.full(fit.weight.shape, np.nan)
+    errors = np.full(fit.used.shape, np.nan)
     for part in parts:
-        left, out = fit.model.rows(~part), fit.model.rows(part)
-        theta, _ = search(left, fit.theta, fit.places[~part], fit.weight[~part])
-        places = fit.places[part]
-        if fit.model.unknown:
-            _, places = search(out, theta, places, fit.weight[part], rows_only=True)
-        errors[part] = out.residual(theta, places) / np.sqrt(_checked(out, theta, places, fit.weight[part]))
-    return np.where(fit.weight > 0.0, errors, np.nan)
-
-
-def _checked(model, theta, places, weight):
-    """Share (N, k) of a reading's variance that the row's unknowns leave; NaN where that is next to nothing."""
-    if not model.unknown:
-        return np.ones(weight.shape)
-    _, by_place = model.slopes(theta, places)
-    basis, _ = np.linalg.qr(weight[..., None] * by_place)
-    share = 1.0 - (basis**2).sum(axis=-1)
-    return np.where(share > 0.02, share, np.nan)
-
-
-def rms(values):
-    """Root mean square of the values that are not NaN."""
-    return float(np.sqrt(np.nanmean(values**2)))
-
-
-def share_closed(before, after, noise_mm):
-    """Share of the gap that errors (N, k) close, and its 95 % interval by drawing blocks of neighbouring rows."""
-    generator = np.random.default_rng(_SEED)
-    blocks = np.array_split(np.arange(len(before)), min(_BLOCKS, len(before)))
-    counts = np.array([np.isfinite(before[block]).sum() for block in blocks])
-    first, second = (np.array([np.nansum(one[block] ** 2) for block in blocks]) for one in (before, after))
-    drawn = generator.integers(len(counts), size=(_DRAWS, len(counts)))
-
-    def share(chosen):
-        total = np.maximum(counts[chosen].sum(axis=-1), 1)
-        gaps = [np.sqrt(np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0)) for one in (first, second)]
-        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-12), -1.0), 0.0)
-
-    value = float(share(np.arange(len(counts))))
-    low, high = np.quantile(share(drawn), [0.025, 0.975])
-    return value, float(min(low, value)), float(max(high, value))
+        values = refit(fit, ~part).values
+        out = fit.lengths.rows(part)
+        checked = 1.0 - out.place_leverage(values)
+        errors[part] = out.residual(values) / np.sqrt(np.where(checked > _MIN_CHECKED, checked, np.nan))
+    return np.where(fit.used, errors, np.nan)

@@ -3,16 +3,12 @@
 import numpy as np
 import pandas as pd
 
-from rrru.studies.real.length_laws import UNEXPLAINED, foretold, rms, share_closed
+from rrru.studies.real.length_laws import UNEXPLAINED, predict_held_out
 
 # rows that a note names
 _NAMED = 10
-
-
-def split(fit, values):
-    """Numbers (n d + 2 k,) of a machine as anchors (n, d), start lengths (k,) and factors (k,)."""
-    readings, anchors = fit.model.routing.shape
-    return values[: -2 * readings].reshape(anchors, -1), values[-2 * readings : -readings], values[-readings:]
+# of the bootstrap of blocks of rows
+_DRAWS, _BLOCKS, _SEED = 1000, 20, 1
 
 
 def parameter(name, unit, value, standard_error, nominal, note):
@@ -28,7 +24,7 @@ def anchors(case, chosen, names, note):
         if hypothesis is None:
             continue
         fit = hypothesis.fit
-        values, errors = fit.model.numbers(fit.theta)[0], split(fit, hypothesis.standard_errors)[0]
+        values, errors = fit.lengths.machine(fit.values)[0], fit.lengths.split(hypothesis.standard_errors)[0]
         for name, place, error in zip(names, values, errors, strict=True):
             coordinates = zip("xyz", place, error, strict=False)
             rows += [
@@ -38,9 +34,9 @@ def anchors(case, chosen, names, note):
 
 
 def steps(case, chain, held_out):
-    """Table real_steps of a chain of laws, and the errors (N, k) of each as the other rows foretell them.
+    """Table real_steps of a chain of laws, and the errors (N, k) of each as the other rows predict them.
 
-    Held-out columns: as `foretold` says, one value per reading.
+    Held-out columns: as `predict_held_out` says, one value per reading.
     """
     rows, errors = [], {}
     for laws in chain:
@@ -48,14 +44,14 @@ def steps(case, chain, held_out):
         if hypothesis is None:
             continue
         fit = hypothesis.fit
-        errors[tuple(laws)] = wrong = foretold(fit, held_out)
+        errors[tuple(laws)] = wrong = predict_held_out(fit, held_out)
         adds = "anchors" + ("" if case.bare.places_mm is not None else " and the place of every row")
         rows.append(
             {
                 "model": " + ".join(["frame", *(law.adds for law in laws)]),
                 "adds": laws[-1].adds if laws else adds,
-                "parameters": len(fit.theta),
-                "identifiable": fit.identifiability.rank,
+                "parameters": len(fit.values),
+                "identifiable": fit.estimate.rank,
                 "train_rms_mm": fit.rms_mm,
                 "held_out_mean_mm": float(np.nanmean(np.abs(wrong))),
                 "held_out_rms_mm": rms(wrong),
@@ -69,7 +65,7 @@ def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
     """The row of real_verdicts but its notes; errors: of the steps, those of the bare frame and of the verdict."""
     effects, probability, chosen = verdict
     before, after = errors.get((), errors[chosen.laws]), errors[chosen.laws]
-    noise = chosen.evidence.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
+    noise = chosen.noise_mm if UNEXPLAINED in effects else chosen.fit.noise_mm
     gaps = [float(np.sqrt(max(rms(one) ** 2 - noise**2, 0.0))) for one in (before, after)]
     closed = share_closed(before, after, noise) if chosen.laws else (0.0, 0.0, 0.0)
     return {
@@ -85,8 +81,8 @@ def verdict_row(case, verdict, errors, *, where, confusable_with, next_runs):
         "held_out_rms_mm": rms(after),
         "held_out_max_mm": float(np.nanmax(np.abs(after))),
         "next_runs": next_runs,
-        "points": len(case.weight),
-        "dropped_points": int((case.weight == 0.0).any(axis=1).sum()),
+        "points": len(case.used),
+        "dropped_points": int((~case.used).any(axis=1).sum()),
     }
 
 
@@ -94,7 +90,7 @@ def bad_words(case, readings, rows):
     """Sentences that name the readings left out and those that stand out but stay; rows (N,): their numbers."""
     said = []
     for flags, words in (
-        (case.weight == 0.0, "Left out, since other lengths contradict them"),
+        (~case.used, "Left out, since other lengths contradict them"),
         (case.suspect, "These stand out from their neighbours, but not so far that they are left out"),
     ):
         named = [
@@ -115,7 +111,30 @@ def points(case, chosen, readings, rows):
     count, bare = len(readings), case.hypothesis(()) or chosen
     columns = {"row": np.repeat(rows, count), "reading": list(readings) * len(rows)}
     for prefix, fit in (("bare_", bare.fit), ("", chosen.fit)):
-        places = np.pad(fit.places, ((0, 0), (0, 3 - fit.places.shape[1])), constant_values=np.nan)
+        places = np.pad(fit.places_mm, ((0, 0), (0, 3 - fit.places_mm.shape[1])), constant_values=np.nan)
         columns |= {f"{prefix}{axis}_mm": np.repeat(places[:, k], count) for k, axis in enumerate("xyz")}
         columns |= {f"{prefix}residual_mm": fit.residual_mm.ravel()}
-    return pd.DataFrame(columns | {"used": case.weight.ravel() > 0.0, "stands_out": case.suspect.ravel()})
+    return pd.DataFrame(columns | {"used": case.used.ravel(), "stands_out": case.suspect.ravel()})
+
+
+def rms(values):
+    """Root mean square of the values that are not NaN."""
+    return float(np.sqrt(np.nanmean(values**2)))
+
+
+def share_closed(before, after, noise_mm):
+    """Share of the gap that errors (N, k) close, and its 95 % interval by drawing blocks of neighbouring rows."""
+    generator = np.random.default_rng(_SEED)
+    blocks = np.array_split(np.arange(len(before)), min(_BLOCKS, len(before)))
+    counts = np.array([np.isfinite(before[block]).sum() for block in blocks])
+    first, second = (np.array([np.nansum(one[block] ** 2) for block in blocks]) for one in (before, after))
+    drawn = generator.integers(len(counts), size=(_DRAWS, len(counts)))
+
+    def share(chosen):
+        total = np.maximum(counts[chosen].sum(axis=-1), 1)
+        gaps = [np.sqrt(np.maximum(one[chosen].sum(axis=-1) / total - noise_mm**2, 0.0)) for one in (first, second)]
+        return np.where(gaps[0] > 0.0, np.maximum(1.0 - gaps[1] / np.maximum(gaps[0], 1e-12), -1.0), 0.0)
+
+    value = float(share(np.arange(len(counts))))
+    low, high = np.quantile(share(drawn), [0.025, 0.975])
+    return value, float(min(low, value)), float(max(high, value))

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from rrru.errors import ConfigError, FitError, IngestError
-from rrru.fit.lengths_only import fit_lengths
+from rrru.fit.lengths import fit_lengths, refit
 from rrru.studies.real import belts, figures_lengths
 from rrru.studies.real.lengths_section import Section
 from tests.studies.real import simulated_lengths as simulated
@@ -166,7 +166,7 @@ def test_measured_machine(run, truth, rms_mm, anchors):
     """The reference fits of the data's README, and the owner's statement of what misses."""
     frame = simulated.measured(f"maslow/run_{run}.csv")
     case, _ = belts.length_case(frame, Section(MASLOW, "maslow", belts._NEEDED, belts._OPTIONAL))
-    everything = np.ones(case.bare.counted.shape)
+    everything = np.ones(case.bare.counted.shape, dtype=bool)
     for laws, expected in zip(
         ((), case.laws["missing_length"][:1], case.laws["missing_length"][-1:]), rms_mm, strict=True
     ):
@@ -174,7 +174,7 @@ def test_measured_machine(run, truth, rms_mm, anchors):
         fit = fit_lengths(model, case.starts(model), everything)
         assert fit.rms_mm == pytest.approx(expected, abs=0.006)
         if laws == case.laws["missing_length"][:1]:
-            np.testing.assert_allclose(fit.theta[:5], anchors, atol=0.06)
+            np.testing.assert_allclose(fit.values[:5], anchors, atol=0.06)
             assert fit.standard_errors[-8] == pytest.approx(3.1, abs=0.05)
     tables = belts.study(frame, MASLOW, "maslow")
     verdict = tables["real_verdicts"].iloc[0]
@@ -189,11 +189,9 @@ def test_measured_machine(run, truth, rms_mm, anchors):
 
 def _jackknife(fit):
     """Standard error of a common missing length by leaving out one of six areas of the places after another."""
-    left_right, low_high = (np.argsort(np.argsort(axis)) / len(axis) for axis in fit.places.T)
+    left_right, low_high = (np.argsort(np.argsort(axis)) / len(axis) for axis in fit.places_mm.T)
     area, found = (3 * left_right).astype(int) + 3 * (2 * low_high).astype(int), []
     for number in range(6):
-        rest = area != number
-        model = fit.model.rows(rest)
-        less = fit_lengths(model, [(fit.theta, fit.places[rest])], fit.weight[rest])
-        found.append(model.numbers(less.theta)[1][0])
+        less = refit(fit, area != number)
+        found.append(less.lengths.machine(less.values)[1][0])
     return np.sqrt(5.0 * np.var(found))

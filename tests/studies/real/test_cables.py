@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rrru.errors import ConfigError, IngestError
-from rrru.fit.lengths_only import fit_lengths
+from rrru.fit.lengths import fit_lengths
 from rrru.studies.real import cables
 from rrru.studies.real.lengths_section import Section
 from tests.studies.real import simulated_lengths as simulated
@@ -104,7 +104,7 @@ def test_measured_robot():
     expected = {(): (2.06, 1.76, 2.36), case.laws["drum_radius"][-1:]: (1.15, 1.49, 1.53)}
     for laws, rms_mm in expected.items():
         model = case.model(laws)
-        fit = fit_lengths(model, case.starts(model), np.ones((16, 3)))
+        fit = fit_lengths(model, case.starts(model), np.ones((16, 3), dtype=bool))
         np.testing.assert_allclose(np.sqrt((fit.residual_mm**2).mean(axis=0)), rms_mm, atol=0.006)
     tables = cables.study(frame, section, "kamal")
     for drum, radius, error in (("drum1", 25.17, 0.28), ("drum2", 34.95, 0.28), ("drum3", 35.32, 0.32)):

@@ -1,4 +1,4 @@
-"""Where to start a fit of lengths only: anchors and places out of the lengths themselves, without a guess.
+"""Where the estimation of anchors from lengths alone starts: closed forms of the lengths, without a guess.
 
 With the first anchor at the origin, L_ij^2 - L_i0^2 = |a_j|^2 - 2 p_i . a_j has, less its mean over the rows, rank d:
 its singular vectors are anchors and places up to a linear map, and L_i0^2 = |p_i|^2 is linear in the square of this
@@ -10,35 +10,37 @@ five anchors in one plane leave this map open for good, since any place's height
 from collections.abc import Iterator
 
 import numpy as np
+import numpy.typing as npt
 
-from rrru.fit.lengths_model import framed
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
 
 # a length may miss up to this share of the longest, and a row may be a bad one: several of each are tried
-_MISSING = (0.0, 0.02, -0.02, 0.05, -0.05, 0.1, -0.1, 0.2)
-_DRAWS, _DRAWN, _SEED = 4, 20, 1
+_MISSING_SHARES = (0.0, 0.02, -0.02, 0.05, -0.05, 0.1, -0.1, 0.2)
+_SUBSETS, _SUBSET_ROWS, _SEED = 4, 20, 1
 
 
-def starts(
-    counted: np.ndarray, heights_mm: np.ndarray, dimensions: int
-) -> Iterator[tuple[np.ndarray, np.ndarray, float]]:
-    """Anchors (n, d), places (N, d) and a missing length in mm to start from; counted (N, n) in mm.
+def propose_anchors(
+    counted_mm: FloatArray, heights_mm: FloatArray, dimensions: int
+) -> Iterator[tuple[FloatArray, float]]:
+    """Anchors (n, d) in their frame and a missing length in mm to start from; counted_mm (N, n), heights_mm (n,).
 
     Each comes from all rows, and from a few drawn ones: rows with a bad reading spoil the former.
     """
-    generator, rows = np.random.default_rng(_SEED), len(counted)
+    generator, rows = np.random.default_rng(_SEED), len(counted_mm)
     subsets = [np.arange(rows)]
-    if rows > _DRAWN:
-        subsets += [np.sort(generator.choice(rows, _DRAWN, replace=False)) for _ in range(_DRAWS)]
-    for share in _MISSING:
-        missing = share * float(counted.max())
-        squares = (counted + missing) ** 2 - heights_mm**2
+    if rows > _SUBSET_ROWS:
+        subsets += [np.sort(generator.choice(rows, _SUBSET_ROWS, replace=False)) for _ in range(_SUBSETS)]
+    for share in _MISSING_SHARES:
+        missing = share * float(counted_mm.max())
+        squares = (counted_mm + missing) ** 2 - heights_mm**2
         for chosen in subsets:
-            anchors = anchors_of(squares[chosen], dimensions)
+            anchors = solve_anchors(squares[chosen], dimensions)
             if anchors is not None:
-                yield *framed(anchors, places_of(squares, anchors)), missing
+                yield align_to_frame(anchors), missing
 
 
-def anchors_of(squares: np.ndarray, dimensions: int) -> np.ndarray | None:
+def solve_anchors(squares: FloatArray, dimensions: int) -> FloatArray | None:
     """Anchors (n, d) of squared distances (N, n) in mm^2, the first at the origin; None where they do not tell."""
     less = squares[:, 1:] - squares[:, :1]
     left, size, right = np.linalg.svd(less - less.mean(axis=0), full_matrices=False)
@@ -63,8 +65,21 @@ def anchors_of(squares: np.ndarray, dimensions: int) -> np.ndarray | None:
     return np.concatenate([np.zeros((1, dimensions)), -0.5 * slopes.T])
 
 
-def places_of(squares: np.ndarray, anchors: np.ndarray) -> np.ndarray:
-    """Places (N, d) of squared distances (N, n) in mm^2 to anchors (n, d), by linear trilateration."""
-    target = (anchors[1:] ** 2).sum(axis=1) - (anchors[0] ** 2).sum() - (squares[:, 1:] - squares[:, :1])
-    fitted, *_ = np.linalg.lstsq(2.0 * (anchors[1:] - anchors[0]), target.T, rcond=None)
-    return fitted.T
+def align_to_frame(anchors: FloatArray, points: FloatArray | None = None) -> FloatArray:
+    """Points (m, d), by default the anchors, turned, moved and mirrored into the frame that the anchors (n, d) fix.
+
+    The first anchor is the origin, the second is on the positive x axis, the third above it, in space in the plane of x
+    and y; lengths do not tell a space from its mirror image, and the fourth is put at positive z.
+    """
+    origin = anchors[0]
+    axes, upper = np.linalg.qr((anchors[1 : anchors.shape[1] + 1] - origin).T)
+    axes = axes * np.where(np.diag(upper) < 0.0, -1.0, 1.0)
+    return np.asarray(((anchors if points is None else points) - origin) @ axes)
+
+
+def free_coordinates(anchors: int, dimensions: int) -> BoolArray:
+    """Flags (anchors, dimensions) of the coordinates that `align_to_frame` does not fix."""
+    free = np.ones((anchors, dimensions), dtype=bool)
+    for row in range(min(anchors, dimensions)):
+        free[row, row:] = False
+    return free
