@@ -31,19 +31,21 @@ class SolverOptions:
     max_iterations: a well-scaled problem needs some ten, one with lost zeros or frames some fifty; step_tolerance: the
     search has ended where a full step would change no parameter by more than this share of its standard error, far
     below what any reading tells; cost_tolerance: or lower the objective by less than this share, about the rounding of
-    a sum of squares; first_damping: share of the largest curvature that damps the first step, small since starts are
-    mostly near; max_damping: beyond it no step lowers the objective.
+    a sum of squares; first_damping: of the first step, in units of the priors, small since starts are mostly near;
+    max_damping: beyond it no step lowers the objective.
     """
 
     max_iterations: int = 200
     step_tolerance: float = 1e-7
     cost_tolerance: float = 1e-15
     first_damping: float = 1e-8
-    max_damping: float = 1e12
+    max_damping: float = 1e24
 
 
 # damping that keeps directions which nothing determines where they are
-_LEAST_DAMPING = 1e-15
+_LEAST_DAMPING = 1e-13
+# damping, times two, after the first step that does not lower the objective
+_RETRY_DAMPING = 1e-3
 _Function = Callable[[FloatArray], FloatArray]
 # rho(z) and its derivative by z, the squared residual in units of the loss scale (as scipy names them)
 _LOSSES: dict[str, tuple[_Function, _Function]] = {
@@ -159,7 +161,7 @@ class _Search:
                     # no lower than rounding: this is the minimum
                     self._end()
                     return
-                damping, growth, self.straight = max(damping, 1e-9) * growth, 2.0 * growth, False
+                damping, growth, self.straight = max(damping, _RETRY_DAMPING) * growth, 2.0 * growth, False
                 if damping > options.max_damping:
                     self.message = "no step lowers the objective"
                     return
@@ -199,18 +201,18 @@ class _Linearized:
     def step(self, damping: float) -> tuple[FloatArray, float]:
         """Damped Gauss-Newton step (k,) within the bounds, and by how much it lowers the objective.
 
-        Parameters count in units of their priors, those of flat priors by the length of their column. damping: as a
-        share of the largest curvature. A parameter that would leave its bounds is put there, and the others follow.
+        Parameters count in units of their priors, those of flat priors by the length of their column; damping: in these
+        units, so that 1 shortens a step to about the priors' standard deviations. A parameter that would leave its
+        bounds is put there, and the others follow.
         """
         columns, target, count = self.triangle[:, :-1], self.triangle[:, -1], len(self.sd)
         length = np.linalg.norm(columns, axis=0)
         unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
-        size = np.sqrt(damping) * max(float((length * unit).max(initial=0.0)), 1e-300)
         free, step = np.ones(count, dtype=bool), np.zeros(count)
         while free.any():
             rest = target + columns[:, ~free] @ step[~free]
             own = np.column_stack([columns[:, free] * unit[free], rest])
-            brake = np.column_stack([size * np.eye(int(free.sum())), np.zeros(int(free.sum()))])
+            brake = np.column_stack([np.sqrt(damping) * np.eye(int(free.sum())), np.zeros(int(free.sum()))])
             damped = triangle_of(np.concatenate([own, brake]))
             step[free] = -unit[free] * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
             beyond = free & ((step < self.low) | (step > self.high))

@@ -32,8 +32,10 @@ GEOMETRY = "geometry"
 _STEP, _NOTHING = 1e-4, 1e-3
 # ASSUME an effect's coefficients are rarely more than this many times their typical size
 PRIOR_TIMES_TYPICAL = 20.0
-# a thousandth of a standard error is far below what any verdict depends on
-_OPTIONS = SolverOptions(step_tolerance=1e-3)
+# a hundredth of a standard error is below what any verdict depends on
+_OPTIONS = SolverOptions(step_tolerance=1e-2)
+# a fit of more parameters is begun once: nearly all of them are coefficients of functions, in which the model is linear
+_MAX_RESTARTED = 200
 # fits whose log posterior densities differ by less are equally good
 _EQUAL_NATS = 1.0
 
@@ -277,7 +279,7 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=
         candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
         candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
         fits.append(solve(problem, [candidate], _OPTIONS))
-        if fits[-1].end.straight and fits[-1].end.converged:
+        if (fits[-1].end.straight and fits[-1].end.converged) or len(model.parameters) > _MAX_RESTARTED:
             break
     enough = min(one.end.cost for one in fits) + _EQUAL_NATS
     return ModelFit(model, next(one for one in fits if one.end.cost <= enough), level)
