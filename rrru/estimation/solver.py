@@ -31,13 +31,15 @@ class SolverOptions:
     max_iterations: a well-scaled problem needs some ten, one with lost zeros or frames some fifty; step_tolerance: the
     search has ended where a full step would change no parameter by more than this share of its standard error, far
     below what any reading tells; cost_tolerance: or lower the objective by less than this share, about the rounding of
-    a sum of squares; first_damping: of the first step, in units of the priors, small since starts are mostly near;
-    max_damping: beyond it no step lowers the objective.
+    a sum of squares; rounding: a step that should lower it by less than this share and does not is lost in the rounding
+    of the model, such as that of closed loops, which ends the search too; first_damping: of the first step, in units of
+    the priors, small since starts are mostly near; max_damping: beyond it no step lowers the objective.
     """
 
     max_iterations: int = 200
     step_tolerance: float = 1e-7
     cost_tolerance: float = 1e-15
+    rounding: float = 1e-10
     first_damping: float = 1e-8
     max_damping: float = 1e24
 
@@ -157,8 +159,7 @@ class _Search:
                 residual, cost = self._evaluate(trial)
                 if cost < self.cost:
                     break
-                if foreseen <= least:
-                    # no lower than rounding: this is the minimum
+                if foreseen <= max(least, options.rounding * self.cost):
                     self._end()
                     return
                 damping, growth, self.straight = max(damping, _RETRY_DAMPING) * growth, 2.0 * growth, False
