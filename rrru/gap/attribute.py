@@ -97,8 +97,13 @@ def with_noise(case, linear, stated_mm):
     if columns.shape[-1] > _MOST_FITTED * linear.data.size:
         # too few points to fit everything: what the calibration leaves has to do
         columns = linear.base
-    model = fit_noise(linear.data, columns, case.series, stated_mm)
-    model = replace(model, alike=alike(linear.data, columns, case.stop, case.kind))
+    rows = case.complete(case.library)
+    if 3 * rows.sum() < linear.base.shape[-1] / _MOST_FITTED:
+        rows[:] = True
+    # an effect that acts where it is unknown how is no noise
+    data, columns, series = linear.data[rows], columns[rows], case.series[rows]
+    model = fit_noise(data, columns, series, stated_mm)
+    model = replace(model, alike=alike(data, columns, case.stop[rows], case.kind[rows]))
     repeated, count = noise.repeat_noise(case.measurements[case.used])
     # what is correlated tells less
     count *= (1.0 - model.correlation**2) / (1.0 + model.correlation**2)
@@ -133,6 +138,8 @@ def attribute(case, prior, stated=KNOWN):
         if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
             outliers = noise.isolated(case.residual(calibrated), case.series, 0.0, case.kind)
+            # what arrived from the other side than its neighbours is no outlier
+            outliers &= case.complete(case.library)
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
@@ -165,7 +172,8 @@ def with_effects(attribution, effects):
         # where the exact sim cannot follow only the linear one is corrected
         with suppress(FitError):
             state, covariance = refine(attribution.case, (attribution.state, attribution.origin), hypothesis, level)
-    return replace(attribution, hypothesis=hypothesis, level=level, state=state, covariance=covariance)
+    found = {"hypothesis": hypothesis, "level": level, "state": state, "covariance": covariance}
+    return replace(attribution, case=attribution.case.with_approach(state), **found)
 
 
 class _Looks:
@@ -232,7 +240,7 @@ def _rounds(case, calibrated, prior, stated):
             if settled and not _bends(case, linear, state, fitted):
                 break
             hypothesis, level, state, covariance = tried, its_level, fitted, spread
-            case = case.standing(state)
+            case = case.standing(state).with_approach(state)
             case, linear, source = looks.at(case, state, hypothesis.terms)
             evidence = case.evidence(linear)
         except FitError:

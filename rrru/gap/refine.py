@@ -26,6 +26,7 @@ def refine(case, starts, hypothesis, level):
     is a place that nothing leads away from. Returns (state, covariance (k, k) of the terms' coefficients). Raises
     FitError where the sim loses its pose.
     """
+    case = case.at_complete(hypothesis.effects)
     fits, straight = [], False
     for start in starts:
         with suppress(FitError):
