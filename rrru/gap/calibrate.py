@@ -9,15 +9,15 @@ from rrru.gap.state import State
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    return State(least_squares(_residuals(case)).deviations, {})
+    return State(least_squares(residuals_of(case)).deviations, {})
 
 
 def origin(case):
     """State that the calibration starts from, see `rrru.fit.start`."""
-    return State(start_of(_residuals(case))[0], {})
+    return State(start_of(residuals_of(case))[0], {})
 
 
-def _residuals(case):
+def residuals_of(case):
     """Residuals of the case's used points."""
     frame = case.measurements[case.used]
     driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)
