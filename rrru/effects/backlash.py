@@ -24,7 +24,7 @@ the play of its nut in mm (paper B, section 3.1).
 import numba
 import numpy as np
 
-from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
+from rrru.effects.protocol import PATH, Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import ParameterSet
 
 _SOURCE = {
@@ -53,11 +53,12 @@ def play(path, half_width):
 
 def _played(motion, values):
     """Changes of the actuator values under widths (K,) in their unit."""
-    return motion.at_drives(play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index])
+    changes = play(np.ascontiguousarray(motion.path_drive), 0.5 * values)[motion.path_index]
+    return motion.at_drives(motion.with_approach(changes, -0.5 * values))
 
 
 def for_robot(robot):
     """The law for all drives."""
     drives = robot.parts.drives
     parameters = ParameterSet(drive_parameters(drives, _SOURCE, ("width", _HIGHEST)))
-    return Effect("backlash", parameters, plain_coordinates(parameters, of_drives(drives, _TYPICAL)), _played)
+    return Effect("backlash", parameters, plain_coordinates(parameters, of_drives(drives, _TYPICAL)), _played, (PATH,))

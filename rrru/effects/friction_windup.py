@@ -30,7 +30,7 @@ assumed: as large as the play of a worn drive, over some degrees or millimetres.
 import numba
 import numpy as np
 
-from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
+from rrru.effects.protocol import PATH, Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
 # in every diagnosis it takes a robot with several causes and scatter for "unexplained": tested where it is named
@@ -77,8 +77,8 @@ def for_robot(robot):
         """Changes of the actuator values under amplitudes (K,) and travels in their units."""
         travel = values[len(drives) :][which]
         share = wound(np.ascontiguousarray(motion.path_drive), travel)[motion.path_index]
-        return motion.at_drives(-values[: len(drives)] * share)
+        amplitude = values[: len(drives)]
+        return motion.at_drives(motion.with_approach(-amplitude * share, -amplitude))
 
-    return Effect(
-        "friction_windup", parameters, plain_coordinates(parameters, of_drives(drives, _TYPICAL), shapes), wound_up
-    )
+    coordinates = plain_coordinates(parameters, of_drives(drives, _TYPICAL), shapes)
+    return Effect("friction_windup", parameters, coordinates, wound_up, (PATH,))

@@ -16,7 +16,7 @@ class Course:
     position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3), drive (n, K); path_drive (N, K): actuator values along
     everything that is driven, with rows path_index (n,); time_s, payload_kg: (n,); drive_motion: first and second
     derivatives (n, K) of the actuator values, None where the positions tell them; stops: whether the robot stopped at
-    every point; temperature_c: (n,) or one for all.
+    every point; temperature_c: (n,) or one for all; approach: (n, K) or one for all, of `rrru.effects.protocol.Motion`.
     """
 
     position_mm: np.ndarray
@@ -30,6 +30,7 @@ class Course:
     drive_motion: tuple | None = None
     stops: bool = False
     temperature_c: np.ndarray | float = np.nan
+    approach: np.ndarray | float = np.nan
 
 
 def make_motion(robot, masses, course, stands=None):
@@ -65,6 +66,7 @@ def make_motion(robot, masses, course, stands=None):
         load_slopes=partial(load_slopes, robot, masses, at, nominal, inertial, carried),
         last_move=last_move(course.drive, course.path_index) if course.stops else np.full_like(rate, np.nan),
         temperature_c=np.broadcast_to(np.asarray(course.temperature_c, dtype=float), len(position)),
+        approach=np.broadcast_to(np.asarray(course.approach, dtype=float), rate.shape),
     )
 
 

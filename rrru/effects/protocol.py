@@ -20,6 +20,8 @@ LOADS = {
     "across": "across",
     "base_moment": "base",
 }
+# field of a Motion that tells from which side each drive comes to a reading, where `Motion.approach` is NaN
+PATH = "path_drive"
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,9 @@ class Motion:
     that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
     how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
-    temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.robots.dynamics`.
+    temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.robots.dynamics`; approach (n,
+    K): where the path does not determine from which side a drive comes to a reading, the expected sense of its
+    approach (-1 from above, 1 from below, 0 for even odds), NaN where the path determines it.
     """
 
     robot: Any
@@ -72,6 +76,7 @@ class Motion:
     last_move: np.ndarray
     temperature_c: np.ndarray
     load_slopes: Callable[[], tuple[Any, ...]]
+    approach: np.ndarray | float = np.nan
 
     def __len__(self) -> int:
         return len(self.drive)
@@ -92,6 +97,13 @@ class Motion:
             for name, own in LOADS.items()
         }
         return replace(self, **changed)
+
+    def with_approach(self, changes: np.ndarray, from_below: np.ndarray) -> np.ndarray:
+        """Changes (n, K) of the actuator values with their expected values where the path does not determine them.
+
+        from_below (K,): change of each drive that comes from below; it has the other sign from above.
+        """
+        return np.where(np.isnan(self.approach), changes, self.approach * from_below)
 
     def at_drives(self, changes: np.ndarray) -> Contribution:
         """Contribution of changes (n, K) of the actuator values, in their units."""
@@ -232,7 +244,8 @@ def plain_coordinates(
 class Effect:
     """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: fields of Motion without which the law says nothing; along_drives: of a law that changes nothing but actuator
+    needs: fields of Motion without which the law says nothing, "path_drive" of a law that depends on the sense in which
+    a drive comes to a reading; along_drives: of a law that changes nothing but actuator
     values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
     law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
@@ -273,6 +286,25 @@ class ActiveEffect:
     def contribute(self, motion: Motion) -> Contribution:
         """Changes at the points of a motion."""
         return self.effect.contribute(motion, self.effect.parameters.vector(self.values))
+
+
+def lacks_values(effect: Any, motion: Motion) -> np.ndarray:
+    """Rows (n,) at which a value that an effect, or an unknown function, needs is NaN."""
+    needs = [getattr(motion, need) for need in effect.needs if need != PATH]
+    return ~np.all([np.ones(len(motion), dtype=bool), *(known_values(values) for values in needs)], axis=0)
+
+
+def known_values(values: np.ndarray) -> np.ndarray:
+    """Rows (n,) of values (n, ..) that are finite."""
+    return np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+
+
+def complete_rows(effect: Any, motion: Motion) -> np.ndarray:
+    """Rows (n,) at which a motion has all that an effect needs, the sense in which the drives arrive included."""
+    result = ~lacks_values(effect, motion)
+    if PATH in effect.needs:
+        result &= np.isnan(np.broadcast_to(motion.approach, motion.drive.shape)).all(axis=1)
+    return result
 
 
 def bears_load(effect: Any) -> bool:

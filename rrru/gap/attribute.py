@@ -96,10 +96,14 @@ def with_noise(case, linear, stated_mm):
 
     "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
     """
-    repeats = noise.repeat_noise(case.measurements[case.used])
+    repeats, complete = noise.repeat_noise(case.measurements[case.used]), case.complete(case.library)
+    if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
+        complete[:] = True
     columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
-    model = fit_noise(linear.data, columns, case.series, stated_mm, repeats)
-    model = replace(model, alike=alike(linear.data, columns, case.stop, case.kind))
+    # an effect that acts where it is unknown how is no noise
+    data, columns, series = linear.data[complete], columns[complete], case.series[complete]
+    model = fit_noise(data, columns, series, stated_mm, repeats)
+    model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
     repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
     if repeated is not None:
         return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
@@ -142,6 +146,8 @@ def attribute(case, prior, stated=KNOWN):
         if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
             outliers = noise.isolated(case.residual(calibrated), case.series, 0.0, case.kind)
+            # what arrived from the other side than its neighbours is no outlier
+            outliers &= case.complete(case.library)
             if outliers.any():
                 case = case.without(outliers)
                 calibrated = calibrate(case)
@@ -169,15 +175,18 @@ def with_effects(attribution, effects):
     hypothesis, level = known
     starts = (attribution.fit.state, attribution.origin) if hypothesis.terms else (attribution.calibrated,)
     fit = fit_hypothesis(attribution.case, attribution.evidence, starts, (hypothesis, level), attribution.fit)
-    return replace(attribution, hypothesis=hypothesis, level=level, fit=fit)
+    case = attribution.case.with_approach(fit.state)
+    return replace(attribution, case=case, hypothesis=hypothesis, level=level, fit=fit)
 
 
 def fit_hypothesis(case, evidence, starts, chosen, known=None):
     """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
 
-    chosen: both; known: a ModelFit that may be the one asked for.
+    It is fitted to the readings at which all its effects have what they need. chosen: both; known: a ModelFit that may
+    be the one asked for.
     """
     hypothesis, level = chosen
+    case = case.at_complete(hypothesis.effects)
     scales = evidence.scales(hypothesis.terms, hypothesis.strengths[level])
     if known and known.level == level and known.model.same_as(EffectModel(case, hypothesis.terms, scales)):
         return known
@@ -247,7 +256,7 @@ def _rounds(case, calibrated, prior, stated):
         if settled and not _bends(case, linear, calibrated, found.state):
             break
         fit, state = found, found.state
-        case = case.standing(state)
+        case = case.standing(state).with_approach(state)
         case, linear, source = looks.at(case, state, tried.terms)
         evidence = case.evidence(linear)
     hypothesis, level = beliefs.best()

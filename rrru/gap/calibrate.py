@@ -9,15 +9,15 @@ from rrru.gap.state import State
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    return State(estimate_deviations(_observations(case)).values, {})
+    return State(estimate_deviations(observations_of(case)).values, {})
 
 
 def origin(case):
     """State that the calibration starts from, see `rrru.estimation.starts`."""
-    return State(starting_values(_observations(case))[0], {})
+    return State(starting_values(observations_of(case))[0], {})
 
 
-def _observations(case):
+def observations_of(case):
     """TargetPositions of the case's used points."""
     frame = case.measurements[case.used]
     driven = rows.actuators(frame, case.mechanism), rows.measured(frame), rows.command(frame)

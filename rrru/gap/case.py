@@ -17,8 +17,9 @@ from rrru.campaign.noise import reading_series
 from rrru.effects.motion import standing
 from rrru.effects.protocol import Contribution, Motion
 from rrru.estimation.noise_model import NoiseModel
+from rrru.gap.approach_direction import estimate_approach, has_direction
 from rrru.gap.evidence import ModelEvidence
-from rrru.gap.linearise import linearised
+from rrru.gap.linearise import approach_responses, linearised
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
 
@@ -33,7 +34,8 @@ class Case:
     `rrru.robots.readings.Readings`; noise: its NoiseModel, white where there is none; beside_scale: factor by which
     rows of reflectors beside the robot count, so that they have the noise of the others; motion_at: from where the
     robot stands to the motion with the loads there, see `rrru.effects.motion.make_motion`; doubts,
-    bounds: what the weight may be off by, see `rrru.gap.weight`.
+    bounds: what the weight may be off by, see `rrru.gap.weight`; known: effect to the points (N,) at which the campaign
+    has all that the effect needs, of the effects that lack something at a used point.
     """
 
     mechanism: object
@@ -49,6 +51,7 @@ class Case:
     motion_at: Callable | None = None
     doubts: dict = field(default_factory=dict)
     bounds: dict = field(default_factory=dict)
+    known: dict = field(default_factory=dict)
 
     def __len__(self):
         return len(self.at)
@@ -147,7 +150,33 @@ class Case:
     def evidence(self, linear):
         """The ModelEvidence on a linearisation."""
         noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
-        return ModelEvidence(self.library, linear, self.series, noise, self._along_paths)
+        rows = {name: known[self.at] for name, known in self.known.items() if name in self.library}
+        incomplete = {name: known for name, known in rows.items() if not known.all()}
+        return ModelEvidence(self.library, linear, self.series, noise, self._along_paths, incomplete)
+
+    def complete(self, effects):
+        """Rows (m,) at which the campaign has all that some effects need."""
+        needed = (self.known[name][self.at] for name in sorted(set(effects) & set(self.known)))
+        return np.all([np.ones(len(self), dtype=bool), *needed], axis=0)
+
+    def at_complete(self, effects):
+        """The case of the points alone at which the campaign has all that some effects need."""
+        rows = self.complete(effects)
+        return self if rows.all() else self.without(~rows)
+
+    def with_approach(self, state):
+        """The case with the senses in which the drives arrive as a state and the readings tell them."""
+        if not np.isfinite(self.motion.approach).any():
+            return self
+        approach = np.where(np.isfinite(self.motion.approach), 0.0, np.nan)
+        if any(has_direction(self.library[name]) for name, _ in state.effects):
+            approach = estimate_approach(self, state, approach_responses(self, state))
+        return replace(self, motion=replace(self.motion, approach=approach))
+
+    @property
+    def axis_mm(self):
+        """Deviation (3,) of the noise of each axis."""
+        return np.full(3, self.noise_mm) if self.noise is None else self.noise.axis_mm
 
     def standing(self, state):
         """The case with the loads where the robot of a state stands, if its platform can turn.
@@ -158,7 +187,8 @@ class Case:
         if not self.mechanism.orients:
             return self
         at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
-        return replace(self, motion=replace(self.motion_at(at), load_slopes=partial(getattr, self.motion, "slopes")))
+        same = {"load_slopes": partial(getattr, self.motion, "slopes"), "approach": self.motion.approach}
+        return replace(self, motion=replace(self.motion_at(at), **same))
 
     def without(self, dropped):
         """The case without the used points of the rows flagged in (m,)."""

@@ -75,7 +75,7 @@ def _effect_row(attribution, name):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
-        level, held_out = int(single.evidence.argmax()), attribution.held_out
+        level, held_out = int(single.evidence.argmax()), attribution.held_out.on_complete(single.terms)
         alone = held_out.predict((), [], level).log_score
         gained = held_out.predict(single.terms, single.strengths[level], level).log_score - alone
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.errors import FitError
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
 from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
@@ -16,6 +15,7 @@ from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attrib
 from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
 from rrru.gap.details import details_of, parameter_rows, where
+from rrru.gap.determined import few_readings, require_determined
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
@@ -29,8 +29,6 @@ from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.seeds import stream
 
-# fewer points fit any effect, and left-out ones are extrapolated
-POINTS_PER_PARAMETER = 3
 # what an effect may lose on left-out points before it is ruled out
 _VETO_NATS = 3.0
 _HALF = 0.5
@@ -81,7 +79,7 @@ def diagnose(
     """Diagnosis of a measurement table of a MeasuredRobot.
 
     details: also the tables that tell more than the verdict, its budget and numbers and what to measure next. Raises
-    FitError where there are too few points to calibrate on.
+    FitError where the readings do not determine the calibration with some to spare, see `rrru.gap.determined`.
     """
     library = settings.library(robot.mechanism)
     stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
@@ -89,10 +87,7 @@ def diagnose(
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
     case = replace(case, doubts=settings.doubts(case.doubts))
-    least = POINTS_PER_PARAMETER * len(nominal.parameters)
-    if len(case) < least:
-        whose = f"campaign {robot.campaign}: " if robot.campaign else ""
-        raise FitError(f"{whose}{case.count} usable points are too few for a diagnosis; allowed: at least {least}")
+    case = require_determined(case, f"campaign {robot.campaign}: " if robot.campaign else "")
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
     case = with_beside(case)
@@ -122,8 +117,14 @@ def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     yield from weight_notes(attribution)
     yield from fit_notes(attribution)
     if case.count < _USUAL * len(case.used):
-        which = "where a run begins, where a drive may just have turned back, near singularities, outliers, blanks"
-        yield f"{case.count} of {len(case.used)} points used, left out are those {which}"
+        which = "not measured, out of reach, near singularities, held out or outliers"
+        yield f"{case.count} of {len(case.used)} points used; the others are {which}"
+    if few := few_readings(case):
+        yield few
+    acting = {name for name, _ in attribution.state.effects} & case.known.keys()
+    if lacking := case.count - len(np.unique(case.at[case.complete(acting)])):
+        where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
+        yield f"{', '.join(sorted(acting))} fitted without {where_not}"
     if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
         worse = "the robot does not repeat, or the instrument is worse"
         yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"

@@ -13,10 +13,19 @@ Strengths are averaged over a grid, even in their logarithm; none makes a prior 
 
 A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
 `Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.gap.weight`).
+
+An effect may lack what it needs at some readings U, such as the sense in which a drive arrives. A set S + D with such
+effects D says nothing about U. It is compared on the readings K at which D has all that it needs:
+
+    log p(y | S + D) = log p(y_K | S + D) + log p(y_U | y_K, R)
+
+R is one set without such effects, the most probable of all, and the same for all D. So S + D and R compare on K alone,
+as do all sets with D; R itself and all sets without D compare on all readings. With S in place of R a set whose S
+imitates D on U would win over D without it: U would count for S and not for D.
 """
 
-from dataclasses import dataclass
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial, wraps
 from itertools import product
 
 import numpy as np
@@ -39,12 +48,24 @@ _KEPT = 256
 _LEAST_VISIBLE = 1e-9
 
 
+def _on_complete(method):
+    """The method of a set of terms on the readings at which all its effects have what they need."""
+
+    @wraps(method)
+    def on_complete(self, terms, *args, **kwargs):
+        return method(self.on_complete(terms), terms, *args, **kwargs)
+
+    return on_complete
+
+
 @dataclass(frozen=True)
 class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
     library: effects by name; linear: `rrru.gap.state.Linear`; run (n,): the series of each row; noise: a NoiseModel;
-    smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is.
+    smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is; known: effect to the rows
+    (n,) at which it has all that it needs, of effects that lack something somewhere. Numbers of sets with such effects
+    are those of the rows at which all of them do.
     """
 
     library: dict
@@ -52,9 +73,27 @@ class ModelEvidence:
     run: np.ndarray
     noise: NoiseModel
     smooth: bool = True
+    known: dict = field(default_factory=dict)
 
     def __len__(self):
         return len(self.run)
+
+    def on_complete(self, terms):
+        """The evidence on the readings at which all effects of terms have what they need."""
+        needed = [self.known[name] for name in sorted({term.effect for term in terms} & self.known.keys())]
+        if not needed:
+            return self
+        rows = np.all(needed, axis=0)
+        key = rows.tobytes()
+        if key not in self._parts:
+            part = replace(self, linear=self.linear.at(rows), run=self.run[rows], known={})
+            self._parts[key] = part
+        return self._parts[key]
+
+    @cached_property
+    def _parts(self):
+        """Evidences on some of the readings that have been asked for."""
+        return {}
 
     @cached_property
     def _whitened(self):
@@ -98,6 +137,7 @@ class ModelEvidence:
             self._priors[term] = Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
         return self._priors[term]
 
+    @_on_complete
     def projected(self, terms, levels):
         """The projected problem of a set of terms at discrepancy levels (indices)."""
         terms = tuple(terms)
@@ -107,6 +147,7 @@ class ModelEvidence:
             return problem
         return problem.reordered([made.index(term) for term in terms], self._order(made, terms))
 
+    @_on_complete
     def found(self, terms):
         """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
         terms = tuple(terms)
@@ -163,6 +204,7 @@ class ModelEvidence:
         matrix = spread(self.library[term.effect].coordinates, term.legs)
         return matrix, numbers.reshape(-1, len(matrix))
 
+    @_on_complete
     def over_strengths(self, terms, strengths=None, levels=None):
         """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
 
@@ -226,6 +268,7 @@ class ModelEvidence:
     def _averages(self):
         return Latest(_KEPT)
 
+    @_on_complete
     def independent(self, terms, levels):
         """Log evidence (l,) of many terms at levels (indices), and their best strengths (l, terms).
 
@@ -245,6 +288,7 @@ class ModelEvidence:
             evidence[row] = highest + losses.sum()
         return evidence, best
 
+    @_on_complete
     def scales(self, terms, strengths):
         """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
         if not terms:
@@ -261,8 +305,9 @@ class ModelEvidence:
         problem = self.projected(hypothesis.terms, [0])
         chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
         mean = np.where(chosen[problem.owner], mean, 0.0)
-        return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self))))
+        return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self.on_complete(hypothesis.terms)))))
 
+    @_on_complete
     def _mean(self, terms, strengths, level):
         """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
         broad = self._broadest(terms)
@@ -281,6 +326,7 @@ class ModelEvidence:
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], own, found[before:]])
 
+    @_on_complete
     def coefficients(self, terms, strengths, level):
         """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).
 

@@ -116,7 +116,12 @@ class HeldOut:
 
         Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
         then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
+
+        Readings at which a term lacks what it needs do not count.
         """
+        part = self.on_complete(terms)
+        if part is not self:
+            return part.gains(terms, strengths, level)
         whole, fits = self.predict(terms, strengths, level), self._fits(terms, strengths, level)
         residuals, spread = whole.coordinates
         variances = whole.left_mm2 + (spread**2).sum(axis=-1)
@@ -132,6 +137,13 @@ class HeldOut:
                 variance[out] -= (taken**2).sum(axis=0).reshape(-1, 3)
             result.append(float(score - _log_score(residual, variance).sum()))
         return result
+
+    def on_complete(self, terms):
+        """The predictions of the readings at which all effects of terms have what they need."""
+        evidence = self.evidence.on_complete(terms)
+        if evidence is self.evidence:
+            return self
+        return HeldOut(self.case.at_complete({term.effect for term in terms}), evidence)
 
     def _blocks(self, terms):
         """Columns (n, 3, k) of the calibration and of each term."""

@@ -1,5 +1,7 @@
 """The sim of a case linearised about a state: derivatives by calibration, effects, their shapes and the drives."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rrru.effects.protocol import gives_way
@@ -34,6 +36,24 @@ def linearised(case, state, keys=None):
         *_by_weight(case, at, state, columns),
         (geometry.sd, geometry.mean - state.deviations),
     )
+
+
+def approach_responses(case, state):
+    """Change (m, 3, K) of what is read where each drive comes from below instead of with even odds, by a state's
+    effects; at readings where the path does not determine the sense.
+    """
+    at, approach = case.map_of(State(state.deviations, {})), case.motion.approach
+    even = np.where(np.isfinite(approach), 0.0, approach)
+
+    def twists(sense):
+        return replace(case, motion=replace(case.motion, approach=sense)).contribution(state).twists
+
+    middle, result = twists(even), np.zeros((len(case), 3, approach.shape[1]))
+    for k in range(approach.shape[1]):
+        below = even.copy()
+        below[np.isfinite(even[:, k]), k] = 1.0
+        result[..., k] = case.of_rows(at.move(twists(below) - middle))
+    return result
 
 
 def _by_shape(case, at, key, state):

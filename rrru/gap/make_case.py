@@ -1,8 +1,9 @@
-"""Making the case of a campaign: its motion, which points can be used, which effects they can test.
+"""Making the case of a campaign: its motion, which points are used, which effects they can test and at which of them.
 
 Lengths in mm, angles in rad.
 """
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import (
     DEGREE,
-    STEPS,
     drive_rates,
     driven_path,
     follows_path,
@@ -19,64 +19,58 @@ from rrru.campaign.driven_path import (
     stops,
 )
 from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import PATH, complete_rows, known_values
 from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
+from rrru.gap.approach_direction import at_reversals, rest_widths
 from rrru.gap.case import Case
 from rrru.gap.unknown import unknown_functions
 from rrru.gap.weight import doubts_of
 
-# an effect is tested where at least this share of the points has what it needs
-_ENOUGH = 0.8
 # more coordinates than this share of the numbers read tell nothing
 _MOST_BROAD = 0.5
-# nearer than this to a reversal of a drive the interpolated path may be on the wrong side of it
-_STANDS = {"rad": 1e-8, "mm": 1e-6}
 # of the splines of a finer interpolation: as far as the two are apart is as far as the coarser one may be off
 _FINER_DEGREE = 7
-_NEAR_REVERSAL = {"rad": 3e-4, "mm": 0.1}
 
 
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
     """The case of a measurement table.
 
-    Effects whose needs the motion meets at too few points are set aside with the reason; the few points that lack what
-    a tested effect needs are left out. Raises FitError for an empty table.
+    Every point is used that was measured, is no outlier and can be reached. Effects whose needs the motion meets
+    nowhere are set aside with the reason; `Case.known` has the points at which the others have all that they need.
+    Raises FitError for an empty table.
     """
     if not len(measurements):
         raise FitError("the campaign has no points")
     measurements = register_measurements(measurements, mechanism)
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
-    motion_at = partial(make_motion, mechanism, masses, _course(measurements, mechanism, actuators))
+    stop, course = stops(measurements), _course(measurements, mechanism, actuators)
+    unknown = _unknown_approach(measurements, mechanism, course)
+    motion_at = partial(make_motion, mechanism, masses, replace(course, approach=np.where(unknown, 0.0, np.nan)))
     motion = motion_at()
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
-    # what lies in the drives' play at a run's start depends on how the robot arrived, which no column tells
-    stop = stops(measurements)
-    used &= ~np.isin(stop, stop[starts_of_runs(measurements["run"].to_numpy())])
-    if follows_path(motion.position_mm, measurements["run"].to_numpy()):
-        finer, _ = driven_path(measurements, _FINER_DEGREE)
-        drives = mechanism, actuators, motion.path_index
-        used &= ~at_reversals(motion, _path_drive(measurements, finer, drives, _FINER_DEGREE))
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
         raise FitError("the campaign has no point that a diagnosis can use")
-    testable, untestable, complete = _tested(library, motion, used, _told(measurements, used, stop))
-    used &= complete
+    testable, untestable = _tested(library, motion, used, _told(measurements, used, stop))
     for name, function in unknown_functions(mechanism).items():
-        values = [getattr(motion, need)[used] for need in function.needs]
-        if all(np.isfinite(value).all() and np.ptp(value) > 0.0 for value in values):
+        if not _lacking(function, motion, used):
             testable[name] = function
+    rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
+    known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
     sizes = float(noise_mm), float(arm_mm)
     doubts, bounds = doubts_of(motion, masses)
     of_weight = {"doubts": doubts, "bounds": bounds}
-    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, motion_at=motion_at, **of_weight)
+    more = {"motion_at": motion_at, "known": known, **of_weight}
+    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
 
 
 def _tested(library, motion, used, told):
-    """Effects that the used points can test, others with the reason, and where (n,) the tested ones are complete.
+    """Effects that the used points can test, and others with the reason.
 
     told: how many numbers the used points tell of the robot.
     """
-    testable, untestable, complete = {}, {}, np.ones(len(used), dtype=bool)
+    testable, untestable = {}, {}
     for name, effect in library.items():
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
@@ -84,24 +78,30 @@ def _tested(library, motion, used, told):
         if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * told:
             untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
             continue
-        values = {need: getattr(motion, need).reshape(len(used), -1) for need in effect.needs}
-        lacking = _lacking({need: value[used] for need, value in values.items()})
+        lacking = _lacking(effect, motion, used)
         if lacking:
             untestable[name] = lacking
         else:
             testable[name] = effect
-            complete = np.all([complete, *(np.isfinite(value).all(axis=1) for value in values.values())], axis=0)
-    return testable, untestable, complete
+    return testable, untestable
 
 
-def _lacking(values):
-    """Why values (n, k) by name do not tell what an effect needs, empty where they do."""
-    known = {name: value[np.isfinite(value).all(axis=1)] for name, value in values.items()}
-    few = [name for name, value in known.items() if len(value) < _ENOUGH * len(values[name])]
-    if few:
-        return f"needs {', '.join(few)}, which the columns do not give"
+def _lacking(effect, motion, used):
+    """Why the used points do not tell what an effect needs, empty where they do."""
+    values = {need: getattr(motion, need)[used] for need in effect.needs if need != PATH}
+    known = {need: value[known_values(value)].reshape(-1, value[0].size) for need, value in values.items()}
+    none = [name for name, value in known.items() if not len(value)]
+    if none:
+        return f"needs {', '.join(none)}, which the columns do not give"
     alike = [name for name, value in known.items() if not np.ptp(value, axis=0).any()]
-    return f"needs {', '.join(alike)} of more than one value" if alike else ""
+    if alike:
+        return f"needs {', '.join(alike)} of more than one value"
+    return "" if complete_rows(effect, motion)[used].any() else no_approach(used)
+
+
+def no_approach(used):
+    """Why an effect that depends on the sense in which the drives arrive is not tested at used points (n,)."""
+    return f"the sense in which the drives arrive is known at none of {int(used.sum())} points"
 
 
 def _told(measurements, used, stop):
@@ -122,33 +122,18 @@ def _fitted(effect, motion):
     return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
 
 
-def at_reversals(motion, other_path):
-    """Rows (n,) at which a drive reverses: on its way up or down there the commanded points alone do not tell.
-
-    other_path: (N, K) actuator values along the path by another interpolation. As far as the two are apart between a
-    point and its neighbours, neither tells where a drive reverses.
-    """
-    result = np.zeros(len(motion.drive), dtype=bool)
-    stations = np.unique(motion.path_index)
-    apart = np.maximum.reduceat(np.abs(motion.path_drive - other_path), stations)
-    apart = np.maximum(apart, np.concatenate([np.zeros_like(apart[:1]), apart[:-1]]))
-    apart = apart[np.searchsorted(stations, motion.path_index)]
-    for leg, unit in enumerate(motion.robot.parts.units):
-        for path in (motion.path_drive[:, leg], other_path[:, leg]):
-            reversals = _reversals(path, _STANDS[unit])
-            if len(reversals):
-                nearest = reversals[np.abs(reversals[:, None] - motion.path_index).argmin(axis=0)]
-                close = np.abs(nearest - motion.path_index) <= STEPS
-                way = np.abs(path[nearest] - motion.drive[:, leg])
-                result |= close & (way < _NEAR_REVERSAL[unit] + apart[:, leg])
-    return result
-
-
-def _reversals(path, stands):
-    """Rows of a path (N,) of one drive at which it turns back; by less than `stands` it does not move."""
-    step = np.diff(path)
-    moving = np.flatnonzero(~(np.abs(step) < stands))
-    return moving[1:][step[moving[:-1]] * step[moving[1:]] < 0.0]
+def _unknown_approach(measurements, mechanism, course):
+    """Where (n, K) the rows do not determine from which side a drive comes: starts of runs, and next to reversals."""
+    run, stop = measurements["run"].to_numpy(), stops(measurements)
+    # no column tells how the robot got to a run's start
+    starts = np.isin(stop, stop[starts_of_runs(run)])
+    result = np.repeat(starts[:, None], course.drive.shape[1], axis=1)
+    if course.stops:
+        return result
+    finer, _ = driven_path(measurements, _FINER_DEGREE)
+    other = _path_drive(measurements, finer, (mechanism, course.drive, course.path_index), _FINER_DEGREE)
+    first = np.diff(stop, prepend=-1) > 0
+    return result | at_reversals(course, other, rest_widths(course.drive[first], run[first], mechanism.parts.units))
 
 
 def _course(measurements, mechanism, actuators):

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from rrru.effects.protocol import gives_way
+from rrru.effects.protocol import Contribution, gives_way, lacks_values
 from rrru.gap.weight import WEIGHT
 
 
@@ -43,7 +43,11 @@ class State:
         effect = library[key[0]]
         values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
         borne = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
-        return effect.contribute(borne, values)
+        made = effect.contribute(borne, values)
+        if not (getattr(effect, "needs", ()) and (lacking := lacks_values(effect, motion)).any()):
+            return made
+        # what it changes there is unknown; `rrru.gap.evidence` does not count these readings for it
+        return Contribution(np.where(lacking[:, None, None], 0.0, made.twists))
 
 
 @dataclass(frozen=True)
@@ -69,3 +73,10 @@ class Linear:
     by_weight: dict = field(default_factory=dict)
     weight_steps: tuple = ()
     base_prior: tuple | None = None
+
+    def at(self, rows):
+        """The linearisation at some of its rows (m,)."""
+        arrays = {name: getattr(self, name)[rows] for name in ("data", "base", "drive")}
+        columns = {name: getattr(self, name) for name in ("columns", "shape_columns", "by_weight")}
+        chosen = {name: {key: values[rows] for key, values in made.items()} for name, made in columns.items()}
+        return replace(self, **arrays, **chosen)

@@ -39,7 +39,7 @@ def drives(count, generator):
     return low + (high - low) * generator.random((count, DRIVES))
 
 
-def _commands(drive):
+def commands(drive):
     """The table of stops at drive values (n, 6), nothing measured yet."""
     frame = pd.DataFrame({"run": 1, "trajectory": "poses", "point": np.arange(1, len(drive) + 1)})
     told = dict(zip(ARM.parts.columns, drive.T, strict=True))
@@ -59,7 +59,7 @@ def measure(effects=(), count=200, seed=1, noise=(NOISE_MM, NOISE_RAD)):
     """Positions and orientations that the arm with errors and active effects reaches, as a table."""
     generator = np.random.default_rng(seed)
     drive = drives(count, generator)
-    frame = _commands(drive)
+    frame = commands(drive)
     frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
     motion = make_case(frame, ARM, MASSES, 1.0, {}).motion
     twists = ARM.twists_of(ERRORS) + together(effects, motion).twists

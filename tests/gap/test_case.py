@@ -3,16 +3,14 @@ routes.
 """
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import driven_path, starts_of_runs
+from rrru.campaign.driven_path import starts_of_runs
 from rrru.errors import FitError
 from rrru.gap.calibrate import calibrate
-from rrru.gap.make_case import at_reversals
 from rrru.gap.state import State
 from tests.gap import campaigns
 from tests.gap.campaigns import EFFECTS, ROBOT, SIM, active, case_of, drawn, measure, plan_of, robot_of
@@ -25,25 +23,20 @@ def _exact(case, state):
     return case.mechanism.measured(*case.posed(state))[case.used]
 
 
-def _doubtful(case):
-    """Rows (n,) at reversals of a campaign's case."""
-    finer, _ = driven_path(case.measurements, 7)
-    other = SIM.inverse(finer)
-    other[case.motion.path_index] = case.motion.drive
-    return at_reversals(case.motion, other)
-
-
 @pytest.fixture(scope="module")
 def case():
     return case_of(measure())
 
 
-def test_the_first_point_of_a_run_is_not_used_for_its_past_is_unknown(case):
-    run = case.measurements["run"].to_numpy()
+def test_points_that_are_known_are_used_and_no_run_begins_with_a_known_approach(case):
     starts = starts_of_runs(case.measurements["run"].to_numpy())
-    assert np.flatnonzero(starts).tolist() == [int(np.argmax(run == r)) for r in np.unique(run)]
-    np.testing.assert_array_equal(case.used, ~starts & ~_doubtful(case))
+    assert case.used.all() and set(case.known) == {"backlash"}
+    assert not case.known["backlash"][starts].any() and 0.7 < case.known["backlash"].mean() < 1.0
+    np.testing.assert_array_equal(case.known["backlash"], np.isnan(case.motion.approach).all(axis=1))
     assert len(case) == case.used.sum() == len(case.points) == len(case.run) == case.count
+    some = case.at_complete({"backlash", "servo_lag"})
+    np.testing.assert_array_equal(some.used, case.known["backlash"])
+    assert case.at_complete({"servo_lag"}) is case
 
 
 def test_points_that_are_lost_or_marked_are_not_used():
@@ -53,10 +46,7 @@ def test_points_that_are_lost_or_marked_are_not_used():
     used = case_of(frame).used
     assert not used[[3, 40, 50]].any() and used[[2, 41, 51]].all()
     frame.loc[60:70, "status"] = "near_singularity"
-    near = slice(60, 71)
-    kept = case_of(frame).used[near]
-    doubtful = starts_of_runs(frame["run"].to_numpy()) | _doubtful(case_of(frame))
-    assert kept.any() and kept.sum() == (~doubtful)[near].sum()
+    assert case_of(frame).used[60:71].all() and case_of(frame).used.sum() == len(frame) - 3
 
 
 def test_points_dropped_later_stay_dropped(case):
@@ -149,34 +139,6 @@ def test_the_data_about_a_state_are_what_it_leaves_and_what_it_explains(case, na
         linear.shape_columns[name].shape[-1] == len(linear.shape_steps[name])
         and np.isfinite(linear.shape_columns[name]).all()
     )
-
-
-def test_a_drive_that_turns_back_at_a_point_makes_it_doubtful_and_one_between_two_points_does_not():
-    """One drive swings as a sine sampled at its crest, or half a step beside it."""
-    steps = np.arange(0, 97)
-    for shift, doubtful in ((0.0, [3, 9]), (4.0, [])):
-        path = np.zeros((len(steps), 3))
-        path[:, 1] = 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0)
-        path[:, 0] = path[:, 2] = 0.001 * steps
-        index = np.arange(0, 97, 8)
-        motion = SimpleNamespace(robot=ROBOT, path_drive=path, path_index=index, drive=path[index])
-        assert np.flatnonzero(at_reversals(motion, path)).tolist() == doubtful
-
-
-def test_where_two_interpolations_are_apart_none_tells_where_a_drive_turns_back():
-    """One crest lies half a step beside a point, by another path a quarter: both points beside it are in doubt."""
-    steps, index = np.arange(0, 97), np.arange(0, 97, 8)
-    rising = 0.001 * steps
-
-    def path_of(shift):
-        return np.stack([rising, 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0), rising], axis=1)
-
-    path, other = path_of(4.0), path_of(4.0)
-    motion = SimpleNamespace(robot=ROBOT, path_drive=path, path_index=index, drive=path[index])
-    assert not at_reversals(motion, other).any()
-    between = (steps > 24) & (steps < 32)
-    other[between] = path_of(2.0)[between]
-    assert np.flatnonzero(at_reversals(motion, other)).tolist() == [3, 4]
 
 
 def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):

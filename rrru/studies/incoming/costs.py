@@ -4,8 +4,9 @@ import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
-from rrru.errors import RrruError
-from rrru.gap.diagnose import POINTS_PER_PARAMETER, sim
+from rrru.errors import FitError, RrruError
+from rrru.gap.determined import require_determined
+from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
@@ -37,9 +38,10 @@ def costs(measurements, config, section):
         )
     except RrruError as error:
         return [*said, f"no diagnosis: {error}"]
-    least = POINTS_PER_PARAMETER * len(robot.parameters)
-    if len(case) < least:
-        said.insert(0, f"no diagnosis: {case.count} usable points, {least} are needed")
+    try:
+        case = require_determined(case)
+    except FitError as error:
+        said.insert(0, f"no diagnosis: {error}")
     return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case)]
 
 

@@ -55,7 +55,7 @@ def test_models_get_better_and_carry(studied):
 
 
 def test_a_short_series_is_calibrated_but_not_diagnosed(tmp_path):
-    series = _series(tmp_path, simulated_arm.log(25))
+    series = _series(tmp_path, simulated_arm.log(10))
     short = arms.study(series, ROBOTS, _settings(), tmp_path / "sheet.parquet")
     tables = {name: frame.assign(campaign="mine") for name, frame in arm_tables.tables(short).items()}
     row = tables["real_verdicts"].iloc[0]

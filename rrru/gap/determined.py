@@ -1,0 +1,91 @@
+"""Whether a campaign's readings determine the calibration, with numbers to spare for the noise and for effects.
+
+A linear model with p parameters leaves m - p degrees of freedom of m numbers read; its Jacobian (m, p) has the rank p
+where the numbers determine all parameters.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rrru.errors import FitError
+from rrru.gap.approach_direction import has_direction
+from rrru.gap.calibrate import observations_of
+
+# numbers read beyond the calibration's parameters: of 20 degrees of freedom the noise is found within 16 %, 1 sigma
+MIN_SPARE_NUMBERS = 20
+# with fewer numbers for each parameter large effects alone are found, and `few_readings` says so
+_FEW_PER_PARAMETER = 9.0
+# singular values of columns of unit length below this share of the largest are rounding
+_RANK_TOLERANCE = 1e-9
+
+
+def require_determined(case, whose=""):
+    """The Case without effects that lack what they need at too many readings.
+
+    The others have to determine the calibration with `MIN_SPARE_NUMBERS` to spare. whose: first words of a message.
+    Raises FitError where all readings together do not.
+    """
+    columns = observations_of(case).jacobian(case.mechanism.parameters.nominal)
+    if why := _why_undetermined(case, columns):
+        raise FitError(f"{whose}{why}")
+    few = {}
+    for name in case.known:
+        rows = case.complete([name])
+        if not _is_determined(columns[rows]):
+            few[name] = _too_few(case, name, rows, columns.shape[-1])
+    if not few:
+        return case
+    library = {name: effect for name, effect in case.library.items() if name not in few}
+    # nobody asked for an unknown function
+    reasons = {name: reason for name, reason in few.items() if name in case.effects}
+    known = {name: points for name, points in case.known.items() if name not in few}
+    return replace(case, library=library, untestable=case.untestable | reasons, known=known)
+
+
+def few_readings(case):
+    """A sentence on how little a diagnosis of few readings finds, None where they are many."""
+    numbers, count = 3 * len(case), len(case.mechanism.parameters)
+    if numbers >= _FEW_PER_PARAMETER * count:
+        return None
+    found = "an effect is found from about the size detectable_mm in gap_identifiability on"
+    return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
+
+
+def _is_determined(columns):
+    """Whether numbers with these derivatives (m, 3, p) determine the p parameters with some to spare."""
+    count = columns.shape[-1]
+    return 3 * len(columns) >= count + MIN_SPARE_NUMBERS and _rank(columns) == count
+
+
+def _rank(columns):
+    """Numerical rank of derivatives (m, 3, p), each parameter by how far it moves what is read."""
+    flat = columns.reshape(-1, columns.shape[-1])
+    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+    return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=_RANK_TOLERANCE))
+
+
+def _why_undetermined(case, columns):
+    """Why readings with derivatives (m, 3, p) do not determine the calibration and what to do, empty where they do."""
+    numbers, count = 3 * len(columns), columns.shape[-1]
+    needed = count + MIN_SPARE_NUMBERS
+    fewer = "or name a smaller set of parameters under `errors` of the campaign"
+    if numbers < needed:
+        poses = len(np.unique(case.stop))
+        more = int(np.ceil((needed - numbers) * poses / numbers))
+        read = f"{numbers} numbers read at {poses} poses are too few for a diagnosis of {count} parameters"
+        return f"{read}; allowed: at least {needed}: measure {more} more poses {fewer}"
+    if (rank := _rank(columns)) < count:
+        read = f"{numbers} numbers read determine {rank} of the calibration's {count} parameters"
+        return f"{read}; allowed: all of them: measure poses that move every drive {fewer}"
+    return ""
+
+
+def _too_few(case, name, rows, count):
+    """Why an effect that has what it needs at some rows (m,) is not tested."""
+    what = "what it needs"
+    if has_direction(case.library[name]):
+        what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"
+    points, numbers = len(np.unique(case.at[rows])), 3 * int(rows.sum())
+    least = f"the calibration's {count} parameters with {MIN_SPARE_NUMBERS} numbers to spare"
+    return f"{what} is known at {points} of {case.count} points; their {numbers} numbers do not determine {least}"
