@@ -74,10 +74,11 @@ def gap_rows(attribution, corrected, section, file, shrink):
     except (ConfigError, SimulationError, UnreachableError) as error:
         why = f"corrected model not driven: {error}; closed at its drive values instead"
         poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
-    result = []
+    result, known = [], attribution.case.complete({term.effect for term in attribution.fit.terms})
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
         twists = twists + _instrument(attribution.case, robot, corrected.found, kind == "corrected_model")
-        left = attribution.case.by_other(robot, own, twists)
+        # where nobody knows from which side a drive comes the file cannot be held to a side
+        left = np.where(known[:, None], attribution.case.by_other(robot, own, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
             result.append(model_row(shrink, kind, left, attribution.case.noise_mm))
     return pd.DataFrame(result), why

@@ -79,6 +79,7 @@ def arm_evidence():
 def _of_robot(name, evidence, terms, strength, level):
     strengths = strength * np.resize([1.0, 0.3, 0.1], len(terms))
     level = level if level in evidence.levels else 0
+    evidence = evidence.on_complete(terms)
     return Problem(name, evidence.projected(terms, [level]), strengths, evidence, terms, level)
 
 

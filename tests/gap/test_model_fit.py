@@ -119,7 +119,9 @@ def test_the_fit_is_of_the_named_set_under_the_case_it_is_stated_for():
     for attribution in (found, with_effects(found, ("backlash",)), with_effects(found, ("backlash", "servo_lag"))):
         terms = {(t.effect, t.shape) for t in attribution.hypothesis.terms}
         assert set(attribution.state.effects) == terms == {(t.effect, t.shape) for t in attribution.fit.terms}
-        assert attribution.fit.model.case is attribution.case and attribution.fit.level == attribution.level
+        complete = attribution.case.at_complete(attribution.hypothesis.effects)
+        np.testing.assert_array_equal(attribution.fit.model.case.used, complete.used)
+        assert attribution.fit.level == attribution.level
         rows = parameter_rows(attribution)
         for name in attribution.hypothesis.effects:
             assert rows.loc[rows["effect"] == name, "standard_error"].notna().any()

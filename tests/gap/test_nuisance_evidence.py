@@ -82,7 +82,8 @@ def _evidence(robot):
 @pytest.mark.parametrize("robot", ["3-RRRU", "arm"])
 @pytest.mark.parametrize("names", [("drive_compliance",), ("drive_compliance", "backlash")])
 def test_the_linearisation_is_a_quarter_of_a_nat_off_where_the_effect_acts(robot, names):
-    evidence, terms = _evidence(robot), tuple(map(Term, names))
+    terms = tuple(map(Term, names))
+    evidence = _evidence(robot).on_complete(terms)
     grids = STRENGTHS, *([1.0],) * (len(terms) - 1)
     found, grid = evidence.over_strengths(terms, grids, [0])
     grams = partial(evidence._grams, [0])

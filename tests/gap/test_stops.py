@@ -126,7 +126,7 @@ def test_a_fold_holds_all_that_was_read_at_a_stop(turned):
     held_out = HeldOut(case, case.evidence(case.linearise(calibrate(case))))
     row_stop = case.points["point"].to_numpy() - 1
     stop = row_stop // 3
-    assert len(stop) == (6 if turned else 3) * (_STOPS - 1)
+    assert len(stop) == (6 if turned else 3) * _STOPS
     for number in np.unique(stop):
         assert len(np.unique(held_out.fold[stop == number])) == 1
     # stretches of five stops in turn, of which every fifth is one fold
