@@ -30,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # a median residual above this share of the robot's size is none that the errors of its geometry make
 FAR_SHARE_OF_SIZE = 2e-3
+# a median residual above this share of the robot's size is that of a frame in which no search can begin
+LOST_SHARE_OF_SIZE = 0.05
 # an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zeros of drives, which
 # `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
 _MAX_SHARE_AFTER = 0.02
@@ -114,7 +116,7 @@ def register_measurements(measurements: pd.DataFrame, robot: Any) -> pd.DataFram
     readings = rows.readings(measurements, robot.angle_arm_mm) or Readings(rows.measured(measurements))
     off = np.linalg.norm(lacking(robot, replace(readings, turn=None), poses, twists)[used], axis=1)
     off = off[np.isfinite(off)]
-    if not len(off) or np.median(off) <= FAR_SHARE_OF_SIZE * robot.size_mm:
+    if not len(off) or np.median(off) <= LOST_SHARE_OF_SIZE * robot.size_mm:
         return measurements
     seen = robot, poses.of(used), twists, readings.of(used)
     most = max(FAR_SHARE_OF_SIZE * robot.size_mm, _MAX_SHARE_AFTER * float(np.median(off)))

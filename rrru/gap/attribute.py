@@ -18,6 +18,7 @@ from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis, search
 from rrru.gap.spectra import with_spectra
 from rrru.gap.state import State
+from rrru.gap.terms import each_leg
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
 
@@ -182,15 +183,16 @@ def with_effects(attribution, effects):
 def fit_hypothesis(case, evidence, starts, chosen, known=None):
     """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
 
-    It is fitted to the readings at which all its effects have what they need. chosen: both; known: a ModelFit that may
-    be the one asked for.
+    It is fitted to the readings at which all its effects have what they need. Where one value for all legs is probable
+    enough each leg still gets its own: nobody knows that they are equal, and the errors say so. chosen: both; known: a
+    ModelFit that may be the one asked for.
     """
     hypothesis, level = chosen
-    case = case.at_complete(hypothesis.effects)
-    scales = evidence.scales(hypothesis.terms, hypothesis.strengths[level])
-    if known and known.level == level and known.model.same_as(EffectModel(case, hypothesis.terms, scales)):
+    case, terms = case.at_complete(hypothesis.effects), tuple(map(each_leg, hypothesis.terms))
+    scales = evidence.scales(terms, hypothesis.strengths[level])
+    if known and known.level == level and known.model.same_as(EffectModel(case, terms, scales)):
         return known
-    return fit_model(case, starts, hypothesis.terms, scales, level)
+    return fit_model(case, starts, terms, scales, level)
 
 
 class _Looks:

@@ -1,7 +1,7 @@
 """Whether a campaign's readings determine the calibration, with numbers to spare for the noise and for effects.
 
-A linear model with p parameters leaves m - p degrees of freedom of m numbers read; its Jacobian (m, p) has the rank p
-where the numbers determine all parameters.
+A linear model whose Jacobian (m, p) has the rank r leaves m - r degrees of freedom of m numbers read. Combinations of
+parameters that the numbers do not determine stay at their prior and cost none.
 """
 
 from dataclasses import replace
@@ -27,13 +27,14 @@ def require_determined(case, whose=""):
     Raises FitError where all readings together do not.
     """
     columns = observations_of(case).jacobian(case.mechanism.parameters.nominal)
-    if why := _why_undetermined(case, columns):
+    rank = _rank(columns)
+    if why := _why_undetermined(case, rank):
         raise FitError(f"{whose}{why}")
     few = {}
     for name in case.known:
         rows = case.complete([name])
-        if not _is_determined(columns[rows]):
-            few[name] = _too_few(case, name, rows, columns.shape[-1])
+        if not _is_determined(columns[rows], rank):
+            few[name] = _too_few(case, name, rows, rank)
     if not few:
         return case
     library = {name: effect for name, effect in case.library.items() if name not in few}
@@ -52,10 +53,9 @@ def few_readings(case):
     return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
 
 
-def _is_determined(columns):
-    """Whether numbers with these derivatives (m, 3, p) determine the p parameters with some to spare."""
-    count = columns.shape[-1]
-    return 3 * len(columns) >= count + MIN_SPARE_NUMBERS and _rank(columns) == count
+def _is_determined(columns, rank):
+    """Whether numbers with these derivatives (m, 3, p) determine so many combinations of parameters, some to spare."""
+    return 3 * len(columns) >= rank + MIN_SPARE_NUMBERS and _rank(columns) == rank
 
 
 def _rank(columns):
@@ -65,27 +65,23 @@ def _rank(columns):
     return int(np.linalg.matrix_rank(np.linalg.qr(flat / size, mode="r"), rtol=_RANK_TOLERANCE))
 
 
-def _why_undetermined(case, columns):
-    """Why readings with derivatives (m, 3, p) do not determine the calibration and what to do, empty where they do."""
-    numbers, count = 3 * len(columns), columns.shape[-1]
-    needed = count + MIN_SPARE_NUMBERS
+def _why_undetermined(case, rank):
+    """Why readings that determine so many combinations of parameters are too few and what to do, empty if they are not."""
+    numbers, needed = 3 * len(case), rank + MIN_SPARE_NUMBERS
+    if numbers >= needed:
+        return ""
+    poses = len(np.unique(case.stop))
+    more = int(np.ceil((needed - numbers) * poses / numbers))
+    read = f"{numbers} numbers read at {poses} poses are too few for a diagnosis of {rank} parameters"
     fewer = "or name a smaller set of parameters under `errors` of the campaign"
-    if numbers < needed:
-        poses = len(np.unique(case.stop))
-        more = int(np.ceil((needed - numbers) * poses / numbers))
-        read = f"{numbers} numbers read at {poses} poses are too few for a diagnosis of {count} parameters"
-        return f"{read}; allowed: at least {needed}: measure {more} more poses {fewer}"
-    if (rank := _rank(columns)) < count:
-        read = f"{numbers} numbers read determine {rank} of the calibration's {count} parameters"
-        return f"{read}; allowed: all of them: measure poses that move every drive {fewer}"
-    return ""
+    return f"{read}; allowed: at least {needed}: measure {more} more poses {fewer}"
 
 
-def _too_few(case, name, rows, count):
+def _too_few(case, name, rows, rank):
     """Why an effect that has what it needs at some rows (m,) is not tested."""
     what = "what it needs"
     if has_direction(case.library[name]):
         what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"
     points, numbers = len(np.unique(case.at[rows])), 3 * int(rows.sum())
-    least = f"the calibration's {count} parameters with {MIN_SPARE_NUMBERS} numbers to spare"
+    least = f"the calibration's {rank} parameters with {MIN_SPARE_NUMBERS} numbers to spare"
     return f"{what} is known at {points} of {case.count} points; their {numbers} numbers do not determine {least}"

@@ -238,7 +238,7 @@ class ModelFit:
         if WEIGHT not in places:
             return []
         (block,) = (block for block in self.estimate.parameters.blocks if block.name == WEIGHT)
-        errors = np.sqrt(np.diag(self.estimate.covariance)[places[WEIGHT]])
+        errors = self.estimate.block_errors(WEIGHT)
         return list(zip(block.names, block.units, self.estimate.block(WEIGHT).tolist(), errors.tolist(), strict=True))
 
     def one_sigma_steps(self):

@@ -1,6 +1,6 @@
 """The hypotheses of the diagnosis: sets of terms, a term being one effect in one shape on certain legs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,6 +26,11 @@ def spread(coordinates, legs):
         # coordinates of one kind come in the order of the legs
         return np.stack([every[:, coordinates.legs == leg] for leg in np.unique(coordinates.legs)]).sum(axis=0)
     return every[:, coordinates.legs == legs]
+
+
+def each_leg(term):
+    """The term with a value of its own for each leg where it has one value for all of them."""
+    return replace(term, legs=EACH) if term.legs == SAME else term
 
 
 def per_leg(effect):
