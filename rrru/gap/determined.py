@@ -66,7 +66,7 @@ def _rank(columns):
 
 
 def _why_undetermined(case, rank):
-    """Why readings that determine so many combinations of parameters are too few and what to do, empty if they are not."""
+    """Why readings of this rank are too few for a diagnosis and what to do, empty where they are not."""
     numbers, needed = 3 * len(case), rank + MIN_SPARE_NUMBERS
     if numbers >= needed:
         return ""

@@ -231,9 +231,12 @@ def test_poses_that_leave_a_number_open_are_diagnosed_as_far_as_they_determine_i
     same = {name: case.measurements[name].iloc[0] for name in arms.ARM.parts.columns[:2]}
     still = case.measurements.assign(**same)
     drive = rows.actuators(still, arms.ARM)
-    still = still.assign(**rows.vector_columns("command", arms.ARM.forward(drive)))
-    open_case = require_determined(replace(case, measurements=still))
-    fit = fit_model(open_case, [State(np.zeros(len(case.mechanism.parameters)), {})])
+    place, generator = arms.ARM.forward(drive), np.random.default_rng(1)
+    seen = place + arms.NOISE_MM * generator.standard_normal(place.shape)
+    still = still.assign(**rows.vector_columns("command", place), **rows.vector_columns("measured", seen))
+    still = still.drop(columns=[name for name in still if name.startswith("measured_r")])
+    open_case = require_determined(arms.case_of(still))
+    fit = fit_model(open_case, [State(np.zeros(len(open_case.mechanism.parameters)), {})])
     errors = fit.estimate.standard_errors
     assert fit.estimate.rank < len(errors) and np.isfinite(errors).all()
     # what the poses do not determine has the error of its prior
