@@ -6,6 +6,7 @@
 import numpy as np
 
 from rrru.effects.library import summary
+from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 
 SCHEMA = 1
 _VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
@@ -18,6 +19,7 @@ _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the libr
 # more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs,
 # and one from which on something acts
 _LISTED, _WORTH, _SURE, _ACTS = 3, 0.05, 0.9, 0.5
+_RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 # a share beyond this is none: effects that imitate each other make a little more than the whole
 _MOST_SHARE = 1.5
 
@@ -194,8 +196,13 @@ def _scatter(facts):
     share = _scatter_share(facts, _ACTS)
     if share < _WORTH:
         return []
+    unknown = REPEATABILITY_UNKNOWN in facts["notes"]
     if not _shares_told(facts):
+        if unknown:
+            return [f"Some of it is {_RANDOM}"]
         return ["Some of it does not repeat from pass to pass: no model can take that away."]
+    if unknown:
+        return [f"{percent(share)} is {_RANDOM}"]
     return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
 
 

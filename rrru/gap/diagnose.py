@@ -19,7 +19,7 @@ from rrru.gap.determined import few_readings, require_determined
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
-from rrru.gap.result_notes import fit_notes, weight_notes
+from rrru.gap.result_notes import fit_notes, noise_notes, weight_notes
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
@@ -125,11 +125,7 @@ def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     if lacking := case.count - len(np.unique(case.at[case.complete(acting)])):
         where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
-    if stated_mm and case.noise_mm > CONTRADICTED * stated_mm:
-        worse = "the robot does not repeat, or the instrument is worse"
-        yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: {worse}"
-    if stated_mm and case.noise_mm < stated_mm / CONTRADICTED:
-        yield f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}: the instrument is better"
+    yield from noise_notes(case, stated_mm, CONTRADICTED)
     for effect, note in case.untestable.items():
         yield f"{effect} not tested: {note}"
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from rrru.effects.library import BY_NAME_ONLY, NAMES, summary
 from rrru.gap import answer
+from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
 from rrru.store import facts
@@ -86,6 +87,12 @@ def test_what_does_not_repeat_is_told_where_it_more_likely_acts_than_not(sure, t
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     unsure = budget.assign(probability=budget["probability"].mask(budget["kind"].isin(["scatter", "runs"]), sure))
     assert ("does not repeat" in " ".join(answered(unsure)["sentences"])) == told
+
+
+def test_without_a_pose_measured_twice_repeatability_is_unknown():
+    said = " ".join(answered(notes=REPEATABILITY_UNKNOWN)["sentences"])
+    assert "does not repeat" not in said
+    assert "10 % is random error above the stated noise. Repeatability is unknown: no pose was measured twice." in said
 
 
 @pytest.mark.parametrize(("factor", "gap"), [(12.0, 0.02), (1.0, 0.0)])
