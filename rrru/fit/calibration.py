@@ -28,7 +28,9 @@ FloatArray = npt.NDArray[np.float64]
 # a nanometre, below what any instrument resolves: with this noise the prior decides what the readings do not determine
 _VANISHING_SD_MM = 1e-6
 # in standard deviations of that noise: the search ends where a full step moves all predictions by a picometre
-_OPTIONS = SolverOptions(step_tolerance=1e-3)
+_OPTIONS = SolverOptions(step_tolerance=1e-3, max_iterations=60)
+# noise of the best instruments
+_FINE_NOISE_MM = 0.01
 # median of the absolute value of a standard normal number
 _NORMAL_MEDIAN = 0.6745
 # influence psi(r) and its slope of the robust losses, from their squared residual z in units of the loss scale
@@ -144,6 +146,9 @@ def calibrate(
 def estimate_deviations(observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1) -> Estimate:
     """The Estimate of the deviations (p,) of the observed mechanism by least squares, within its bounds.
 
+    Where the readings hardly determine some combinations the search does not end under vanishing noise, as it follows
+    a curved valley; it is begun again under the noise of the best instruments, which leaves these to the prior.
+
     loss: one of `rrru.estimation.solver.LOSSES`, with the residual `loss_scale_mm` at which a robust loss begins to
     bend. Combinations of parameters that the readings do not determine stay at their prior mean. Raises FitError, with
     the Estimate as its result, where there are fewer equations than parameters or the search does not converge.
@@ -155,6 +160,8 @@ def estimate_deviations(observations: Any, loss: str = "linear", loss_scale_mm: 
     start, evaluations = starting_values(observations)
     found = solve(least_squares_problem(observations, loss, loss_scale_mm), [start], _OPTIONS)
     if not found.end.converged:
+        found = solve(least_squares_problem(observations, loss, loss_scale_mm, _FINE_NOISE_MM), [start])
+    if not found.end.converged:
         raise FitError(explain_end(found, "the calibration"), found)
     return replace(found, end=replace(found.end, evaluations=found.end.evaluations + evaluations))
 
@@ -164,11 +171,12 @@ def estimate_deviations_at(observations: Any, deviations: npt.ArrayLike, message
     return estimate_at(least_squares_problem(observations), deviations, message, evaluations)
 
 
-def least_squares_problem(observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1) -> Problem:
+def least_squares_problem(
+    observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1, noise_mm: float = _VANISHING_SD_MM
+) -> Problem:
     """The Problem whose solution is the least sum of squares, or of a robust loss that bends at `loss_scale_mm`."""
     geometry = Parameters((Block.geometry(observations.mechanism.parameters),))
-    noise = WhiteNoise(_VANISHING_SD_MM)
-    return Problem(observations, geometry, noise, loss, loss_scale_mm / _VANISHING_SD_MM)
+    return Problem(observations, geometry, WhiteNoise(noise_mm), loss, loss_scale_mm / noise_mm)
 
 
 def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:
@@ -189,7 +197,7 @@ def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:
     names, scale, columns = np.array(parameters.names)[free], parameter_scale(mechanism)[free], jacobian[..., free]
     reduced = analyse_columns(names, scale, columns)
     if robust:
-        z = (residual / (estimate.problem.loss_scale * _VANISHING_SD_MM)) ** 2
+        z = (estimate.standardized_residual / estimate.problem.loss_scale) ** 2
         first, second = _SLOPES[estimate.problem.loss](z)
         standard_errors[free] = reduced.robust_standard_errors(columns, first * residual, first + 2.0 * z * second)
     else:
