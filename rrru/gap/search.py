@@ -114,7 +114,9 @@ class _Tried:
     def refer(self):
         """Make the most probable set of effects that lack nothing the reference of the others."""
         complete = [h for h in self.hypotheses.values() if h.effects.isdisjoint(self.evidence.known)]
-        best = max(complete, key=lambda h: h.evidence.max())
+        # what an effect more explains has to pay for its choice among all of them
+        price = np.log(len(self.evidence.library))
+        best = max(complete, key=lambda h: h.evidence.max() - price * len(h.terms))
         if not self._others or best.terms == self._reference.terms:
             return
         last, self._reference, self._others = self._others, best, {}
