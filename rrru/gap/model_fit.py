@@ -34,8 +34,9 @@ _STEP, _NOTHING = 1e-4, 1e-3
 PRIOR_TIMES_TYPICAL = 20.0
 # a hundredth of a standard error is below what any verdict depends on
 _OPTIONS = SolverOptions(step_tolerance=1e-2)
-# a fit of more parameters is begun once: nearly all of them are coefficients of functions, in which the model is linear
-_MAX_RESTARTED = 200
+# a fit of more parameters is begun once, since nearly all of them are coefficients of functions, in which the model is
+# linear, and ends within a fiftieth of a nat, since its steps are slow
+_MANY, _MANY_OPTIONS = 200, SolverOptions(step_tolerance=0.3, max_iterations=60)
 # fits whose log posterior densities differ by less are equally good
 _EQUAL_NATS = 1.0
 
@@ -272,14 +273,14 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=
     the model has no pose at any start, even without effects.
     """
     model = EffectModel(case, tuple(terms), np.asarray(scales, dtype=float), signed)
-    problem = Problem(model, model.parameters, whitening_of(case, level))
+    problem, many = Problem(model, model.parameters, whitening_of(case, level)), len(model.parameters) > _MANY
     fits = []
     for start in starts:
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
         candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
-        fits.append(solve(problem, [candidate], _OPTIONS))
-        if (fits[-1].end.straight and fits[-1].end.converged) or len(model.parameters) > _MAX_RESTARTED:
+        fits.append(solve(problem, [candidate], _MANY_OPTIONS if many else _OPTIONS))
+        if (fits[-1].end.straight and fits[-1].end.converged) or many:
             break
     enough = min(one.end.cost for one in fits) + _EQUAL_NATS
     return ModelFit(model, next(one for one in fits if one.end.cost <= enough), level)
