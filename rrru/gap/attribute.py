@@ -237,7 +237,8 @@ def _rounds(case, calibrated, prior, stated):
     evidence = case.evidence(linear)
     small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
     for _ in range(_MOST_ROUNDS):
-        beliefs = posterior(evidence, search(evidence), prior)
+        decisive = evidence.on_library()
+        beliefs = posterior(decisive, search(decisive), prior)
         hypothesis, level = beliefs.best()
         if not hypothesis.terms:
             break

@@ -70,7 +70,7 @@ def _effect_row(attribution, name):
     if not holding:
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
-    row["log_evidence"] = float(best.evidence.max() - attribution.evidence.none.max())
+    row["log_evidence"] = float(best.evidence.max() - attribution.evidence.on_library().none.max())
     if legs := beliefs.legs(name):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
@@ -96,7 +96,7 @@ def _looks_like(beliefs):
 
 def _set_rows(attribution):
     """Rows of `gap_sets`: the most probable sets."""
-    result, none = [], attribution.evidence.none.max()
+    result, none = [], attribution.evidence.on_library().none.max()
     sets = list(attribution.posterior.sets().items())[:_MOST_SETS]
     for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
         hypothesis, _ = attribution.posterior.best_of(effects, unexplained)

@@ -14,6 +14,9 @@ from rrru.gap.calibrate import observations_of
 
 # numbers read beyond the calibration's parameters: of 20 degrees of freedom the noise is found within 16 %, 1 sigma
 MIN_SPARE_NUMBERS = 20
+# sets of effects compare on the readings at which all of them have what they need: with fewer of these an effect would
+# cost the others more than half of what is known of them
+MIN_COMPLETE_SHARE = 0.5
 # with fewer numbers for each parameter large effects alone are found, and `few_readings` says so
 _FEW_PER_PARAMETER = 9.0
 # singular values of columns of unit length below this share of the largest are rounding
@@ -33,7 +36,7 @@ def require_determined(case, whose=""):
     few = {}
     for name in case.known:
         rows = case.complete([name])
-        if not _is_determined(columns[rows], rank):
+        if rows.mean() < MIN_COMPLETE_SHARE or not _is_determined(columns[rows], rank):
             few[name] = _too_few(case, name, rows, rank)
     if not few:
         return case
@@ -83,5 +86,6 @@ def _too_few(case, name, rows, rank):
     if has_direction(case.library[name]):
         what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"
     points, numbers = len(np.unique(case.at[rows])), 3 * int(rows.sum())
-    least = f"the calibration's {rank} parameters with {MIN_SPARE_NUMBERS} numbers to spare"
-    return f"{what} is known at {points} of {case.count} points; their {numbers} numbers do not determine {least}"
+    least = f"the calibration's {rank} parameters with {MIN_SPARE_NUMBERS} to spare"
+    allowed = f"at least {MIN_COMPLETE_SHARE:.0%} of them whose numbers ({numbers}) determine {least}"
+    return f"{what} is known at {points} of {case.count} points; allowed: {allowed}"

@@ -195,7 +195,7 @@ def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], pri
         rest = rest.without(name)
     if rest.height > beliefs.height - NEGLIGIBLE:
         return rest
-    evidence = attribution.evidence
+    evidence = attribution.evidence.on_library()
     return posterior(evidence, search(evidence, without=ruled_out), prior)
 
 

@@ -14,14 +14,9 @@ Strengths are averaged over a grid, even in their logarithm; none makes a prior 
 A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
 `Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.gap.weight`).
 
-An effect may lack what it needs at some readings U, such as the sense in which a drive arrives. A set S + D with such
-effects D says nothing about U. It is compared on the readings K at which D has all that it needs:
-
-    log p(y | S + D) = log p(y_K | S + D) + log p(y_U | y_K, R)
-
-R is one set without such effects, the most probable of all, and the same for all D. So S + D and R compare on K alone,
-as do all sets with D; R itself and all sets without D compare on all readings. With S in place of R a set whose S
-imitates D on U would win over D without it: U would count for S and not for D.
+An effect may lack what it needs at some readings, such as the sense in which a drive arrives: it says nothing about
+them. All sets of effects then compare on the readings at which every effect of the library has what it needs
+(`ModelEvidence.on_library`); coefficients of a set are those of the readings at which its own effects do.
 """
 
 from dataclasses import dataclass, field, replace
@@ -78,9 +73,17 @@ class ModelEvidence:
     def __len__(self):
         return len(self.run)
 
+    def on_library(self):
+        """The evidence on the readings at which every effect has what it needs, where all sets compare."""
+        return self._on(self.known)
+
     def on_complete(self, terms):
         """The evidence on the readings at which all effects of terms have what they need."""
-        needed = [self.known[name] for name in sorted({term.effect for term in terms} & self.known.keys())]
+        return self._on({term.effect for term in terms} & self.known.keys())
+
+    def _on(self, names):
+        """The evidence on the readings at which some effects have what they need."""
+        needed = [self.known[name] for name in sorted(names)]
         if not needed:
             return self
         rows = np.all(needed, axis=0)

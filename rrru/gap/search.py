@@ -5,14 +5,13 @@ term at a time, and then each of their terms is taken out and another one tried 
 strengths that are independent of each other.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
 
 from rrru.gap.evidence import STRENGTHS, averaged
-from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.terms import variants
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
@@ -54,7 +53,6 @@ def search(evidence, most=12, without=()):
     tried = _Tried(evidence)
     for terms in ((), *((term,) for name in library for term in choices[name])):
         tried.add(terms)
-    tried.refer()
     layer = tried.best_of_size(1)
     for size in range(2, min(_SMALL, most, len(library)) + 1):
         near = tried.near_levels()
@@ -72,14 +70,12 @@ def search(evidence, most=12, without=()):
                 others = [[t for t in choices[term.effect] if t.shape == term.shape] for term in hypothesis.terms]
                 for terms in product(*others):
                     tried.add(terms, levels=near)
-        tried.refer()
         layer = tried.best_of_size(size)
         smaller = max(h.evidence.max() for h in tried.hypotheses.values() if len(h.terms) < size)
         if not layer or layer[0].evidence.max() < smaller - _WORTH:
             break
     else:
         _grow(tried, choices, layer, min(most, len(library)))
-    tried.refer()
     return list(tried.hypotheses.values())
 
 
@@ -88,11 +84,9 @@ def _grow(tried, choices, layer, most):
     for size in range(_SMALL + 1, most + 1):
         best = tried.best
         layer = tried.grown(layer, choices, size)
-        tried.refer()
         if not layer or layer[0].evidence.max() < best.evidence.max():
             break
     for _ in range(_REPLACEMENTS):
-        tried.refer()
         start = tried.best
         if len(start.terms) < _SMALL:
             break
@@ -107,38 +101,7 @@ class _Tried:
 
     def __init__(self, evidence):
         self.evidence, self.hypotheses = evidence, {}
-        # R of `rrru.gap.evidence`; what it says of the readings at which others lack something, by evidence of the rest
-        self._reference, self._others = Hypothesis((), evidence.none, np.ones((len(LEVELS), 0))), {}
         self._leader = 0, -np.inf
-
-    def refer(self):
-        """Make the most probable set of effects that lack nothing the reference of the others."""
-        complete = [h for h in self.hypotheses.values() if h.effects.isdisjoint(self.evidence.known)]
-        # what an effect more explains has to pay for its choice among all of them
-        price = np.log(len(self.evidence.library))
-        best = max(complete, key=lambda h: h.evidence.max() - price * len(h.terms))
-        if not self._others or best.terms == self._reference.terms:
-            return
-        last, self._reference, self._others = self._others, best, {}
-        for key, hypothesis in self.hypotheses.items():
-            if not hypothesis.effects.isdisjoint(self.evidence.known):
-                more = self._of_others(hypothesis.terms) - last[id(self.evidence.on_complete(hypothesis.terms))]
-                self.hypotheses[key] = replace(hypothesis, evidence=hypothesis.evidence + more)
-        self._leader = int(self.best.evidence.argmax()), self.best.evidence.max()
-
-    def _of_others(self, terms):
-        """Log density of the readings at which terms lack what they need, by the reference, given the others."""
-        part = self.evidence.on_complete(terms)
-        if part is self.evidence:
-            return 0.0
-        if id(part) not in self._others:
-            found = self._reference.evidence
-            levels = np.flatnonzero(np.isfinite(found))
-            own = _averaged(part, self._reference.terms, levels)
-            # as probable as others before the data, and half of it none at all: see `rrru.gap.posterior`
-            weight = np.where(levels == 0, 0.0, -np.log(len(LEVELS) - 1.0))
-            self._others[id(part)] = float(log_sum_exp(found[levels] + weight) - log_sum_exp(own + weight))
-        return self._others[id(part)]
 
     def add(self, terms, strengths=None, levels=None):
         """Try a set of terms with strength grids at some levels (indices), by default all, unless it has been tried."""
@@ -161,13 +124,13 @@ class _Tried:
             grids = strengths or (STRENGTHS,) * len(terms)
             coarse = tuple(grid[1::2] if len(grid) == len(STRENGTHS) else grid for grid in grids)
             value, grid = self.evidence.over_strengths(terms, coarse, [level])
-            full[level] = averaged(value, len(terms))[0] + self._of_others(terms)
+            full[level] = averaged(value, len(terms))[0]
             best[level] = grid[value[0].argmax()]
             if full[level] < highest - _HOPELESS:
                 return Hypothesis(terms, full, best)
         levels = self.evidence.levels if levels is None else levels
         value, grid = self.evidence.over_strengths(terms, strengths, levels)
-        full[levels] = averaged(value, len(terms)) + self._of_others(terms)
+        full[levels] = averaged(value, len(terms))
         best[levels] = grid[value.argmax(axis=1)]
         return Hypothesis(terms, full, best)
 
@@ -186,13 +149,11 @@ class _Tried:
         """Log evidence of a hypothesis with each of other terms at its best level and strengths, and their sets."""
         level = int(start.evidence.argmax())
         grids = [[strength] for strength in start.strengths[level]]
+        own, _ = self.evidence.over_strengths(start.terms, grids, [level])
         gains = []
         for term in others:
-            terms = *start.terms, term
-            # both on the readings at which all of the set have what they need
-            own, _ = self.evidence.on_complete(terms).over_strengths(start.terms, grids, [level])
-            value, _ = self.evidence.over_strengths(terms, (*grids, STRENGTHS), [level])
-            gains.append((float(start.evidence[level] - own[0, 0] + averaged(value, 1)[0]), terms))
+            value, _ = self.evidence.over_strengths((*start.terms, term), (*grids, STRENGTHS), [level])
+            gains.append((float(start.evidence[level] - own[0, 0] + averaged(value, 1)[0]), (*start.terms, term)))
         return gains
 
     def polished(self, terms, levels=None):
@@ -202,7 +163,6 @@ class _Tried:
             full, best = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
             levels = self.near_levels() if levels is None else levels
             full[levels], best[levels] = self.evidence.independent(terms, levels)
-            full[levels] += self._of_others(terms)
             self.hypotheses[key] = Hypothesis(tuple(terms), full, best)
         return self.hypotheses[key]
 
@@ -225,15 +185,6 @@ class _Tried:
                 if other is None or hypothesis.evidence.max() > other.evidence.max():
                     per_effects[hypothesis.effects] = hypothesis
         return sorted(per_effects.values(), key=lambda h: -h.evidence.max())[:_BEST_SETS]
-
-
-def _averaged(evidence, terms, levels):
-    """Log evidence (l,) of a set of terms at levels (indices), averaged over strengths as sets of its size are."""
-    if not terms:
-        return evidence.none[levels]
-    if len(terms) > _SMALL:
-        return evidence.independent(terms, levels)[0]
-    return averaged(evidence.over_strengths(terms, levels=levels)[0], len(terms))
 
 
 def _narrow(start, levels):
