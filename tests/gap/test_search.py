@@ -225,6 +225,9 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
     names = frozenset(other.split("+"))
     assert own == verdict.label and TWINS - frozenset(verdict.effects) <= names
     rival = found.posterior.best_of(names)
+    if len(rival[0].terms) > len(favoured[0].terms):
+        # the answer with more effects makes the data
+        favoured, rival = rival, favoured
     keys = [(term.effect, term.shape) for term in (*favoured[0].terms, *rival[0].terms)]
     new = longer.linearise(found.calibrated, keys)
     mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].strengths[favoured[1]], favoured[1])
