@@ -71,7 +71,7 @@ def _contests(attribution, verdict):
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
     if not rivals and verdict.probability < OPTIONS.min_sure_probability:
         rivals = [names for names, flag in attribution.posterior.sets() if not flag and names != effects]
-    for names in rivals[: OPTIONS.max_rivals]:
+    for names in rivals[: OPTIONS.max_advised_rivals]:
         other = attribution.posterior.best_of(names)
         # a rival may be one only beside something small that is unknown
         if favoured is not None and other is not None:
@@ -107,12 +107,12 @@ def _poses(attribution, contest, masses):
         if fast and not (told_speed < OPTIONS.fast_pass_mm_s and np.isfinite(last_s)):
             continue
         speed, load, how = _driven(own_speed, own_load, fast, loaded)
-        table = poses.commands(start, end, case.mechanism, last_s + OPTIONS.pause_s, speed, load)
+        table = poses.commands(start, end, case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(case, table, masses)
         if not _tell(planned, contest):
             continue
         now, added = worth(attribution, truth, imitator, planned)
-        chosen, gain = greedy(now, added, OPTIONS.max_poses)
+        chosen, gain = greedy(now, added, OPTIONS.max_advised_poses)
         # one that tells hardly more is not worth a payload
         if gain > 1.1 * most:
             count, most = len(chosen), gain
@@ -152,7 +152,7 @@ def candidates(frame):
     count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
     # passes of poses that were driven before are no trajectories
     names = count.index[(count > OPTIONS.points_per_pass) | (count.max() <= OPTIONS.points_per_pass)]
-    chosen = names[np.unique(np.linspace(0, len(names) - 1, OPTIONS.max_trajectories).astype(int))]
+    chosen = names[np.unique(np.linspace(0, len(names) - 1, OPTIONS.max_advised_trajectories).astype(int))]
     end, result, tables = _end_s(frame), [], []
     for name in chosen:
         first = frame[frame["trajectory"] == name]
@@ -163,7 +163,7 @@ def candidates(frame):
                 continue
             speed, load, how = _driven(own_speed, own_load, fast, loaded)
             how = ["in reverse"] * reverse + how
-            tables.append(_pass(first, len(tables) + 1, end + OPTIONS.pause_s, reverse, speed, load))
+            tables.append(_pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load))
             words = f"{name} {' '.join(how) or 'once more'}"
             result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]

@@ -65,11 +65,11 @@ def _grid(commands):
     """Points (g, 3) of the box about commands (n, 3) that one of these is near, and its number (g,)."""
     low, high = commands.min(axis=0), commands.max(axis=0)
     lines = [
-        np.linspace(a, b, OPTIONS.grid_lines) if b - a > OPTIONS.min_extent_mm else np.array([a])
+        np.linspace(a, b, OPTIONS.drive_table_grid_lines) if b - a > OPTIONS.min_extent_mm else np.array([a])
         for a, b in zip(low, high, strict=True)
     ]
     points = np.stack([axis.ravel() for axis in np.meshgrid(*lines, indexing="ij")], axis=1)
-    step = np.maximum((high - low) / (OPTIONS.grid_lines - 1), OPTIONS.min_extent_mm)
+    step = np.maximum((high - low) / (OPTIONS.drive_table_grid_lines - 1), OPTIONS.min_extent_mm)
     far, number = cKDTree(commands / step).query(points / step, p=np.inf)
     return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 

@@ -170,7 +170,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         verdict = decide(attribution, {term.effect: share for term, share in ordered})
         same = known.hypothesis.effects == frozenset(verdict.effects)
         fitted = known if same else with_effects(attribution, verdict.effects)
-        least = OPTIONS.veto_nats if verdict.unexplained else -OPTIONS.veto_nats
+        least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             return verdict, with_effects(fitted, verdict.effects), ordered if same else order_by_share(fitted)

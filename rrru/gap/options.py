@@ -125,7 +125,7 @@ class DiagnosisOptions:
     # hypotheses so far below the best have no probability that matters: e^-25 is 1e-11
     negligible_nats: float = 25.0
     # an effect that predicts left-out points worse by more is ruled out; with something unexplained it has to gain it
-    veto_nats: float = 3.0
+    max_heldout_loss_nats: float = 3.0
     # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
     max_none_probability: float = 0.2
     # rivals less probable than this share of the verdict's probability are not named; the usual 5 %
@@ -199,11 +199,11 @@ class DiagnosisOptions:
     # a fast pass, the added mass, and the pause between runs; assumed
     fast_pass_mm_s: float = 300.0
     added_payload_kg: float = 5.0
-    pause_s: float = 60.0
+    pause_between_runs_s: float = 60.0
     # trajectories and pairs of rivals that runs are designed for, and poses of a run; assumed, bound the time
-    max_trajectories: int = 4
-    max_rivals: int = 2
-    max_poses: int = 10
+    max_advised_trajectories: int = 4
+    max_advised_rivals: int = 2
+    max_advised_poses: int = 10
     # less expected log Bayes factor than this is not worth a run; assumed
     min_run_gain_nats: float = 0.2
     # as much makes a rival 20 times less probable, which rules it out
@@ -220,8 +220,8 @@ class DiagnosisOptions:
     # orders of the periodogram per resolved one; assumed, finer than the width of a peak
     orders_per_resolution: int = 6
     # peaks of a periodogram that become shapes, and shapes of an effect at most; assumed, bound the time
-    max_peaks: int = 2
-    max_shapes: int = 8
+    max_periodogram_peaks: int = 2
+    max_effect_shapes: int = 8
     # peaks closer than this share of the resolution are the same order; assumed
     min_order_distance_ratio: float = 0.03
     # standard error of an order that was found, over the resolution; assumed
@@ -251,7 +251,7 @@ class DiagnosisOptions:
 
     # --- corrected files ---
     # lines of the grid along each axis; assumed
-    grid_lines: int = 7
+    drive_table_grid_lines: int = 7
     # a grid point has a measured point within so many steps of the grid: no extrapolation
     max_grid_distance_steps: float = 1.0
     # extents below this are none; rounding

@@ -72,11 +72,11 @@ def _found(case, linear, effect, others):
     gains = periodogram(linear.data, linear.drive[..., drives], drive, beside, orders)
     peaks, _ = find_peaks(gains)
     shapes = list(coordinates.shapes)
-    for peak in peaks[np.argsort(-gains[peaks])][: OPTIONS.max_peaks]:
+    for peak in peaks[np.argsort(-gains[peaks])][: OPTIONS.max_periodogram_peaks]:
         order = _vertex(orders, gains, peak)
         had = [search.order(shape[search.name]) for shape in shapes]
         new = min(abs(order - one) for one in had) > OPTIONS.min_order_distance_ratio * step
-        if new and len(shapes) < OPTIONS.max_shapes:
+        if new and len(shapes) < OPTIONS.max_effect_shapes:
             shapes.append(shapes[0] | {search.name: search.value(order)})
     stated, resolved = coordinates.stated or len(coordinates.shapes), len(orders) / OPTIONS.orders_per_resolution
     probability, doubt = OPTIONS.stated_order_probability, OPTIONS.order_sd_ratio * step
