@@ -13,14 +13,10 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.gap import poses
 from rrru.gap.make_case import make_case
+from rrru.gap.options import OPTIONS
 from rrru.gap.verdict import label
 from rrru.gap.worth import greedy, worth
 
-_FAST_MM_S, _LOAD_KG, _REST_S, _MOST_TRAJECTORIES, _MOST_RIVALS, _MOST_POSES = 300.0, 5.0, 60.0, 4, 2, 10
-# less than this is not worth a run; as much as makes a rival 20 times less probable rules it out
-_WORTH_NATS, _ENOUGH_NATS = 0.2, 3.0
-# a verdict of less has rivals even where each of them is too improbable to be named
-_SURE = 0.9
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
 _POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"), "speed_mm_s", "payload_kg")
@@ -59,10 +55,10 @@ def advise(attribution, verdict, masses, most=3):
         ]
     runs = pd.DataFrame(result, columns=_COLUMNS)
     listed = NOTHING.poses
-    if contests and not (runs["gain_nats"] > _ENOUGH_NATS).any():
+    if contests and not (runs["gain_nats"] > OPTIONS.decisive_gain_nats).any():
         row, listed = _poses(attribution, contests[0], masses)
         runs = pd.DataFrame([*result, *row], columns=_COLUMNS)
-    runs = runs[runs["gain_nats"] > _WORTH_NATS]
+    runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
     runs = runs.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
     runs = runs.drop_duplicates("run").head(most).reset_index(drop=True)
     return Advice(runs, listed if (runs["kind"] == "poses").any() else NOTHING.poses)
@@ -73,9 +69,9 @@ def _contests(attribution, verdict):
     effects = frozenset(verdict.effects)
     favoured = attribution.posterior.best_of(effects)
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
-    if not rivals and verdict.probability < _SURE:
+    if not rivals and verdict.probability < OPTIONS.min_sure_probability:
         rivals = [names for names, flag in attribution.posterior.sets() if not flag and names != effects]
-    for names in rivals[:_MOST_RIVALS]:
+    for names in rivals[: OPTIONS.max_advised_rivals]:
         other = attribution.posterior.best_of(names)
         # a rival may be one only beside something small that is unknown
         if favoured is not None and other is not None:
@@ -108,20 +104,20 @@ def _poses(attribution, contest, masses):
     own_speed = told_speed if np.isfinite(told_speed) else _speed(case.measurements)
     last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
-        if fast and not (told_speed < _FAST_MM_S and np.isfinite(last_s)):
+        if fast and not (told_speed < OPTIONS.fast_pass_mm_s and np.isfinite(last_s)):
             continue
         speed, load, how = _driven(own_speed, own_load, fast, loaded)
-        table = poses.commands(start, end, case.mechanism, last_s + _REST_S, speed, load)
+        table = poses.commands(start, end, case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(case, table, masses)
         if not _tell(planned, contest):
             continue
         now, added = worth(attribution, truth, imitator, planned)
-        chosen, gain = greedy(now, added, _MOST_POSES)
+        chosen, gain = greedy(now, added, OPTIONS.max_advised_poses)
         # one that tells hardly more is not worth a payload
         if gain > 1.1 * most:
             count, most = len(chosen), gain
             words = " ".join([f"{count} poses", *how]), "poses", "poses", False
-            row = *words, speed, load, count * poses.POINTS, separates, now.nats(), gain
+            row = *words, speed, load, count * OPTIONS.points_per_pass, separates, now.nats(), gain
             ends = {**rows.vector_columns("from", start[chosen]), **rows.vector_columns("to", end[chosen])}
             listed = pd.DataFrame({"pose": np.arange(1, count + 1), **ends, "speed_mm_s": speed, "payload_kg": load})
             best = [dict(zip(_COLUMNS, row, strict=True))], listed
@@ -130,7 +126,8 @@ def _poses(attribution, contest, masses):
 
 def _driven(own_speed, own_load, fast, loaded):
     """Speed and payload of a kind of pass, and in words what is not the campaign's own."""
-    speed, load = _FAST_MM_S if fast else own_speed, own_load + (_LOAD_KG if loaded else 0.0)
+    speed = OPTIONS.fast_pass_mm_s if fast else own_speed
+    load = own_load + (OPTIONS.added_payload_kg if loaded else 0.0)
     return speed, load, [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
@@ -154,19 +151,19 @@ def candidates(frame):
     """
     count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
     # passes of poses that were driven before are no trajectories
-    names = count.index[(count > poses.POINTS) | (count.max() <= poses.POINTS)]
-    chosen = names[np.unique(np.linspace(0, len(names) - 1, _MOST_TRAJECTORIES).astype(int))]
+    names = count.index[(count > OPTIONS.points_per_pass) | (count.max() <= OPTIONS.points_per_pass)]
+    chosen = names[np.unique(np.linspace(0, len(names) - 1, OPTIONS.max_advised_trajectories).astype(int))]
     end, result, tables = _end_s(frame), [], []
     for name in chosen:
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
         own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
         for reverse, fast, loaded in _KINDS:
-            if fast and not (own_speed < _FAST_MM_S and np.isfinite(end)):
+            if fast and not (own_speed < OPTIONS.fast_pass_mm_s and np.isfinite(end)):
                 continue
             speed, load, how = _driven(own_speed, own_load, fast, loaded)
             how = ["in reverse"] * reverse + how
-            tables.append(_pass(first, len(tables) + 1, end + _REST_S, reverse, speed, load))
+            tables.append(_pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load))
             words = f"{name} {' '.join(how) or 'once more'}"
             result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]

@@ -6,6 +6,7 @@
 import numpy as np
 
 from rrru.effects.library import summary
+from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 
 SCHEMA = 1
@@ -16,12 +17,7 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "at_bound")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
-# more numbers than this are left to the table; a share that is worth a sentence; a probability that needs no more runs,
-# and one from which on something acts
-_LISTED, _WORTH, _SURE, _ACTS = 3, 0.05, 0.9, 0.5
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
-# a share beyond this is none: effects that imitate each other make a little more than the whole
-_MOST_SHARE = 1.5
 
 
 def answer(campaign, verdict, tables, drives=()):
@@ -147,7 +143,7 @@ def _causes(facts):
     said = [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(facts["effects"])]
     if not told and said:
         said.append("The gap is so small beside the noise that its shares cannot be told.")
-    elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + _WORTH:
+    elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
         share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
@@ -166,7 +162,7 @@ def _shares_told(facts):
     """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
     shares.append(_scatter_share(facts))
-    return facts["gap_rms_mm"] > 0.0 and max(shares) <= _MOST_SHARE
+    return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
 def _cause(effect, follow, told):
@@ -176,7 +172,8 @@ def _cause(effect, follow, told):
         share = f"{percent(effect['share'])}{follow} is" if told else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
-    size = f" ({', '.join(sizes) if len(sizes) <= _LISTED else f'{len(sizes)} numbers'})" if sizes else ""
+    listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
+    size = f" ({listed})" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
     return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
 
@@ -193,8 +190,8 @@ def _sizes(parameters):
 
 def _scatter(facts):
     """What does not repeat, where it acts and matters."""
-    share = _scatter_share(facts, _ACTS)
-    if share < _WORTH:
+    share = _scatter_share(facts, OPTIONS.min_scatter_probability)
+    if share < OPTIONS.min_mentioned_share:
         return []
     unknown = REPEATABILITY_UNKNOWN in facts["notes"]
     if not _shares_told(facts):
@@ -242,7 +239,7 @@ def _next(facts):
         return f"Next: {what}. That decides {_contest(best['separates'])}."
     if facts["unexplained"]:
         return "Next: no run is advised, since the library has nothing to test; see where the gap lies."
-    if facts["probability"] >= _SURE:
+    if facts["probability"] >= OPTIONS.min_sure_probability:
         return "Next: nothing more needs to be measured for this answer."
     return "Next: no further run that was tried in computation would settle it."
 

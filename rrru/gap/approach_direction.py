@@ -14,25 +14,13 @@ import numpy as np
 
 from rrru.campaign.driven_path import STEPS
 from rrru.effects.protocol import PATH
+from rrru.gap.options import OPTIONS
 
-# steps of a drive below these are rounding of its values
-_ROUNDING = {"rad": 1e-8, "mm": 1e-6}
-# orders of the differences of drive values; fewer differences have no median
-_LOWEST_ORDER, _HIGHEST_ORDER, _MIN_DIFFERENCES = 2, 10, 8
+_ROUNDING = {"rad": OPTIONS.drive_rounding_rad, "mm": OPTIONS.drive_rounding_mm}
 # the next difference, over its deviation for white noise, of a motion with 4 points a period: sin(pi / 4)
 _FOUR_A_PERIOD = np.sqrt(0.5)
 # median absolute value of a standard normal number
 _MEDIAN_NORMAL = 0.6745
-# a larger share of the widest swing of a drive is no jitter but a motion of which hardly a point is read
-_MAX_JITTER_SHARE = 1e-3
-# two readings of a drive at rest differ by more than this many deviations of the jitter once in 50,000 pairs
-_JITTER_DEVIATIONS = 6.0
-# two interpolations that are this far apart may both be as far off, to opposite sides
-_OFF = 2.0
-# a sense that changes the residual by less than this share of the noise is not estimated
-_MIN_RESPONSE = 0.1
-# all combinations of the senses of up to so many drives are weighed
-_MAX_DRIVES = 10
 
 
 def read_back_jitter(drive, run):
@@ -48,14 +36,16 @@ def read_back_jitter(drive, run):
     regression, Biometrika 77, 1990, for the differences.
     """
     runs = np.split(np.asarray(drive, dtype=float), np.flatnonzero(np.diff(run)) + 1)
-    found = [_jitter_of_run(values) for values in runs if len(values) > _MIN_DIFFERENCES + _LOWEST_ORDER]
+    least = OPTIONS.min_differences + OPTIONS.min_difference_order
+    found = [_jitter_of_run(values) for values in runs if len(values) > least]
     return np.quantile(found, 0.25, axis=0, method="lower") if found else np.zeros(np.shape(drive)[1])
 
 
 def _jitter_of_run(drive):
     """`read_back_jitter` (K,) of drive values (n, K) of one run."""
     sizes = []
-    for order in range(_LOWEST_ORDER, min(_HIGHEST_ORDER, len(drive) - _MIN_DIFFERENCES) + 1):
+    highest = min(OPTIONS.max_difference_order, len(drive) - OPTIONS.min_differences)
+    for order in range(OPTIONS.min_difference_order, highest + 1):
         size = np.median(np.abs(np.diff(drive, n=order, axis=0)), axis=0) / _MEDIAN_NORMAL
         sizes.append(size / np.sqrt(comb(2 * order, order)))
     result = np.zeros(drive.shape[1])
@@ -70,8 +60,8 @@ def rest_widths(drive, run, units):
     span = np.ptp(drive, axis=0)
     widest = np.array([span[[other == unit for other in units]].max() for unit in units])
     jitter = read_back_jitter(drive, run)
-    jitter = np.where(jitter < _MAX_JITTER_SHARE * widest, jitter, 0.0)
-    return np.maximum(_JITTER_DEVIATIONS * jitter, rounding)
+    jitter = np.where(jitter < OPTIONS.max_jitter_per_swing * widest, jitter, 0.0)
+    return np.maximum(OPTIONS.rest_width_per_jitter_sd * jitter, rounding)
 
 
 def at_reversals(course, other_path, widths):
@@ -93,7 +83,7 @@ def at_reversals(course, other_path, widths):
                 nearest = reversals[np.abs(reversals[:, None] - course.path_index).argmin(axis=0)]
                 close = np.abs(nearest - course.path_index) <= STEPS
                 way = np.abs(path[nearest] - course.drive[:, leg])
-                result[:, leg] |= close & (way < width + _OFF * apart[:, leg])
+                result[:, leg] |= close & (way < width + OPTIONS.interpolation_error_factor * apart[:, leg])
     return result
 
 
@@ -127,14 +117,14 @@ def estimate_approach(case, state, responses):
     plain = replace(case, motion=replace(case.motion, approach=np.where(unknown, 0.0, approach)))
     scale = case.axis_mm
     left, response = plain.residual(state) / scale, responses / scale[:, None]
-    size = np.sqrt((response**2).sum(axis=1)) > _MIN_RESPONSE
+    size = np.sqrt((response**2).sum(axis=1)) > OPTIONS.min_approach_response_per_noise
     approach[unknown] = 0.0
     acting = (unknown[case.at] & size).any(axis=1)
     for stop in np.unique(case.stop[acting]):
         here = case.stop == stop
         drives = np.flatnonzero((unknown[case.at[here]] & size[here]).any(axis=0))
         power = (response[here][..., drives] ** 2).sum(axis=(0, 1))
-        drives = np.sort(drives[np.argsort(-power, kind="stable")][:_MAX_DRIVES])
+        drives = np.sort(drives[np.argsort(-power, kind="stable")][: OPTIONS.max_jointly_estimated_drives])
         senses = np.array([*product((-1.0, 1.0), repeat=len(drives))])
         lacking = left[here].ravel() - senses @ response[here].reshape(-1, response.shape[-1])[:, drives].T
         log = -0.5 * (lacking**2).sum(axis=1)

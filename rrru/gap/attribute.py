@@ -13,6 +13,7 @@ from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
 from rrru.gap.identify import with_seen
 from rrru.gap.model_fit import EffectModel, ModelFit, fit_model
+from rrru.gap.options import OPTIONS
 from rrru.gap.orders import with_orders
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis, search
@@ -22,11 +23,6 @@ from rrru.gap.terms import each_leg
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
 
-_MOST_ROUNDS, _MOST_CLEANINGS = 6, 3
-# times the noise below which a gap, and share of the noise, rms, below which what the sim bends by is small
-_SMALL, _STRAIGHT = 10.0, 0.1
-# share of the numbers read that the columns have to leave, so that each reading still shows some of its noise
-_LEAST_FREE = 0.1
 # what is told of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 
@@ -123,7 +119,7 @@ def _noise_columns(case, linear, known):
     choices = [*blocks.values()], few
     for chosen in choices:
         columns = np.concatenate([linear.base, *chosen, *linear.shape_columns.values()], axis=-1)
-        if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, _LEAST_FREE * linear.data.size):
+        if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size):
             return columns
     return columns if known else linear.base
 
@@ -142,7 +138,7 @@ def _few(case, calibrated):
 def attribute(case, prior, stated=KNOWN):
     """Attribution of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
     total = case.count
-    for cleaning in range(_MOST_CLEANINGS + 1):
+    for cleaning in range(OPTIONS.max_outlier_rounds + 1):
         calibrated = calibrate(case)
         if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
@@ -156,7 +152,7 @@ def attribute(case, prior, stated=KNOWN):
         attribution = _rounds(case, calibrated, prior, stated)
         found = attribution.case
         outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
-        if cleaning == _MOST_CLEANINGS or not outliers.any():
+        if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
             break
         case = case.without(outliers)
     return replace(attribution, dropped=total - case.count)
@@ -224,7 +220,7 @@ def _bends(case, linear, state, fitted):
     """Whether the exact sim at a fitted state without shapes is off what a linearisation about a state says there."""
     said = linear.data - linear.base @ (fitted.deviations - state.deviations)
     said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
-    return np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > _STRAIGHT * case.noise_mm
+    return np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > OPTIONS.max_nonlinearity_per_noise * case.noise_mm
 
 
 def _rounds(case, calibrated, prior, stated):
@@ -235,8 +231,8 @@ def _rounds(case, calibrated, prior, stated):
     fit = fit_model(case, [calibrated])
     calibrated = state = fit.state
     evidence = case.evidence(linear)
-    small = np.sqrt((linear.data**2).mean()) < _SMALL * case.noise_mm
-    for _ in range(_MOST_ROUNDS):
+    small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * case.noise_mm
+    for _ in range(OPTIONS.max_search_rounds):
         decisive = evidence.on_library()
         beliefs = posterior(decisive, search(decisive), prior)
         hypothesis, level = beliefs.best()

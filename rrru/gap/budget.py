@@ -12,13 +12,11 @@ import pandas as pd
 from scipy.special import ndtr
 
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import signatures, spread
 from rrru.gap.unknown import UNKNOWN
 
 COLUMNS = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
-# effects and products that matter less are not listed
-_LEAST_PROBABLE, _LEAST_SHARE = 0.02, 0.005
-_INTERVAL = (0.025, 0.975)
 _UNEXPLAINED = "unexplained"
 
 
@@ -36,7 +34,7 @@ def budget(attribution, stated_mm, generator, draws):
     rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, beliefs.probability_unexplained))
     rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in products.items()]
     # small products are left to what the noise leaves
-    least = _LEAST_SHARE * max(gap, 1e-12)
+    least = OPTIONS.min_covariance_share * max(gap, 1e-12)
     rows = [row for row in rows if row[1] != "covariance" or abs(row[2].mean()) > least]
     known = sum(float(drawn.mean()) for *_, drawn, _ in rows)
     calibration = instrument * attribution.evidence.linear.base.shape[-1] / (3.0 * len(attribution.case)) * np.ones(1)
@@ -48,7 +46,7 @@ def budget(attribution, stated_mm, generator, draws):
 
 def _row(part, kind, squares, probability, total):
     """One row of draws (b,) of a mean square, which may be negative where it is a product."""
-    mean, (low, high) = float(squares.mean()), np.quantile(squares, _INTERVAL)
+    mean, (low, high) = float(squares.mean()), np.quantile(squares, OPTIONS.interval_quantiles)
     share = [one / total if total > 0.0 else 0.0 for one in (mean, min(low, mean), max(high, mean))]
     return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), *map(float, share), float(probability)
 
@@ -62,7 +60,7 @@ def _drawn(attribution, generator, draws):
     data = data - basis @ (basis.T @ data)
     weights = beliefs.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
-    names = [name for name in case.effects if beliefs.marginal(name) > _LEAST_PROBABLE]
+    names = [name for name in case.effects if beliefs.marginal(name) > OPTIONS.min_budget_probability]
     squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
     products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
     for number in np.flatnonzero(counts):

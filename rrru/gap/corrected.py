@@ -12,6 +12,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.gap.details import parameter_rows
+from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import weight_notes
 from rrru.robots.file_changes import Found
 from rrru.robots.to_mjcf import to_mjcf
@@ -19,7 +20,6 @@ from rrru.robots.to_urdf import to_urdf
 
 # what a drive's numbers in a file are, by the effect and the stem of its parameters
 _COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
-_HALF = 0.5
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def corrected(attribution, section, folder):
     Raises ConfigError for a file whose bodies do not all stand in it as such.
     """
     found, others = found_of(attribution)
-    if attribution.posterior.probability_unexplained > _HALF:
+    if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
     others += weight_notes(attribution)
     if "urdf" in section:

@@ -12,17 +12,11 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Contribution
+from rrru.gap.options import OPTIONS
 from rrru.robots.drive_step import drives_at
 
-# lines of the grid along each axis, and how far a measured point may be, in its steps
-_LINES, _NEAR = 7, 1.0
-# extents below this are none
-_FLAT_MM = 1e-6
 # how far the drives come from, longer than any play
-_APPROACH = {"rad": 0.1, "mm": 5.0}
-# a drive's error changes with the drive so slowly that two looks settle it
-_LOOKS = 3
-_SAME = 1e-12
+_APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
 
 def corrected_drives(attribution, masses):
@@ -41,12 +35,12 @@ def corrected_drives(attribution, masses):
     found = {}
     for approach in (-1, 1):
         told = nominal
-        for _ in range(_LOOKS):
+        for _ in range(OPTIONS.correction_iterations):
             motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
             twists = robot.twists(attribution.state.deviations) + _change(attribution, motion)
             told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
         found[approach] = told
-    if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < _SAME:
+    if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
         found = {0: found[1]}
     return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
 
@@ -70,11 +64,14 @@ def _table(robot, place, drives, state):
 def _grid(commands):
     """Points (g, 3) of the box about commands (n, 3) that one of these is near, and its number (g,)."""
     low, high = commands.min(axis=0), commands.max(axis=0)
-    lines = [np.linspace(a, b, _LINES) if b - a > _FLAT_MM else np.array([a]) for a, b in zip(low, high, strict=True)]
+    lines = [
+        np.linspace(a, b, OPTIONS.drive_table_grid_lines) if b - a > OPTIONS.min_extent_mm else np.array([a])
+        for a, b in zip(low, high, strict=True)
+    ]
     points = np.stack([axis.ravel() for axis in np.meshgrid(*lines, indexing="ij")], axis=1)
-    step = np.maximum((high - low) / (_LINES - 1), _FLAT_MM)
+    step = np.maximum((high - low) / (OPTIONS.drive_table_grid_lines - 1), OPTIONS.min_extent_mm)
     far, number = cKDTree(commands / step).query(points / step, p=np.inf)
-    return points[far <= _NEAR], number[far <= _NEAR]
+    return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 
 
 def at_rest(robot, masses, state, approach, nominal):

@@ -12,6 +12,7 @@ from rrru.effects.protocol import together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
 from rrru.gap.corrected import corrected
 from rrru.gap.corrected_drives import corrected_drives
+from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import model_row
 from rrru.plant.mujoco_robot import MujocoRobot
 from rrru.robots.catalogue import make_mechanism
@@ -20,8 +21,6 @@ from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.walk import Poses
 from rrru.store.whole import write_text
 
-# a simulation takes about a tenth of a second a point: no more of them are driven, from the first on
-_MOST_DRIVEN = 300
 # what of a Motion has no row for each point
 _WHOLE = ("robot", "path_drive", "load_slopes")
 
@@ -95,7 +94,7 @@ def simulated(motion, robot, file, platform):
 
     robot: of the file. Raises ConfigError, SimulationError or UnreachableError where it cannot be driven.
     """
-    count = min(len(motion), _MOST_DRIVEN)
+    count = min(len(motion), OPTIONS.max_driven_points)
     first = replace(
         motion,
         **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WHOLE},

@@ -9,14 +9,13 @@ from rrru.campaign import measurements as rows
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.model_fit import GEOMETRY
+from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import sites, spread
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 from rrru.gap.weight import WEIGHT
 
-_MOST_SETS = 20
-_LIKELY = 0.5
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
 _EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan, "note": ""}
@@ -46,7 +45,7 @@ def _attribute_rows(attribution):
         for name, note in case.untestable.items()
     ]
     none, unknown = beliefs.sets().get((frozenset(), False), 0.0), beliefs.probability_unexplained
-    note = _looks_like(beliefs) if unknown > _LIKELY else ""
+    note = _looks_like(beliefs) if unknown > OPTIONS.min_unexplained_probability else ""
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY, "note": note})
     return pd.DataFrame(result)
@@ -89,7 +88,7 @@ def _looks_like(beliefs):
     """What the unexplained part follows, where one of the unknown functions is likely."""
     likely = {name: beliefs.marginal(name) for name in UNKNOWN}
     best = max(likely, key=likely.get)
-    if likely[best] > _LIKELY:
+    if likely[best] > OPTIONS.min_function_probability:
         return f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})"
     return "follows no smooth function tried"
 
@@ -97,7 +96,7 @@ def _looks_like(beliefs):
 def _set_rows(attribution):
     """Rows of `gap_sets`: the most probable sets."""
     result, none = [], attribution.evidence.on_library().none.max()
-    sets = list(attribution.posterior.sets().items())[:_MOST_SETS]
+    sets = list(attribution.posterior.sets().items())[: OPTIONS.max_listed_sets]
     for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
         hypothesis, _ = attribution.posterior.best_of(effects, unexplained)
         row = {

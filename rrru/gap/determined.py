@@ -11,14 +11,8 @@ import numpy as np
 from rrru.errors import FitError
 from rrru.gap.approach_direction import has_direction
 from rrru.gap.calibrate import observations_of
+from rrru.gap.options import OPTIONS
 
-# numbers read beyond the calibration's parameters: of 20 degrees of freedom the noise is found within 16 %, 1 sigma
-MIN_SPARE_NUMBERS = 20
-# sets of effects compare on the readings at which all of them have what they need: with fewer of these an effect would
-# cost the others more than half of what is known of them
-MIN_COMPLETE_SHARE = 0.5
-# with fewer numbers for each parameter large effects alone are found, and `few_readings` says so
-_FEW_PER_PARAMETER = 9.0
 # singular values of columns of unit length below this share of the largest are rounding
 _RANK_TOLERANCE = 1e-9
 
@@ -26,8 +20,8 @@ _RANK_TOLERANCE = 1e-9
 def require_determined(case, whose=""):
     """The Case without effects that lack what they need at too many readings.
 
-    The others have to determine the calibration with `MIN_SPARE_NUMBERS` to spare. whose: first words of a message.
-    Raises FitError where all readings together do not.
+    The others have to determine the calibration with `OPTIONS.min_spare_numbers` to spare. whose: first words of a
+    message. Raises FitError where all readings together do not.
     """
     columns = observations_of(case).jacobian(case.mechanism.parameters.nominal)
     rank = _rank(columns)
@@ -36,7 +30,7 @@ def require_determined(case, whose=""):
     few = {}
     for name in case.known:
         rows = case.complete([name])
-        if rows.mean() < MIN_COMPLETE_SHARE or not _is_determined(columns[rows], rank):
+        if rows.mean() < OPTIONS.min_complete_share or not _is_determined(columns[rows], rank):
             few[name] = _too_few(case, name, rows, rank)
     if not few:
         return case
@@ -50,7 +44,7 @@ def require_determined(case, whose=""):
 def few_readings(case):
     """A sentence on how little a diagnosis of few readings finds, None where they are many."""
     numbers, count = 3 * len(case), len(case.mechanism.parameters)
-    if numbers >= _FEW_PER_PARAMETER * count:
+    if numbers >= OPTIONS.few_numbers_per_parameter * count:
         return None
     found = "an effect is found from about the size detectable_mm in gap_identifiability on"
     return f"few readings: {numbers} numbers for {count} parameters of the calibration; {found}"
@@ -58,7 +52,7 @@ def few_readings(case):
 
 def _is_determined(columns, rank):
     """Whether numbers with these derivatives (m, 3, p) determine so many combinations of parameters, some to spare."""
-    return 3 * len(columns) >= rank + MIN_SPARE_NUMBERS and _rank(columns) == rank
+    return 3 * len(columns) >= rank + OPTIONS.min_spare_numbers and _rank(columns) == rank
 
 
 def _rank(columns):
@@ -70,7 +64,7 @@ def _rank(columns):
 
 def _why_undetermined(case, rank):
     """Why readings of this rank are too few for a diagnosis and what to do, empty where they are not."""
-    numbers, needed = 3 * len(case), rank + MIN_SPARE_NUMBERS
+    numbers, needed = 3 * len(case), rank + OPTIONS.min_spare_numbers
     if numbers >= needed:
         return ""
     poses = len(np.unique(case.stop))
@@ -86,6 +80,6 @@ def _too_few(case, name, rows, rank):
     if has_direction(case.library[name]):
         what = "the sense in which the drives arrive, unknown at starts of runs and next to reversals of a drive,"
     points, numbers = len(np.unique(case.at[rows])), 3 * int(rows.sum())
-    least = f"the calibration's {rank} parameters with {MIN_SPARE_NUMBERS} to spare"
-    allowed = f"at least {MIN_COMPLETE_SHARE:.0%} of them whose numbers ({numbers}) determine {least}"
+    least = f"the calibration's {rank} parameters with {OPTIONS.min_spare_numbers} to spare"
+    allowed = f"at least {OPTIONS.min_complete_share:.0%} of them whose numbers ({numbers}) determine {least}"
     return f"{what} is known at {points} of {case.count} points; allowed: {allowed}"

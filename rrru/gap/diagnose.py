@@ -18,7 +18,8 @@ from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.determined import few_readings, require_determined
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
-from rrru.gap.posterior import NEGLIGIBLE, Posterior, posterior
+from rrru.gap.options import OPTIONS
+from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.result_notes import fit_notes, noise_notes, weight_notes
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
@@ -29,13 +30,6 @@ from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.seeds import stream
 
-# what an effect may lose on left-out points before it is ruled out
-_VETO_NATS = 3.0
-_HALF = 0.5
-# the diagnosis looks further than a calibration's bounds, which a strong effect would press against
-_ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
-# share of a campaign's points that is usually diagnosed; fewer are told
-_USUAL = 0.8
 _DEFAULTS = GapSettings()
 
 
@@ -70,7 +64,7 @@ class Diagnosis:
 
 def sim(mechanism: Any) -> Any:
     """The mechanism with bounds wide enough for a gap to show itself in the deviations."""
-    return mechanism.widened(_ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM)
+    return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
 
 
 def diagnose(
@@ -116,7 +110,7 @@ def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
     yield from fit_notes(attribution)
-    if case.count < _USUAL * len(case.used):
+    if case.count < OPTIONS.min_used_share * len(case.used):
         which = "not measured, out of reach, near singularities, held out or outliers"
         yield f"{case.count} of {len(case.used)} points used; the others are {which}"
     if few := few_readings(case):
@@ -176,7 +170,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         verdict = decide(attribution, {term.effect: share for term, share in ordered})
         same = known.hypothesis.effects == frozenset(verdict.effects)
         fitted = known if same else with_effects(attribution, verdict.effects)
-        least = _VETO_NATS if verdict.unexplained else -_VETO_NATS
+        least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             return verdict, with_effects(fitted, verdict.effects), ordered if same else order_by_share(fitted)
@@ -193,7 +187,7 @@ def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], pri
     rest = beliefs
     for name in worse:
         rest = rest.without(name)
-    if rest.height > beliefs.height - NEGLIGIBLE:
+    if rest.height > beliefs.height - OPTIONS.negligible_nats:
         return rest
     evidence = attribution.evidence.on_library()
     return posterior(evidence, search(evidence, without=ruled_out), prior)
@@ -204,7 +198,7 @@ def _likely(attribution: Attribution) -> tuple[Attribution, tuple]:
 
     What else the best hypothesis holds there may be a part of what is unexplained, and spoils what is predicted.
     """
-    if attribution.posterior.probability_unexplained > _HALF:
+    if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         attribution = with_effects(attribution, tuple(certain_beside_unexplained(attribution.posterior)))
     return attribution, order_by_share(attribution)
 

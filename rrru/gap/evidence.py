@@ -28,6 +28,7 @@ import numpy as np
 from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.options import OPTIONS
 from rrru.gap.projected import Prior, Projected
 from rrru.gap.terms import EACH, SAME, spread
 from rrru.gap.weight import WEIGHT, as_found, borne, gained_over_cases, mean_over_cases, over_cases
@@ -35,12 +36,6 @@ from rrru.gap.whitened import LEVELS, Whitened
 from rrru.kept import Latest
 
 STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
-# times that each of many strengths is found about the others
-_SWEEPS = 2
-# answers of each kind that are kept
-_KEPT = 256
-# a term of which the calibration leaves a smaller share of the mean square is not seen
-_LEAST_VISIBLE = 1e-9
 
 
 def _on_complete(method):
@@ -130,7 +125,7 @@ class ModelEvidence:
                 (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)
             )
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
-            unit = np.sqrt(max(power, _LEAST_VISIBLE * total, 1e-30))
+            unit = np.sqrt(max(power, OPTIONS.min_visible_share * total, 1e-30))
             if coordinates.sized:
                 # of many coefficients the data tell the size far better than the strengths lie apart: one is just it
                 unit = STRENGTHS[np.abs(np.log(STRENGTHS / unit)).argmin()]
@@ -261,15 +256,15 @@ class ModelEvidence:
 
     @cached_property
     def _problems(self):
-        return Latest(_KEPT)
+        return Latest(OPTIONS.max_cached_results)
 
     @cached_property
     def _found(self):
-        return Latest(_KEPT)
+        return Latest(OPTIONS.max_cached_results)
 
     @cached_property
     def _averages(self):
-        return Latest(_KEPT)
+        return Latest(OPTIONS.max_cached_results)
 
     @_on_complete
     def independent(self, terms, levels):
@@ -280,7 +275,7 @@ class ModelEvidence:
         evidence, best = np.empty(len(levels)), np.ones((len(levels), len(terms)))
         for row, level in enumerate(levels):
             losses = np.zeros(len(terms))
-            for _ in range(_SWEEPS):
+            for _ in range(OPTIONS.prior_scale_sweeps):
                 for k, term in enumerate(terms):
                     # what is tried comes last: the others' part stands
                     others = *terms[:k], *terms[k + 1 :]

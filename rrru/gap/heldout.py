@@ -12,17 +12,10 @@ from rrru.estimation.cross_validation import CrossValidation, choose_folds
 from rrru.estimation.noise_model import half_waves, lengths
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import signatures
 from rrru.gap.terms import spread as spread_of
 from rrru.gap.whitened import LEVELS, spectrum
-
-# where a trajectory was driven once only, its runs are cut into stretches of about this many points, and every
-# so-manieth is left out
-_STRETCH, _FOLDS = 5, 5
-# more runs than this share folds
-_MAX_RUN_FOLDS = 20
-# fewer runs than this are resampled by stretches
-_ENOUGH_RUNS = 10
 
 
 @dataclass(frozen=True)
@@ -90,10 +83,10 @@ class HeldOut:
         """Fold numbers (m,), the ones that ask for most first."""
         frame, run = self.case.points, self.case.run
         if (frame.groupby("trajectory")["run"].nunique() > 1).all():
-            yield np.unique(run, return_inverse=True)[1] % _MAX_RUN_FOLDS
+            yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
         place = within(run, self.case.stop)
-        for length in (_STRETCH, 1):
-            yield np.unique((place // length + run) % _FOLDS, return_inverse=True)[1]
+        for length in (OPTIONS.points_per_stretch, 1):
+            yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]
 
     def predict(self, terms, strengths, level, uncertain=True):
         """Prediction by the calibration together with a set of terms.
@@ -214,8 +207,8 @@ def within(run, at):
 def resampled_rows(case, generator, draws):
     """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
     block = run = case.run
-    if len(np.unique(run)) < _ENOUGH_RUNS:
-        block = run * (len(run) + 1) + within(run, case.stop) // _STRETCH
+    if len(np.unique(run)) < OPTIONS.min_resampled_runs:
+        block = run * (len(run) + 1) + within(run, case.stop) // OPTIONS.points_per_stretch
     groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
     result = np.empty((draws, len(run)), dtype=int)
     for k in range(draws):

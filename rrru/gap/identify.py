@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy.special import chdtri, chndtrinc
 
-# found 9 times of 10 at 1 % false alarms
-_POWER, _FALSE = 0.9, 0.01
+from rrru.gap.options import OPTIONS
+
 _HIDDEN = "the calibration takes it up entirely on these points"
 _UNKNOWN = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
 
@@ -42,7 +42,7 @@ def with_seen(case, linear):
 
 def _needed(freedom):
     """Square, over the noise, from which on an effect of so many degrees of freedom is found."""
-    return chndtrinc(chdtri(freedom, _FALSE), freedom, 1.0 - _POWER)
+    return chndtrinc(chdtri(freedom, OPTIONS.false_alarm_probability), freedom, 1.0 - OPTIONS.detection_power)
 
 
 def _visible(case, linear, base, name):

@@ -8,12 +8,10 @@ from scipy.spatial import cKDTree
 from scipy.special import chdtri
 
 from rrru.gap.heldout import resampled_rows
+from rrru.gap.options import OPTIONS
 
-# the worst spot is the middle of the neighbours with the largest mean square; regions are cells of the points' box
-_NEIGHBOURS, _CELLS = 9, (3, 3, 2)
-_MOST_LEVELS = 12
-# drives slower than this, in their unit a second, are at rest
-_AT_REST = 1e-6
+# regions are cells of the points' box
+_CELLS = 3, 3, 2
 _COLUMNS = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_high", "share_of_noise", "noise_could")
 _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 
@@ -43,7 +41,7 @@ def locate(case, residual_mm, drive, generator, draws=200):
 
 def worst_spot(position_mm, residual_mm):
     """Point (3,) of the n points around which the residual's mean square over its neighbours is largest."""
-    count = min(_NEIGHBOURS, len(position_mm))
+    count = min(OPTIONS.worst_spot_neighbours, len(position_mm))
     _, near = cKDTree(position_mm).query(position_mm, k=count)
     squares = (residual_mm**2).sum(axis=1)
     return position_mm[int(squares[near.reshape(len(position_mm), count)].mean(axis=1).argmax())]
@@ -94,7 +92,7 @@ def _levels(case):
     result = {"trajectory": frame["trajectory"].to_numpy(dtype=object), "region": _cells(position)}
     for name, column, unit in (("speed", "speed_mm_s", "mm/s"), ("payload", "payload_kg", "kg")):
         values = frame[column].to_numpy(dtype=float)
-        if len(pd.unique(values[np.isfinite(values)])) <= _MOST_LEVELS:
+        if len(pd.unique(values[np.isfinite(values)])) <= OPTIONS.max_factor_levels:
             result[name] = np.array([f"{v:g} {unit}" if np.isfinite(v) else "" for v in values], dtype=object)
     time = frame["time_s"].to_numpy(dtype=float)
     if np.isfinite(time).any():
@@ -104,7 +102,8 @@ def _levels(case):
     if np.isfinite(rate).any():
         for leg, unit in enumerate(case.mechanism.parts.units):
             more, less = ("down", "up") if unit == "rad" else ("out", "in")
-            sense = np.where(rate[:, leg] > _AT_REST, more, np.where(rate[:, leg] < -_AT_REST, less, "at rest"))
+            backwards = np.where(rate[:, leg] < -OPTIONS.min_drive_rate, less, "at rest")
+            sense = np.where(rate[:, leg] > OPTIONS.min_drive_rate, more, backwards)
             named = np.char.add(f"leg {leg + 1} ", sense)
             result[f"motion_direction {leg + 1}"] = np.where(np.isfinite(rate[:, leg]), named, "").astype(object)
     return result

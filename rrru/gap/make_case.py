@@ -24,13 +24,9 @@ from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
 from rrru.gap.approach_direction import at_reversals, rest_widths
 from rrru.gap.case import Case
+from rrru.gap.options import OPTIONS
 from rrru.gap.unknown import unknown_functions
 from rrru.gap.weight import doubts_of
-
-# more coordinates than this share of the numbers read tell nothing
-_MOST_BROAD = 0.5
-# of the splines of a finer interpolation: as far as the two are apart is as far as the coarser one may be off
-_FINER_DEGREE = 7
 
 
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
@@ -75,7 +71,7 @@ def _tested(library, motion, used, told):
         if _fitted(effect, motion):
             untestable[name] = "the calibration's own parameters take it up"
             continue
-        if effect.coordinates.broad and len(effect.coordinates) > _MOST_BROAD * told:
+        if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
             untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
             continue
         lacking = _lacking(effect, motion, used)
@@ -130,8 +126,8 @@ def _unknown_approach(measurements, mechanism, course):
     result = np.repeat(starts[:, None], course.drive.shape[1], axis=1)
     if course.stops:
         return result
-    finer, _ = driven_path(measurements, _FINER_DEGREE)
-    other = _path_drive(measurements, finer, (mechanism, course.drive, course.path_index), _FINER_DEGREE)
+    finer, _ = driven_path(measurements, OPTIONS.finer_spline_degree)
+    other = _path_drive(measurements, finer, (mechanism, course.drive, course.path_index), OPTIONS.finer_spline_degree)
     first = np.diff(stop, prepend=-1) > 0
     return result | at_reversals(course, other, rest_widths(course.drive[first], run[first], mechanism.parts.units))
 

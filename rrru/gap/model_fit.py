@@ -21,24 +21,16 @@ from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
+from rrru.gap.options import OPTIONS
 from rrru.gap.state import State
 from rrru.gap.terms import Term, spread
-from rrru.gap.weight import NARROW_SHARE, WEIGHT
+from rrru.gap.weight import WEIGHT
 from rrru.gap.whitened import LEVELS, spectrum
 from rrru.kept import last_kept
 
 GEOMETRY = "geometry"
-# step of a difference quotient as a share of a coefficient's size; where that is next to nothing it is the typical size
-_STEP, _NOTHING = 1e-4, 1e-3
-# ASSUME an effect's coefficients are rarely more than this many times their typical size
-PRIOR_TIMES_TYPICAL = 20.0
-# a hundredth of a standard error is below what any verdict depends on
-_OPTIONS = SolverOptions(step_tolerance=1e-2)
-# a fit of more parameters is begun once, since nearly all of them are coefficients of functions, in which the model is
-# linear, and ends within a fiftieth of a nat, since its steps are slow
-_MANY, _MANY_OPTIONS = 200, SolverOptions(step_tolerance=0.3, max_iterations=60)
-# fits whose log posterior densities differ by less are equally good
-_EQUAL_NATS = 1.0
+_SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
+_MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,9 +99,8 @@ class EffectModel:
             doubts = np.array([self.case.doubts[name] for name in self._weight_names])
             low, high = np.transpose([self.case.bounds[name] for name in self._weight_names])
             units = ["kg" if name.endswith("kg") else "rad" for name in self._weight_names]
-            blocks.append(
-                Block.of(WEIGHT, self._weight_names, units, NARROW_SHARE * doubts, 0.0, (low, high), wide_sd=doubts)
-            )
+            narrow_sd = OPTIONS.stated_nuisance_sd_ratio * doubts
+            blocks.append(Block.of(WEIGHT, self._weight_names, units, narrow_sd, 0.0, (low, high), wide_sd=doubts))
         return Parameters(tuple(blocks))
 
     def vector(self, state):
@@ -172,7 +163,8 @@ class EffectModel:
         for k, column in enumerate(matrix.T):
             typical = float(np.max(effect.coordinates.typical[column > 0.0]))
             size = float(np.abs(present[column > 0.0]).max())
-            step = _STEP * max(size, typical) if size > _NOTHING * typical else typical
+            apart_from_zero = size > OPTIONS.min_coefficient_per_typical * typical
+            step = OPTIONS.difference_step_ratio * max(size, typical) if apart_from_zero else typical
             moved = state.contribution(case.library, key, case.motion, present + step * column)
             result[..., k] = case.of_rows(at.move((moved - own).twists)) / step
         return result
@@ -273,20 +265,23 @@ def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=
     the model has no pose at any start, even without effects.
     """
     model = EffectModel(case, tuple(terms), np.asarray(scales, dtype=float), signed)
-    problem, many = Problem(model, model.parameters, whitening_of(case, level)), len(model.parameters) > _MANY
+    problem, many = (
+        Problem(model, model.parameters, whitening_of(case, level)),
+        len(model.parameters) > OPTIONS.max_parameters_of_several_starts,
+    )
     fits = []
     for start in starts:
         # where the exact model has no pose at a start with effects, it has one without them
         candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
         candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
-        fits.append(solve(problem, [candidate], _MANY_OPTIONS if many else _OPTIONS))
+        fits.append(solve(problem, [candidate], _MANY_OPTIONS if many else _SOLVER_OPTIONS))
         if (fits[-1].end.straight and fits[-1].end.converged) or many:
             break
-    enough = min(one.end.cost for one in fits) + _EQUAL_NATS
+    enough = min(one.end.cost for one in fits) + OPTIONS.equal_fits_nats
     return ModelFit(model, next(one for one in fits if one.end.cost <= enough), level)
 
 
-def fit_named_effects(case, names, calibrated, times_typical=PRIOR_TIMES_TYPICAL):
+def fit_named_effects(case, names, calibrated, times_typical=OPTIONS.prior_sd_per_typical):
     """ModelFit of a Case with the effects of these names, each in its first shape, chosen beforehand without a search.
 
     calibrated: State to start from; times_typical: of the prior's standard deviation over the typical size. Signs and

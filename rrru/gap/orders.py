@@ -12,19 +12,9 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from rrru.effects.harmonic import drives_of
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
-
-# orders per resolved one, and the largest number of orders found that are kept
-_DENSITY, _PEAKS, _MOST = 6, 2, 8
-# what is found again lies within this share of the resolution
-_SAME = 0.03
-# an order that was found is off by this share of the resolution, 1 sigma
-_DOUBT = 0.1
-# a combination of waves of which less than this share is left beside the calibration is not told
-_TOLD = 1e-6
-# of what may be any order, this share is believed to be the stated one
-_STATED = 0.5
 
 
 def resolution(drive):
@@ -47,7 +37,7 @@ def periodogram(data, drive_effect, drive, beside, orders):
         taken, moment, whole = basis.T @ columns, columns.T @ left, columns.T @ columns
         size, turned = np.linalg.eigh(whole - taken.T @ taken)
         # what the calibration takes up is no wave
-        told = size > _TOLD * np.trace(whole) / len(size)
+        told = size > OPTIONS.min_remaining_wave_share * np.trace(whole) / len(size)
         gains[row] = ((turned[:, told].T @ moment) ** 2 / size[told]).sum()
     return gains
 
@@ -76,20 +66,22 @@ def _found(case, linear, effect, others):
     drives = drives_of(case.mechanism, search.unit)
     drive, step = case.motion.drive[:, drives][case.at], resolution(case.motion.drive[:, drives][case.used])
     beside = np.concatenate([linear.base, *signatures(case.library, linear, others)], axis=-1)
-    orders = np.arange(step, search.highest, step / _DENSITY)
+    orders = np.arange(step, search.highest, step / OPTIONS.orders_per_resolution)
     if len(orders) < 3 or beside.shape[-1] > linear.data.size // 2:
         return effect
     gains = periodogram(linear.data, linear.drive[..., drives], drive, beside, orders)
     peaks, _ = find_peaks(gains)
     shapes = list(coordinates.shapes)
-    for peak in peaks[np.argsort(-gains[peaks])][:_PEAKS]:
+    for peak in peaks[np.argsort(-gains[peaks])][: OPTIONS.max_periodogram_peaks]:
         order = _vertex(orders, gains, peak)
         had = [search.order(shape[search.name]) for shape in shapes]
-        if min(abs(order - one) for one in had) > _SAME * step and len(shapes) < _MOST:
+        new = min(abs(order - one) for one in had) > OPTIONS.min_order_distance_ratio * step
+        if new and len(shapes) < OPTIONS.max_effect_shapes:
             shapes.append(shapes[0] | {search.name: search.value(order)})
-    stated, resolved = coordinates.stated or len(coordinates.shapes), len(orders) / _DENSITY
-    weights = [_STATED / stated] * stated + [(1.0 - _STATED) / resolved] * (len(shapes) - stated)
-    found = replace(coordinates, shapes=tuple(shapes), weights=tuple(weights), stated=stated, doubt=_DOUBT * step)
+    stated, resolved = coordinates.stated or len(coordinates.shapes), len(orders) / OPTIONS.orders_per_resolution
+    probability, doubt = OPTIONS.stated_order_probability, OPTIONS.order_sd_ratio * step
+    weights = [probability / stated] * stated + [(1.0 - probability) / resolved] * (len(shapes) - stated)
+    found = replace(coordinates, shapes=tuple(shapes), weights=tuple(weights), stated=stated, doubt=doubt)
     return replace(effect, coordinates=found)
 
 

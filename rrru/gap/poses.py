@@ -9,13 +9,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.speed_profile import Trapezoid
-
-# points that are read on a pass, and its length
-POINTS, LENGTH_MM = 5, 100.0
-# log2 of the passes tried
-_TRIED_LOG2 = 8
-# a pass keeps at least this share of the campaign's own distance from singularities
-_CLEAR = 0.8
+from rrru.gap.options import OPTIONS
 
 
 def passes(measurements, mechanism):
@@ -31,28 +25,28 @@ def passes(measurements, mechanism):
         return np.zeros((0, 3)), np.zeros((0, 3))
     known = np.unique(rows.command(measurements)[rows.usable(measurements)], axis=0)
     low, high = known.min(axis=0), known.max(axis=0)
-    shares = qmc.Sobol(6, scramble=False).random_base2(_TRIED_LOG2)
+    shares = qmc.Sobol(6, scramble=False).random_base2(OPTIONS.tried_passes_log2)
     start, other = low + shares[:, :3] * (high - low), low + shares[:, 3:] * (high - low)
     distance = np.linalg.norm(other - start, axis=1, keepdims=True)
-    far = distance[:, 0] > LENGTH_MM
+    far = distance[:, 0] > OPTIONS.pass_length_mm
     start = start[far]
-    end = start + LENGTH_MM * (other[far] - start) / distance[far]
+    end = start + OPTIONS.pass_length_mm * (other[far] - start) / distance[far]
     fine = _clear(known, points_of(start, end), mechanism)
     return start[fine], end[fine]
 
 
 def points_of(start_mm, end_mm):
-    """Points (n, POINTS, 3) of passes from starts to ends (n, 3)."""
-    return start_mm[:, None] + np.linspace(0.0, 1.0, POINTS)[:, None] * (end_mm - start_mm)[:, None]
+    """Points (n, p, 3) of passes, p of each, from starts to ends (n, 3)."""
+    return start_mm[:, None] + np.linspace(0.0, 1.0, OPTIONS.points_per_pass)[:, None] * (end_mm - start_mm)[:, None]
 
 
 def _clear(known, points, mechanism):
-    """Passes (n,) whose points (n, POINTS, 3) are in reach and nearly as far from singularities as known points."""
+    """Passes (n,) whose points (n, p, 3) are in reach and nearly as far from singularities as known points."""
     flat = points.reshape(-1, 3)
     own, drive = mechanism.inverse(known), mechanism.planned(flat)
     fine = np.isfinite(drive).all(axis=1)
     for measure, limit in zip(_measures(mechanism, flat, drive), _measures(mechanism, known, own), strict=True):
-        fine &= measure > _CLEAR * np.nanmin(limit)
+        fine &= measure > OPTIONS.min_singularity_distance_ratio * np.nanmin(limit)
     return fine.reshape(points.shape[:2]).all(axis=1)
 
 
@@ -69,11 +63,15 @@ def commands(start_mm, end_mm, mechanism, start_s, speed_mm_s, payload_kg):
     The speed is that in the middle, to which each speeds up evenly; times are NaN where it is.
     """
     points, count = points_of(start_mm, end_mm).reshape(-1, 3), len(start_mm)
-    time = np.full(POINTS, np.nan)
+    time = np.full(OPTIONS.points_per_pass, np.nan)
     if np.isfinite(speed_mm_s):
-        profile = Trapezoid(LENGTH_MM, speed_mm_s, speed_mm_s**2 / LENGTH_MM)
-        time = start_s + profile.time(np.linspace(0.0, LENGTH_MM, POINTS))
-    told = {"run": np.repeat(np.arange(1, count + 1), POINTS), "point": np.tile(np.arange(1, POINTS + 1), count)}
+        profile = Trapezoid(OPTIONS.pass_length_mm, speed_mm_s, speed_mm_s**2 / OPTIONS.pass_length_mm)
+        time = start_s + profile.time(np.linspace(0.0, OPTIONS.pass_length_mm, OPTIONS.points_per_pass))
+    points_of_pass = np.arange(1, OPTIONS.points_per_pass + 1)
+    told = {
+        "run": np.repeat(np.arange(1, count + 1), len(points_of_pass)),
+        "point": np.tile(points_of_pass, count),
+    }
     drives = dict(zip(mechanism.parts.columns, mechanism.planned(points).T, strict=True))
     return pd.DataFrame(told).assign(
         trajectory="poses",

@@ -7,12 +7,10 @@ from math import comb
 import numpy as np
 
 from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
-
-# hypotheses further below the best than this carry nothing
-NEGLIGIBLE = 25.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ def posterior(evidence, hypotheses, prior):
     log_weight = np.array([h.evidence + log_prior.terms(h.terms) for h in hypotheses])
     # single effects stay, however improbable: tables show what each does alone
     single = np.array([len(h.terms) <= 1 for h in hypotheses])
-    worth = single | (log_weight.max(axis=1) > log_weight.max() - NEGLIGIBLE)
+    worth = single | (log_weight.max(axis=1) > log_weight.max() - OPTIONS.negligible_nats)
     kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
     log_weight = log_weight[worth]
     unexplained = np.zeros(log_weight.shape, dtype=bool)

@@ -1,18 +1,16 @@
 """Sentences on what a fit found of the robot apart from its effects."""
 
 from rrru.campaign.noise import repeat_noise
+from rrru.gap.options import OPTIONS
 
 # said where a part of the gap looks like random error and no pose was measured under the same conditions again
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
-
-# standard errors from which on the weight is surely off
-_SURE = 3.0
 
 
 def weight_notes(attribution):
     """Sentences on what the weight is surely off by."""
     for name, unit, value, error in attribution.fit.weight:
-        if abs(value) > _SURE * error:
+        if abs(value) > OPTIONS.min_nuisance_z * error:
             what = "more at the platform" if unit == "kg" else f"that the base leans about {name[-1]}"
             yield f"weight not as told: {value:.3g} +- {error:.2g} {unit} {what}"
 

@@ -12,17 +12,10 @@ from itertools import combinations, product
 import numpy as np
 
 from rrru.gap.evidence import STRENGTHS, averaged
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import variants
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.whitened import LEVELS
-
-# hypotheses this far below the best in log evidence are not worth refining
-_WORTH = 12.0
-_HOPELESS = 30.0
-_BEST_SETS = 4
-# sets of so many effects are tried with all combinations of strengths
-_SMALL = 3
-_REPLACEMENTS, _POLISHED = 3, 8
 
 
 @dataclass(frozen=True)
@@ -54,7 +47,7 @@ def search(evidence, most=12, without=()):
     for terms in ((), *((term,) for name in library for term in choices[name])):
         tried.add(terms)
     layer = tried.best_of_size(1)
-    for size in range(2, min(_SMALL, most, len(library)) + 1):
+    for size in range(2, min(OPTIONS.max_jointly_averaged_effects, most, len(library)) + 1):
         near = tried.near_levels()
         if size == 2:
             for first, second in combinations([name for name in library if name not in UNKNOWN], 2):
@@ -72,7 +65,7 @@ def search(evidence, most=12, without=()):
                     tried.add(terms, levels=near)
         layer = tried.best_of_size(size)
         smaller = max(h.evidence.max() for h in tried.hypotheses.values() if len(h.terms) < size)
-        if not layer or layer[0].evidence.max() < smaller - _WORTH:
+        if not layer or layer[0].evidence.max() < smaller - OPTIONS.max_loss_of_larger_sets_nats:
             break
     else:
         _grow(tried, choices, layer, min(most, len(library)))
@@ -81,14 +74,14 @@ def search(evidence, most=12, without=()):
 
 def _grow(tried, choices, layer, most):
     """Try sets of more effects as long as they gain, and the best one with each of its effects out or replaced."""
-    for size in range(_SMALL + 1, most + 1):
+    for size in range(OPTIONS.max_jointly_averaged_effects + 1, most + 1):
         best = tried.best
         layer = tried.grown(layer, choices, size)
         if not layer or layer[0].evidence.max() < best.evidence.max():
             break
-    for _ in range(_REPLACEMENTS):
+    for _ in range(OPTIONS.max_replacement_rounds):
         start = tried.best
-        if len(start.terms) < _SMALL:
+        if len(start.terms) < OPTIONS.max_jointly_averaged_effects:
             break
         fewer = [tried.polished(tuple(t for t in start.terms if t != term)) for term in start.terms]
         tried.grown(fewer, choices, len(start.terms))
@@ -126,7 +119,7 @@ class _Tried:
             value, grid = self.evidence.over_strengths(terms, coarse, [level])
             full[level] = averaged(value, len(terms))[0]
             best[level] = grid[value[0].argmax()]
-            if full[level] < highest - _HOPELESS:
+            if full[level] < highest - OPTIONS.max_loss_at_best_level_nats:
                 return Hypothesis(terms, full, best)
         levels = self.evidence.levels if levels is None else levels
         value, grid = self.evidence.over_strengths(terms, strengths, levels)
@@ -141,7 +134,7 @@ class _Tried:
             others = [term for name, terms in choices.items() if name not in start.effects for term in terms]
             gains += self._gains(start, others)
         gains.sort(key=lambda pair: -pair[0])
-        for _, terms in gains[:_POLISHED]:
+        for _, terms in gains[: OPTIONS.max_evaluated_sets_per_size]:
             self.polished(terms, near)
         return self.best_of_size(size)
 
@@ -184,7 +177,7 @@ class _Tried:
                 other = per_effects.get(hypothesis.effects)
                 if other is None or hypothesis.evidence.max() > other.evidence.max():
                     per_effects[hypothesis.effects] = hypothesis
-        return sorted(per_effects.values(), key=lambda h: -h.evidence.max())[:_BEST_SETS]
+        return sorted(per_effects.values(), key=lambda h: -h.evidence.max())[: OPTIONS.max_sets_per_size]
 
 
 def _narrow(start, levels):

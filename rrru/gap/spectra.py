@@ -14,20 +14,10 @@ from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
 from rrru.effects.harmonic import waves
+from rrru.gap.options import OPTIONS
 from rrru.gap.state import State
 from rrru.gap.terms import signatures
 from rrru.gap.unknown import UNKNOWN
-
-# orders per resolved one; highest order; most waves that are still called few
-_DENSITY, _HIGHEST, _MOST_WAVES = 2, 64.0, 30
-# share of a wave's squares that the calibration has to leave
-_TOLD = 0.01
-# of a wave of unit length, below which others take it up
-_SEEN = 1e-6
-# steps of that grid by which a wave's order may lie beside the one of the grid that shows it
-_REACH = 0.75
-# logarithms of the signal over the noise that are tried: from, to, how many
-_RATIOS = -4.0, 7.0, 23
 
 
 def with_spectra(case, linear, terms):
@@ -94,15 +84,15 @@ def pursue(data, basis, drive_effect, drive):
     # what the calibration takes up is none
     least = 1e-3 * np.linalg.norm(every, axis=0).max()
     unit = _unit(every, least)
-    resolved = max(sum(_HIGHEST * span / (2.0 * np.pi) for span in reach), 1.0)
+    resolved = max(sum(OPTIONS.max_spectrum_order * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
     found, had, left = [], np.zeros((len(data), 0)), data  # had: an orthonormal basis of the waves found
-    while len(found) < min(_MOST_WAVES, len(data) // 20):
+    while len(found) < min(OPTIONS.max_spectrum_waves, len(data) // 20):
         gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
         if not gains.any():
             break
         k, middle = atoms[int(gains.argmax())]
-        step = 2.0 * np.pi / reach[k] / _DENSITY
+        step = 2.0 * np.pi / reach[k] / OPTIONS.spectrum_orders_per_resolution
         wave = partial(lambda k, order: _unit(columns(k, np.array([order])), least), k)
         order = _sharpest(left, had, wave, middle, step)
         added = _beside(had, wave(order))
@@ -122,7 +112,8 @@ def _sharpest(left, had, wave, middle, step):
 
     A wave between two orders of the grid, which lie a step apart, would else be taken for both of them.
     """
-    bounds = max(middle - _REACH * step, _DENSITY * step), min(middle + _REACH * step, _HIGHEST)
+    shift, lowest = OPTIONS.max_order_shift_steps * step, OPTIONS.spectrum_orders_per_resolution * step
+    bounds = max(middle - shift, lowest), min(middle + shift, OPTIONS.max_spectrum_order)
 
     def cost(order):
         return -float(((_beside(had, wave(order)).T @ left) ** 2).sum())
@@ -134,7 +125,7 @@ def _beside(had, columns):
     """An orthonormal basis (m, r) of what columns (m, c) add to the orthonormal ones had (m, h)."""
     # once more for what rounding has left
     basis, size, _ = np.linalg.svd(_without(_without(columns, had), had), full_matrices=False)
-    return basis[:, size > _SEEN]
+    return basis[:, size > OPTIONS.min_new_wave_length]
 
 
 def _unit(columns, least):
@@ -156,7 +147,8 @@ def amplitudes(case, state, orders):
         columns = _without(whole, basis)
         pairs, moments = columns.reshape(len(left), -1, 2), (columns.T @ left).reshape(-1, 2)
         grams = np.einsum("mgi,mgj->gij", pairs, pairs)
-        told = np.linalg.eigvalsh(grams)[:, 0] > _TOLD * (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
+        squares = (whole**2).sum(axis=0).reshape(-1, 2).mean(axis=1)
+        told = np.linalg.eigvalsh(grams)[:, 0] > OPTIONS.min_free_wave_share * squares
         found[told] = np.linalg.norm(np.linalg.solve(grams[told], moments[told, :, None])[:, :, 0], axis=1)
     return result
 
@@ -164,7 +156,9 @@ def amplitudes(case, state, orders):
 def _orders(reach):
     """Orders that a drive which swings through so many rad is searched for."""
     step = 2.0 * np.pi / reach if reach > 0.0 else np.inf
-    return np.arange(step, _HIGHEST, step / _DENSITY) if step < _HIGHEST else np.zeros(0)
+    if step >= OPTIONS.max_spectrum_order:
+        return np.zeros(0)
+    return np.arange(step, OPTIONS.max_spectrum_order, step / OPTIONS.spectrum_orders_per_resolution)
 
 
 def _waves_of(drive_effect, drive, k, orders):
@@ -205,7 +199,8 @@ def _likeliest_factor(gram, moment, square, count):
 
     # a ratio of 1 over the root of the mean square is that of as much signal as noise
     middle = 0.5 * np.log(count / max(value.sum(), 1e-300))
-    tried = middle + np.linspace(*_RATIOS)
+    lowest, highest = OPTIONS.min_log_signal_to_noise, OPTIONS.max_log_signal_to_noise
+    tried = middle + np.linspace(lowest, highest, OPTIONS.tried_signal_to_noise)
     best = tried[np.argmin([cost(one) for one in tried])]
     width = tried[1] - tried[0]
     fine = minimize_scalar(cost, bounds=(best - width, best + width), method="bounded")

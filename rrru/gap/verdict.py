@@ -2,12 +2,9 @@
 
 from dataclasses import dataclass
 
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import per_leg
 
-# a rival that is this many times less probable than the verdict is no longer named
-_RIVAL = 0.05
-_SURE, _HALF = 0.9, 0.5
-_NOTHING = 0.2
 _NONE = (frozenset(), False)
 
 
@@ -59,9 +56,9 @@ def decide(attribution, shares):
     unknown, sets = beliefs.probability_unexplained, beliefs.sets()
     known = {key: p for key, p in sets.items() if not key[1]}
     best = max(known, key=known.get, default=_NONE)
-    if known.get(_NONE, 0.0) > _NOTHING:
+    if known.get(_NONE, 0.0) > OPTIONS.max_none_probability:
         best = _NONE
-    unexplained = known.get(_NONE, 0.0) <= _NOTHING and unknown > known.get(best, 0.0)
+    unexplained = known.get(_NONE, 0.0) <= OPTIONS.max_none_probability and unknown > known.get(best, 0.0)
     if unexplained:
         effects, probability, rivals = _beside_unexplained(sets, unknown, shares)
     else:
@@ -73,7 +70,7 @@ def decide(attribution, shares):
         unexplained,
         float(min(probability, 1.0)),
         _leg(beliefs, effects, attribution.case.library),
-        tuple((*key, p) for key, p in ordered if p > _RIVAL * probability),
+        tuple((*key, p) for key, p in ordered if p > OPTIONS.min_rival_probability_ratio * probability),
     )
 
 
@@ -81,7 +78,7 @@ def _beside_unexplained(sets, unknown, shares):
     """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained)."""
     within = {effects: p for (effects, flag), p in sets.items() if flag}
     named = _certain(within, unknown)
-    if sum(shares.get(name, 0.0) for name in named) < _HALF:
+    if sum(shares.get(name, 0.0) for name in named) < OPTIONS.min_share_with_unexplained:
         named = frozenset()
     # what imitates a part of the unknown, and what would do without it
     rivals = {(effects, True): p for effects, p in within.items() if effects != named}
@@ -98,7 +95,7 @@ def certain_beside_unexplained(beliefs):
 def _certain(within, unknown):
     """Effects that make up 0.9 of the probability of something unexplained, from that of sets with it."""
     acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
-    return frozenset(name for name, p in acting.items() if p > _SURE * unknown)
+    return frozenset(name for name, p in acting.items() if p > OPTIONS.min_probability_given_unexplained * unknown)
 
 
 def _leg(beliefs, effects, library):

@@ -25,22 +25,18 @@ from itertools import product
 import numpy as np
 
 from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.options import OPTIONS
 from rrru.gap.projected import gained, posterior_covariance, posterior_mean
 from rrru.robots.dynamics import carried_kg, level_axes
 from rrru.robots.lumps import PLATFORM
 
 # its name beside effects, and that of its mass
 WEIGHT, _EXTRA = "weight", "extra_kg"
-# chances that a mass, or a lean, is as told and that it is not, each with its share of the standard deviations below
-NARROW_SHARE = 0.1
-_CASES = ((0.5, NARROW_SHARE), (0.5, 1.0))
-_SHARE, _OF_ALL, _LEAN_RAD = 0.3, 0.1, float(np.radians(1.0))
-# share of the told mass that may be missing, and standard deviations that anything may be off by
-_MISSING, _MOST = 0.9, 10.0
-# such a share of these is nothing
-_STAYS = 1e-4
-# strengths lie so far apart that the next one to a size may be this share of it
-_NEXT = 0.5
+# probabilities that a mass, or a tilt, is as stated and that it is not, each with its ratio of standard deviations
+_CASES = (
+    (OPTIONS.stated_nuisance_probability, OPTIONS.stated_nuisance_sd_ratio),
+    (1.0 - OPTIONS.stated_nuisance_probability, 1.0),
+)
 
 
 def weight_names(robot):
@@ -56,10 +52,11 @@ def doubts_of(motion, masses):
     robot, lumps = motion.robot, getattr(motion.robot, "lumps", ())
     own = sum(lump.mass_kg for lump in lumps if lump.joint == PLATFORM)
     told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
-    extra = _SHARE * float(told.max(initial=0.0)) or _OF_ALL * sum(lump.mass_kg for lump in lumps)
-    doubts = extra, *(2 * [_LEAN_RAD if extra else 0.0])
-    bounds = [(-_MOST * doubt, _MOST * doubt) for doubt in doubts]
-    bounds[0] = -_MISSING * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
+    extra = OPTIONS.payload_sd_per_stated_mass * float(told.max(initial=0.0))
+    extra = extra or OPTIONS.payload_sd_per_robot_mass * sum(lump.mass_kg for lump in lumps)
+    doubts = extra, *(2 * [OPTIONS.tilt_sd_rad if extra else 0.0])
+    bounds = [(-OPTIONS.nuisance_bound_sd * doubt, OPTIONS.nuisance_bound_sd * doubt) for doubt in doubts]
+    bounds[0] = -OPTIONS.max_missing_mass_share * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
     return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (doubts, bounds))
 
 
@@ -107,13 +104,13 @@ def gained_over_cases(problem, strengths):
     if not problem.weights:
         return gained(problem, problem.scale(strengths))
     # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
-    least = np.maximum(strengths, _NEXT * problem.at_least)
+    least = np.maximum(strengths, OPTIONS.min_prior_scale_per_size * problem.at_least)
     result = _over_cases(problem, problem.scale(least))
     narrow = (least > strengths).any(axis=1)
     if narrow.any():
         as_it_is = problem.scale(np.concatenate([strengths[narrow], least[narrow]]))
         # under a prior too narrow for the coefficients the weight's columns, as large as these, would stand for them
-        as_it_is[:, -len(problem.weights) :] = _STAYS
+        as_it_is[:, -len(problem.weights) :] = OPTIONS.fixed_nuisance_sd_ratio
         own, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
         result[:, narrow] = own + np.minimum(result[:, narrow] - at_least, 0.0)
     return result

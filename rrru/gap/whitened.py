@@ -11,17 +11,16 @@ import numpy as np
 
 from rrru.campaign.noise import along_runs
 from rrru.estimation.noise_model import NoiseModel, lengths
+from rrru.gap.options import OPTIONS
 from rrru.gap.terms import EACH, SAME, per_leg, spread
 from rrru.gap.weight import WEIGHT
 
 LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
-# the discrepancy's spectrum: half its density is lost at this half-wave number along a run; share of it that is white
-_HALF_WAVES, _WHITE = 3.0, 0.01
 
 
 def spectrum(wave):
     """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
-    density = 1.0 / (1.0 + (wave / _HALF_WAVES) ** 2) + _WHITE
+    density = 1.0 / (1.0 + (wave / OPTIONS.discrepancy_half_density_wave_number) ** 2) + OPTIONS.discrepancy_white_share
     return density / density.mean()
 
 

@@ -3,7 +3,7 @@
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, from_config
-from rrru.gap.poses import LENGTH_MM, POINTS
+from rrru.gap.options import OPTIONS
 
 
 def advised_runs(run, poses, trajectories, motion):
@@ -16,7 +16,7 @@ def advised_runs(run, poses, trajectories, motion):
     entry = {key: run[key] for key in ("reverse", "speed_mm_s", "payload_kg")}
     if run["kind"] == "poses":
         ends = zip(rows.vectors(poses, "from").tolist(), rows.vectors(poses, "to").tolist(), strict=True)
-        lines = [Line(f"pose_{k}", *pair, POINTS) for k, pair in enumerate(ends, start=1)]
-        return make_plan(lines, [entry | {"acceleration_mm_s2": speed**2 / LENGTH_MM}], **motion).runs
+        lines = [Line(f"pose_{k}", *pair, OPTIONS.points_per_pass) for k, pair in enumerate(ends, start=1)]
+        return make_plan(lines, [entry | {"acceleration_mm_s2": speed**2 / OPTIONS.pass_length_mm}], **motion).runs
     entry["acceleration_mm_s2"] = motion["acceleration_mm_s2"] * (speed / motion["speed_mm_s"]) ** 2
     return make_plan(from_config(trajectories), [entry | {"trajectories": [run["trajectory"]]}], **motion).runs

@@ -14,10 +14,11 @@ from rrru.effects.protocol import together
 from rrru.errors import FitError
 from rrru.gap.approach_direction import at_reversals, read_back_jitter, rest_widths
 from rrru.gap.attribute import attribute
-from rrru.gap.determined import MIN_SPARE_NUMBERS, require_determined
+from rrru.gap.determined import require_determined
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
 from rrru.gap.model_fit import fit_model
+from rrru.gap.options import OPTIONS
 from rrru.gap.settings import Prior
 from rrru.gap.state import State
 from rrru.robots.drive_step import drives_at
@@ -218,10 +219,9 @@ def test_too_few_readings_are_refused_with_what_to_do():
     frame = arms.measure((), 10)
     case = arms.case_of(frame)
     count = len(case.mechanism.parameters)
-    more = int(np.ceil((count + MIN_SPARE_NUMBERS - 30) / 3.0))
-    told = (
-        f"30 numbers read at 10 poses .* {count} parameters; .* least {count + MIN_SPARE_NUMBERS}: measure {more} more"
-    )
+    least = count + OPTIONS.min_spare_numbers
+    more = int(np.ceil((least - 30) / 3.0))
+    told = f"30 numbers read at 10 poses .* {count} parameters; .* least {least}: measure {more} more"
     with pytest.raises(FitError, match=told):
         require_determined(arms.case_of(frame.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"])))
 

@@ -12,6 +12,7 @@ from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.model_fit import fit_model
+from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
@@ -68,7 +69,7 @@ def test_passes_lie_between_measured_points_within_reach():
     known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
     assert len(start) > 20 and np.isfinite(SIM.inverse(points)).all()
     assert (points >= known.min(axis=0) - 1e-9).all() and (points <= known.max(axis=0) + 1e-9).all()
-    np.testing.assert_allclose(np.linalg.norm(end - start, axis=1), poses.LENGTH_MM)
+    np.testing.assert_allclose(np.linalg.norm(end - start, axis=1), OPTIONS.pass_length_mm)
     near, *_ = SIM.singularities(points, SIM.inverse(points))
     own, *_ = SIM.singularities(known, SIM.inverse(known))
     assert near.min() > 0.75 * own.min()
@@ -107,8 +108,8 @@ def test_poses_tell_what_no_trajectory_does(between):
     assert between.runs["kind"].tolist() == ["poses"]
     assert between.runs["separates"].str.contains("local_compliance").all()
     row, listed = between.runs.iloc[0], between.poses
-    assert row["gain_nats"] > 3.0 and row["points"] == poses.POINTS * len(listed) and 1 < len(listed) <= 10
+    assert row["gain_nats"] > 3.0 and row["points"] == OPTIONS.points_per_pass * len(listed) and 1 < len(listed) <= 10
     assert listed["pose"].tolist() == list(range(1, len(listed) + 1))
     middle = (listed["from_y_mm"] + listed["to_y_mm"]) / 2.0
     # the first one crosses where they differ
-    assert abs(middle.iloc[0]) < 60.0 + poses.LENGTH_MM / 2.0
+    assert abs(middle.iloc[0]) < 60.0 + OPTIONS.pass_length_mm / 2.0

@@ -12,7 +12,8 @@ from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.model_fit import fit_model
-from rrru.gap.posterior import NEGLIGIBLE, posterior
+from rrru.gap.options import OPTIONS
+from rrru.gap.posterior import posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
 from rrru.gap.state import Linear
@@ -60,7 +61,7 @@ def test_where_a_likely_set_does_without_it_nothing_is_searched(monkeypatch):
     found = _found(0.02)
     beliefs = found.posterior
     kept = beliefs.without("whole")
-    assert kept.height > beliefs.height - NEGLIGIBLE and kept.best()[0].effects == {"first", "second"}
+    assert kept.height > beliefs.height - OPTIONS.negligible_nats and kept.best()[0].effects == {"first", "second"}
     monkeypatch.setattr(diagnose, "search", lambda *_, **__: pytest.fail("searched"))
     rest = diagnose._without(found, {"whole"}, {"whole"}, PRIOR)
     assert rest.best() == kept.best() and rest.marginal("whole") == 0.0

@@ -9,7 +9,8 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.gap.advise import candidates
 from rrru.gap.diagnose import Diagnosis, MeasuredRobot
-from rrru.gap.poses import POINTS, passes, points_of
+from rrru.gap.options import OPTIONS
+from rrru.gap.poses import passes, points_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.catalogue import make_mechanism
 from rrru.studies.withheld import advice, draw
@@ -68,7 +69,7 @@ def test_poses_are_driven_one_by_one(robot):
     run = {"kind": "poses", "trajectory": "poses", "reverse": False, "speed_mm_s": 80.0, "payload_kg": 5.0}
     longer, runs = advice.drive(robot, _arm(measurements, poses=listed), run, CONDITIONS, np.random.default_rng(0))
     extra = longer.iloc[len(measurements) :]
-    assert len(runs) == 3 and extra.groupby("run").size().tolist() == [POINTS] * 3
+    assert len(runs) == 3 and extra.groupby("run").size().tolist() == [OPTIONS.points_per_pass] * 3
     np.testing.assert_allclose(rows.command(extra), points_of(start, end).reshape(-1, 3), atol=1e-9)
     # passes are no trajectories to be driven again
     names = {run["trajectory"] for run in candidates(longer)[0]}

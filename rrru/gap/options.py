@@ -1,0 +1,276 @@
+"""Thresholds and settings of the diagnosis in one place, each with the reason for its value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class DiagnosisOptions:
+    """What limits a diagnosis, one field a threshold; the comment above a field says why it has its value.
+
+    The unit is the end of a name; a ratio, share or probability has none. nats: differences of log evidence or of log
+    predictive density, natural logarithm; 3 nats are odds of 20 to 1. "Assumed" marks a value that no source gives and
+    no derivation supports.
+    """
+
+    # --- which readings are used ---
+    # numbers read beyond the calibration's parameters: 20 degrees of freedom give the noise within 16 %, 1 sigma
+    min_spare_numbers: int = 20
+    # sets of effects compare on the readings at which all of them have what they need: with fewer of these an effect
+    # would cost the others more than half of what is known of them
+    min_complete_share: float = 0.5
+    # with fewer numbers for each parameter large effects alone are found, and `few_readings` says so; assumed
+    few_numbers_per_parameter: float = 9.0
+    # share of a campaign's points that is usually diagnosed; a note says so where fewer are; assumed
+    min_used_share: float = 0.8
+    # an effect of more coefficients than this share of the numbers read is not tested; assumed
+    max_coefficients_per_number: float = 0.5
+    # bounds of geometric parameters: further than a calibration's, which a strong effect would press against; assumed
+    parameter_bound_rad: float = 0.3
+    parameter_bound_mm: float = 100.0
+
+    # --- sense of arrival of the drives ---
+    # steps of a drive below these are rounding of its values
+    drive_rounding_rad: float = 1e-8
+    drive_rounding_mm: float = 1e-6
+    # orders of the differences of drive values that jitter is found from; assumed
+    min_difference_order: int = 2
+    max_difference_order: int = 10
+    # fewer differences have no median; assumed
+    min_differences: int = 8
+    # a larger share of the widest swing of a drive is no jitter but a motion of which hardly a point is read; assumed
+    max_jitter_per_swing: float = 1e-3
+    # two readings of a drive at rest differ by more than so many deviations of the jitter once in 50,000 pairs
+    rest_width_per_jitter_sd: float = 6.0
+    # degree of the splines of a finer interpolation: its distance from the coarser one bounds the coarser one's error
+    finer_spline_degree: int = 7
+    # two interpolations that are this far apart may both be as far off, to opposite sides
+    interpolation_error_factor: float = 2.0
+    # a sense of arrival that changes the residual by less than this share of the noise is not estimated; assumed
+    min_approach_response_per_noise: float = 0.1
+    # drives of one stop whose senses are estimated together, in all combinations; bounds the time
+    max_jointly_estimated_drives: int = 10
+
+    # --- noise and linearisation ---
+    # share of the numbers read that the fitted columns leave, so that each reading still shows its noise; assumed
+    min_free_share: float = 0.1
+    # rounds of leaving out outliers; assumed
+    max_outlier_rounds: int = 3
+    # rounds of search and fit until the best hypothesis stays; assumed
+    max_search_rounds: int = 6
+    # a gap below so many times the noise is small: it is tested whether the model is linear over it; assumed
+    max_small_gap_per_noise: float = 10.0
+    # nonlinearity, rms, below this share of the noise is negligible; assumed
+    max_nonlinearity_per_noise: float = 0.1
+    # the discrepancy's spectrum loses half its density at this half-wave number along a run; assumed
+    discrepancy_half_density_wave_number: float = 3.0
+    # share of the discrepancy's spectrum that is white; assumed
+    discrepancy_white_share: float = 0.01
+
+    # --- search over sets of effects and their evidence ---
+    # sets so far below the best smaller one end the search for larger ones: odds of 160,000 to 1
+    max_loss_of_larger_sets_nats: float = 12.0
+    # a set so far below the best one at its level is tried at no other level: e^-30 is 1e-13
+    max_loss_at_best_level_nats: float = 30.0
+    # sets of each size that larger ones grow from; assumed
+    max_sets_per_size: int = 4
+    # sets of up to so many effects are averaged over all combinations of prior scales: 8^3 of them
+    max_jointly_averaged_effects: int = 3
+    # rounds in which each effect of the best set is taken out or replaced; assumed
+    max_replacement_rounds: int = 3
+    # sets of a larger size whose evidence is computed in full; assumed
+    max_evaluated_sets_per_size: int = 8
+    # sweeps in which each of many prior scales is found given the others; assumed
+    prior_scale_sweeps: int = 2
+    # results of each kind in the cache of the evidence; bounds the memory
+    max_cached_results: int = 256
+    # the calibration explains a term up to this share of its mean square: the rest is rounding
+    min_visible_share: float = 1e-9
+
+    # --- evidence over nuisance parameters by importance sampling ---
+    # share of draws from the prior: bounds the importance weights by its inverse
+    prior_draw_share: float = 0.2
+    # degrees of freedom of the proposal's t distribution: heavier tails than the posterior; assumed
+    proposal_degrees_of_freedom: float = 5.0
+    # draws of each round that fits the proposal, and rounds at most; assumed
+    draws_per_proposal_round: int = 1024
+    max_proposal_rounds: int = 12
+    # effective share of the draws from which on the proposal fits; assumed
+    min_effective_draw_share: float = 0.3
+    # variances of the proposal over those of the draws: too wide costs less than too narrow; assumed
+    proposal_variance_factor: float = 1.2
+    # smallest variance of a proposal over that of the prior; assumed
+    min_proposal_variance_ratio: float = 1e-6
+    # draws whose Gram matrices are made at a time; bounds the memory
+    max_draws_per_block: int = 512
+
+    # --- payload and tilt of the base as nuisance parameters ---
+    # prior probability that a mass, or a tilt, is as stated; assumed
+    stated_nuisance_probability: float = 0.5
+    # standard deviation where it is as stated, over that where it is not; assumed
+    stated_nuisance_sd_ratio: float = 0.1
+    # standard deviation of the payload over the stated mass; where none is stated, over the robot's masses; assumed
+    payload_sd_per_stated_mass: float = 0.3
+    payload_sd_per_robot_mass: float = 0.1
+    # standard deviation of the tilt of the base about each level axis: 1 degree; assumed
+    tilt_sd_rad: float = float(np.radians(1.0))
+    # share of the stated mass that may be missing: a mass is positive
+    max_missing_mass_share: float = 0.9
+    # bounds of a nuisance parameter in standard deviations; assumed
+    nuisance_bound_sd: float = 10.0
+    # a standard deviation of this share fixes a nuisance parameter
+    fixed_nuisance_sd_ratio: float = 1e-4
+    # neighbours of the grid of prior scales are about three apart: one next to a size may be this share of it
+    min_prior_scale_per_size: float = 0.5
+
+    # --- posterior and verdict ---
+    # hypotheses so far below the best have no probability that matters: e^-25 is 1e-11
+    negligible_nats: float = 25.0
+    # an effect that predicts left-out points worse by more is ruled out; with something unexplained it has to gain it
+    max_heldout_loss_nats: float = 3.0
+    # no cause is named while "none" is more probable: a false alarm costs more than a small gap that is not found
+    max_none_probability: float = 0.2
+    # rivals less probable than this share of the verdict's probability are not named; the usual 5 %
+    min_rival_probability_ratio: float = 0.05
+    # with something unexplained an effect is named from this probability on, given that; assumed
+    min_probability_given_unexplained: float = 0.9
+    # with something unexplained effects are named where they explain this share of the gap together; assumed
+    min_share_with_unexplained: float = 0.5
+    # something unexplained is more probable than not
+    min_unexplained_probability: float = 0.5
+    # a verdict of this probability needs no further run; one of less has rivals even where none is named; assumed
+    min_sure_probability: float = 0.9
+
+    # --- fit of the exact model ---
+    # step of a difference quotient over a coefficient's size; assumed
+    difference_step_ratio: float = 1e-4
+    # a coefficient below this share of its typical size is next to zero: the step is the typical size; assumed
+    min_coefficient_per_typical: float = 1e-3
+    # an effect's coefficients are rarely more than so many times their typical size; assumed
+    prior_sd_per_typical: float = 20.0
+    # a hundredth of a standard error is below what any verdict depends on
+    step_tolerance_per_standard_error: float = 1e-2
+    # a fit of more parameters has one start: nearly all are coefficients of functions, in which the model is linear
+    max_parameters_of_several_starts: int = 200
+    # more of them end within a fiftieth of a nat, since their steps are slow
+    step_tolerance_of_many: float = 0.3
+    max_iterations_of_many: int = 60
+    # fits whose log posterior densities differ by less are equally good; assumed
+    equal_fits_nats: float = 1.0
+
+    # --- held-out points and detectability ---
+    # where a trajectory was driven once only, its runs are cut into stretches of about so many points; assumed
+    points_per_stretch: int = 5
+    # every so-manieth stretch is left out: the usual five folds
+    stretch_folds: int = 5
+    # more runs than this share folds; bounds the time
+    max_run_folds: int = 20
+    # fewer runs than this are resampled by stretches: too few for a bootstrap of runs; assumed
+    min_resampled_runs: int = 10
+    # a detectable effect is found 9 times of 10 at 1 % false alarms; usual values
+    detection_power: float = 0.9
+    false_alarm_probability: float = 0.01
+
+    # --- budget and places of the gap ---
+    # effects of less probability, and products of two effects of a smaller share, are not listed; assumed
+    min_budget_probability: float = 0.02
+    min_covariance_share: float = 0.005
+    # quantiles of a 95 % interval
+    interval_quantiles: tuple[float, float] = (0.025, 0.975)
+    # the worst spot is the middle of so many neighbours with the largest mean square; assumed
+    worst_spot_neighbours: int = 9
+    # a speed or payload of more distinct values is no factor; assumed
+    max_factor_levels: int = 12
+    # drives slower than this, in their unit a second, are at rest; assumed
+    min_drive_rate: float = 1e-6
+
+    # --- notes and text of the answer ---
+    # standard errors from which on a note says that payload or tilt differ from the stated ones; the usual 3 sigma
+    min_nuisance_z: float = 3.0
+    # rows of the table of sets; assumed
+    max_listed_sets: int = 20
+    # a function of the discrepancy is named where it is more probable than not
+    min_function_probability: float = 0.5
+    # a text that lists more fitted numbers says how many there are; the table has them; assumed
+    max_listed_numbers: int = 3
+    # a share of the gap that is worth a sentence; assumed
+    min_mentioned_share: float = 0.05
+    # random error gets a sentence where it is more probable than not
+    min_scatter_probability: float = 0.5
+    # a share beyond this is none: confounded effects add up to a little more than the whole; assumed
+    max_mentioned_share: float = 1.5
+
+    # --- experiment design: the next runs and poses ---
+    # a fast pass, the added mass, and the pause between runs; assumed
+    fast_pass_mm_s: float = 300.0
+    added_payload_kg: float = 5.0
+    pause_between_runs_s: float = 60.0
+    # trajectories and pairs of rivals that runs are designed for, and poses of a run; assumed, bound the time
+    max_advised_trajectories: int = 4
+    max_advised_rivals: int = 2
+    max_advised_poses: int = 10
+    # less expected log Bayes factor than this is not worth a run; assumed
+    min_run_gain_nats: float = 0.2
+    # as much makes a rival 20 times less probable, which rules it out
+    decisive_gain_nats: float = 3.0
+    # points that are read on a short pass, and its length; assumed
+    points_per_pass: int = 5
+    pass_length_mm: float = 100.0
+    # log2 of the number of passes that are tried: 256; assumed
+    tried_passes_log2: int = 8
+    # a pass has at least this share of the campaign's own distance from singularities; assumed
+    min_singularity_distance_ratio: float = 0.8
+
+    # --- harmonics of effects ---
+    # orders of the periodogram per resolved one; assumed, finer than the width of a peak
+    orders_per_resolution: int = 6
+    # peaks of a periodogram that become shapes, and shapes of an effect at most; assumed, bound the time
+    max_periodogram_peaks: int = 2
+    max_effect_shapes: int = 8
+    # peaks closer than this share of the resolution are the same order; assumed
+    min_order_distance_ratio: float = 0.03
+    # standard error of an order that was found, over the resolution; assumed
+    order_sd_ratio: float = 0.1
+    # the calibration explains a combination of waves of which a smaller share remains; assumed
+    min_remaining_wave_share: float = 1e-6
+    # prior probability that an effect of any order has the stated one; assumed
+    stated_order_probability: float = 0.5
+
+    # --- spectra of the drives ---
+    # orders of the grid per resolved one; the order is refined between them
+    spectrum_orders_per_resolution: int = 2
+    # highest order a turn; assumed
+    max_spectrum_order: float = 64.0
+    # more waves are a rough function, not a few waves; assumed
+    max_spectrum_waves: int = 30
+    # share of a wave's squares that the calibration has to leave; assumed
+    min_free_wave_share: float = 0.01
+    # remaining length of a wave of unit length below which the waves found before explain it; rounding
+    min_new_wave_length: float = 1e-6
+    # a wave's order differs from that of the grid by at most so many steps: half a step, and a margin
+    max_order_shift_steps: float = 0.75
+    # logarithms of signal over noise that are tried: from, to, how many; signals of 0.02 to 1,000 times the noise
+    min_log_signal_to_noise: float = -4.0
+    max_log_signal_to_noise: float = 7.0
+    tried_signal_to_noise: int = 23
+
+    # --- corrected files ---
+    # lines of the grid along each axis; assumed
+    drive_table_grid_lines: int = 7
+    # a grid point has a measured point within so many steps of the grid: no extrapolation
+    max_grid_distance_steps: float = 1.0
+    # extents below this are none; rounding
+    min_extent_mm: float = 1e-6
+    # distance from which the drives come: longer than any backlash
+    approach_distance_rad: float = 0.1
+    approach_distance_mm: float = 5.0
+    # a drive's error changes with the drive so slowly that after two iterations it stays; one more is a margin
+    correction_iterations: int = 3
+    # drive values of both senses that are closer, in the drives' unit, are the same; rounding
+    min_sense_difference: float = 1e-12
+    # a simulation takes about a tenth of a second a point: no more points are driven, from the first on
+    max_driven_points: int = 300
+
+
+OPTIONS = DiagnosisOptions()
