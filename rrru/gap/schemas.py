@@ -151,7 +151,7 @@ campaign effect
 parameter              str    name of the parameter
 unit                   str    unit of the value
 value                  float  fitted value
-standard_error         float? 1 sigma, correlated among them; null for shapes and what was not fitted
+standard_error         float? 1 sigma, correlated among them; null at a bound and for what was not fitted
 at_bound               bool   true where the fit ended at a bound
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank
