@@ -2,7 +2,7 @@
 
 The evidence of normal coefficients is that of their Cholesky factor. Non-negative ones, whose priors are halved, add
 the logarithm of 2^p P, where P is the probability that they are positive under the posterior of the untruncated
-coefficients; `rrru.gap.orthant` has its equations.
+coefficients; `tests.gap.orthant` has its equations.
 """
 
 import math

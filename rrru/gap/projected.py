@@ -98,7 +98,7 @@ def gained(problem, scale):
 def evidence_error(problem, scale):
     """How far (levels, m) `gained` may be off at prior deviations (m, k): the size of the correction in it.
 
-    It comes from the probability of the coefficients that cannot be negative, see `rrru.gap.orthant`.
+    It comes from the probability of the coefficients that cannot be negative, see `tests.gap.orthant`.
     """
     gram, moment = np.ascontiguousarray(problem.gram), problem.moment - problem.gram @ problem.about
     correction = kernels.log_evidence_and_correction(gram, moment, np.ascontiguousarray(scale), problem.positive)[1]

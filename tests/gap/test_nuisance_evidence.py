@@ -10,9 +10,9 @@ from scipy.stats import norm
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import STRENGTHS
 from rrru.gap.evidence_kernels import log_evidence
-from rrru.gap.nuisance_evidence import ProductModel, sample_evidence
 from rrru.gap.terms import Term
 from tests.gap import arms, campaigns
+from tests.reference.nuisance_evidence import ProductModel, sample_evidence
 
 # nats that the linearisation is off at most, where the effect acts that bears the loads
 _MAX_ERROR_NATS = 0.25

@@ -8,9 +8,9 @@ from scipy.special import log_ndtr, logsumexp
 from scipy.stats import norm
 
 from rrru.gap.evidence_kernels import log_evidence, log_evidence_and_correction
-from rrru.gap.orthant import log_orthant, truncated_moments
 from rrru.gap.projected import evidence_error
 from tests.gap.evidence_problems import COUNT, problems
+from tests.gap.orthant import log_orthant, truncated_moments
 from tests.reference.truncated_normal import posterior, sample_evidence
 
 # issue of the estimation core: log evidence within 0.1 nats of importance sampling
