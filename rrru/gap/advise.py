@@ -35,7 +35,7 @@ class Advice:
 NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
 
 
-def advise(attribution, verdict, masses, most=3):
+def advise(attribution, verdict, masses, most=OPTIONS.max_advised_runs):
     """The Advice, empty where no rival answer is left that the library can predict."""
     contests = [] if verdict.unexplained else list(_contests(attribution, verdict))
     if not contests:
@@ -114,7 +114,7 @@ def _poses(attribution, contest, masses):
         now, added = worth(attribution, truth, imitator, planned)
         chosen, gain = greedy(now, added, OPTIONS.max_advised_poses)
         # one that tells hardly more is not worth a payload
-        if gain > 1.1 * most:
+        if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
             words = " ".join([f"{count} poses", *how]), "poses", "poses", False
             row = *words, speed, load, count * OPTIONS.points_per_pass, separates, now.nats(), gain

@@ -64,7 +64,7 @@ def _row(case, name, raw, visible, bases):
     own, total = float((visible**2).sum()), float((raw**2).sum())
     share = np.sqrt(own / total) if total > 0.0 else 0.0
     row = {"testable": True, **_UNKNOWN, "visible_share": share, "note": ""}
-    if share < 1e-6:
+    if share < OPTIONS.min_visible_rms_share:
         return row | {"testable": False, "note": _HIDDEN}
     first = visible[:, : len(case.library[name].coordinates)]
     freedom = np.linalg.matrix_rank(first, tol=1e-6 * np.linalg.norm(first))

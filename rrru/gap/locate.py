@@ -70,7 +70,7 @@ class _Whole:
         with np.errstate(divide="ignore", invalid="ignore"):
             drawn = np.where(drawn_total > 0.0, excess[self.resampled].sum(axis=1) / drawn_total, 0.0)
         share = excess.sum() / total.sum() if total.sum() > 0.0 else 0.0
-        low, high = np.quantile(np.clip(drawn, 0.0, 1.0), [0.025, 0.975])
+        low, high = np.quantile(np.clip(drawn, 0.0, 1.0), OPTIONS.interval_quantiles)
         share = float(np.clip(share, 0.0, 1.0))
         count = int((freedom > 0.0).sum())
         return {
@@ -82,7 +82,7 @@ class _Whole:
             "share_low": float(min(low, share)),
             "share_high": float(max(high, share)),
             "share_of_noise": float(freedom.sum() / (3.0 * len(part))),
-            "noise_could": bool(part.sum() / self.variance < chdtri(freedom.sum(), 0.05)),
+            "noise_could": bool(part.sum() / self.variance < chdtri(freedom.sum(), OPTIONS.min_noise_p_value)),
         }
 
 

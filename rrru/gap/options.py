@@ -77,6 +77,10 @@ class DiagnosisOptions:
     max_sets_per_size: int = 4
     # sets of up to so many effects are averaged over all combinations of prior scales: 8^3 of them
     max_jointly_averaged_effects: int = 3
+    # effects of a set at most; assumed, bounds the time
+    max_effects: int = 12
+    # a set grows with prior scales within this of its best ones, natural logarithm: the neighbours on the grid
+    max_log_scale_distance: float = 1.3
     # rounds in which each effect of the best set is taken out or replaced; assumed
     max_replacement_rounds: int = 3
     # sets of a larger size whose evidence is computed in full; assumed
@@ -168,6 +172,8 @@ class DiagnosisOptions:
     max_run_folds: int = 20
     # fewer runs than this are resampled by stretches: too few for a bootstrap of runs; assumed
     min_resampled_runs: int = 10
+    # the calibration explains an effect up to this share, rms: the rest is rounding
+    min_visible_rms_share: float = 1e-6
     # a detectable effect is found 9 times of 10 at 1 % false alarms; usual values
     detection_power: float = 0.9
     false_alarm_probability: float = 0.01
@@ -182,6 +188,8 @@ class DiagnosisOptions:
     worst_spot_neighbours: int = 9
     # a speed or payload of more distinct values is no factor; assumed
     max_factor_levels: int = 12
+    # noise explains a part that is smaller than what noise exceeds with this probability; the usual 5 %
+    min_noise_p_value: float = 0.05
     # drives slower than this, in their unit a second, are at rest; assumed
     min_drive_rate: float = 1e-6
 
@@ -206,6 +214,10 @@ class DiagnosisOptions:
     fast_pass_mm_s: float = 300.0
     added_payload_kg: float = 5.0
     pause_between_runs_s: float = 60.0
+    # runs that are advised; assumed
+    max_advised_runs: int = 3
+    # poses at another speed or payload are worth it where they gain this many times as much; assumed
+    min_gain_ratio_of_harder_poses: float = 1.1
     # trajectories and pairs of rivals that runs are designed for, and poses of a run; assumed, bound the time
     max_advised_trajectories: int = 4
     max_advised_rivals: int = 2
@@ -244,6 +256,10 @@ class DiagnosisOptions:
     max_spectrum_order: float = 64.0
     # more waves are a rough function, not a few waves; assumed
     max_spectrum_waves: int = 30
+    # numbers read for each wave at least; assumed
+    min_numbers_per_spectrum_wave: int = 20
+    # the calibration explains a wave of which it leaves less than this share of the longest one; assumed
+    min_free_wave_length_ratio: float = 1e-3
     # share of a wave's squares that the calibration has to leave; assumed
     min_free_wave_share: float = 0.01
     # remaining length of a wave of unit length below which the waves found before explain it; rounding

@@ -36,7 +36,7 @@ class Hypothesis:
         return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
 
 
-def search(evidence, most=12, without=()):
+def search(evidence, most=OPTIONS.max_effects, without=()):
     """Hypotheses worth knowing: none, every single term, and sets of up to `most` effects around the best ones.
 
     without: names of effects that are ruled out.
@@ -183,5 +183,5 @@ class _Tried:
 def _narrow(start, levels):
     """Strength grids for a set that grows from another: around that one's best, and all for the newcomer."""
     level = levels[np.argmax(start.evidence[levels])]
-    near = [STRENGTHS[np.abs(np.log(STRENGTHS / s)) < 1.3] for s in start.strengths[level]]
+    near = [STRENGTHS[np.abs(np.log(STRENGTHS / s)) < OPTIONS.max_log_scale_distance] for s in start.strengths[level]]
     return (*near, STRENGTHS)

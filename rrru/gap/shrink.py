@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.gap.heldout import resampled_rows
+from rrru.gap.options import OPTIONS
 
 CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
 
@@ -86,7 +87,7 @@ def share_closed(before, after):
     """Share of the gap closed between two steps and its 95 % interval from their draws; zero where there was no gap."""
     share = _share(before.gap_rms_mm, after.gap_rms_mm)
     pairs = [_share(gap_rms(a), gap_rms(b)) for a, b in zip(before.draws, after.draws, strict=True)]
-    low, high = np.quantile(pairs, [0.025, 0.975])
+    low, high = np.quantile(pairs, OPTIONS.interval_quantiles)
     return share, float(min(low, share)), float(max(high, share))
 
 

@@ -82,12 +82,12 @@ def pursue(data, basis, drive_effect, drive):
 
     every = np.concatenate([columns(k, _orders(reach[k])) for k in range(drive.shape[1])], axis=1)
     # what the calibration takes up is none
-    least = 1e-3 * np.linalg.norm(every, axis=0).max()
+    least = OPTIONS.min_free_wave_length_ratio * np.linalg.norm(every, axis=0).max()
     unit = _unit(every, least)
     resolved = max(sum(OPTIONS.max_spectrum_order * span / (2.0 * np.pi) for span in reach), 1.0)
     price, freedom = np.log(resolved) + np.log(len(data)), max(len(data) - basis.shape[1], 0)
     found, had, left = [], np.zeros((len(data), 0)), data  # had: an orthonormal basis of the waves found
-    while len(found) < min(OPTIONS.max_spectrum_waves, len(data) // 20):
+    while len(found) < min(OPTIONS.max_spectrum_waves, len(data) // OPTIONS.min_numbers_per_spectrum_wave):
         gains = ((unit.T @ left) ** 2).reshape(-1, 2).sum(axis=1)
         if not gains.any():
             break
