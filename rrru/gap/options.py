@@ -92,23 +92,6 @@ class DiagnosisOptions:
     # the calibration explains a term up to this share of its mean square: the rest is rounding
     min_visible_share: float = 1e-9
 
-    # --- evidence over nuisance parameters by importance sampling ---
-    # share of draws from the prior: bounds the importance weights by its inverse
-    prior_draw_share: float = 0.2
-    # degrees of freedom of the proposal's t distribution: heavier tails than the posterior; assumed
-    proposal_degrees_of_freedom: float = 5.0
-    # draws of each round that fits the proposal, and rounds at most; assumed
-    draws_per_proposal_round: int = 1024
-    max_proposal_rounds: int = 12
-    # effective share of the draws from which on the proposal fits; assumed
-    min_effective_draw_share: float = 0.3
-    # variances of the proposal over those of the draws: too wide costs less than too narrow; assumed
-    proposal_variance_factor: float = 1.2
-    # smallest variance of a proposal over that of the prior; assumed
-    min_proposal_variance_ratio: float = 1e-6
-    # draws whose Gram matrices are made at a time; bounds the memory
-    max_draws_per_block: int = 512
-
     # --- payload and tilt of the base as nuisance parameters ---
     # prior probability that a mass, or a tilt, is as stated; assumed
     stated_nuisance_probability: float = 0.5

@@ -17,8 +17,18 @@ import numpy as np
 from scipy.stats import multivariate_t, norm
 
 from rrru.gap.evidence_kernels import log_evidence, log_sum_exp
-from rrru.gap.options import OPTIONS
 from rrru.gap.weight import cases_of
+
+# share of draws from the prior, which bounds the weights, and degrees of freedom of the fitted t distribution
+_PRIOR_DRAW_SHARE, _DEGREES_OF_FREEDOM = 0.2, 5.0
+# draws of each round that fits it, most rounds, effective share of the draws that ends them
+_DRAWS_PER_ROUND, _MAX_ROUNDS, _MIN_EFFECTIVE_SHARE = 1024, 12, 0.3
+# factor by which its variances exceed those of the draws
+_VARIANCE_FACTOR = 1.2
+# smallest variance of a proposal, over that of the prior
+_MIN_VARIANCE_RATIO = 1e-6
+# draws whose Gram matrices are made at a time
+_MAX_DRAWS_PER_BLOCK = 512
 
 
 class SampledEvidence(NamedTuple):
@@ -69,7 +79,7 @@ class ProductModel(NamedTuple):
     def log_likelihood(self, nuisance):
         """Log evidence (n,) of the coefficients at nuisance parameters (n, q)."""
         parts = []
-        for some in np.split(nuisance, range(OPTIONS.max_draws_per_block, len(nuisance), OPTIONS.max_draws_per_block)):
+        for some in np.split(nuisance, range(_MAX_DRAWS_PER_BLOCK, len(nuisance), _MAX_DRAWS_PER_BLOCK)):
             mix = self.mix[0] + np.tensordot(some, self.mix[1:], 1)
             turned = mix.transpose(0, 2, 1)
             parts.append(log_evidence(turned @ self.gram @ mix, turned @ self.moment, self.scale[None], self.positive))
@@ -90,14 +100,14 @@ def sample_evidence(model, generator, draws=4096):
     """SampledEvidence of a ProductModel by so many draws of a numpy Generator, after those that fit the proposal."""
     widest = np.diag(model.sd.max(axis=0) ** 2)
     proposal = model.mean, widest
-    for _ in range(OPTIONS.max_proposal_rounds):
-        nuisance, log = _draw(model, proposal, generator, OPTIONS.draws_per_proposal_round)
+    for _ in range(_MAX_ROUNDS):
+        nuisance, log = _draw(model, proposal, generator, _DRAWS_PER_ROUND)
         share = np.exp(log - log_sum_exp(log))
         center = share @ nuisance
         apart = nuisance - center
-        covariance = OPTIONS.proposal_variance_factor * (share[:, None] * apart).T @ apart
-        proposal = center, covariance + OPTIONS.min_proposal_variance_ratio * widest
-        if 1.0 / (share**2).sum() > OPTIONS.min_effective_draw_share * OPTIONS.draws_per_proposal_round:
+        covariance = _VARIANCE_FACTOR * (share[:, None] * apart).T @ apart
+        proposal = center, covariance + _MIN_VARIANCE_RATIO * widest
+        if 1.0 / (share**2).sum() > _MIN_EFFECTIVE_SHARE * _DRAWS_PER_ROUND:
             break
     _, log = _draw(model, proposal, generator, draws)
     weight = np.exp(log - log.max())
@@ -108,11 +118,11 @@ def sample_evidence(model, generator, draws=4096):
 
 def _draw(model, proposal, generator, count):
     """Nuisance parameters (n, q) from prior and proposal (mean, covariance), and logarithms (n,) of their weights."""
-    density = multivariate_t(*proposal, df=OPTIONS.proposal_degrees_of_freedom)
+    density = multivariate_t(*proposal, df=_DEGREES_OF_FREEDOM)
     fitted = np.reshape(density.rvs(count, random_state=generator), (count, -1))
-    from_prior = generator.random((count, 1)) < OPTIONS.prior_draw_share
+    from_prior = generator.random((count, 1)) < _PRIOR_DRAW_SHARE
     nuisance = np.where(from_prior, model.draw_prior(generator, count), fitted)
     prior = model.log_prior(nuisance)
-    own = np.log1p(-OPTIONS.prior_draw_share) + np.atleast_1d(density.logpdf(nuisance))
-    drawn_from = np.logaddexp(own, np.log(OPTIONS.prior_draw_share) + prior)
+    own = np.log1p(-_PRIOR_DRAW_SHARE) + np.atleast_1d(density.logpdf(nuisance))
+    drawn_from = np.logaddexp(own, np.log(_PRIOR_DRAW_SHARE) + prior)
     return nuisance, model.log_likelihood(nuisance) + prior - drawn_from
