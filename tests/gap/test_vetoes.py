@@ -86,7 +86,8 @@ def attribution():
     case = case_of(measure((strong("servo_lag", 8.0), strong("leg_asymmetry", 8.0))), {n: EFFECTS[n] for n in names})
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = posterior(evidence, search(evidence), PRIOR)
+    decisive = evidence.on_library()
+    beliefs = posterior(decisive, search(decisive), PRIOR)
     return Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
 
 
