@@ -142,7 +142,7 @@ class DiagnosisOptions:
     max_parameters_of_several_starts: int = 200
     # more of them end within a fiftieth of a nat, since their steps are slow
     step_tolerance_of_many: float = 0.3
-    max_iterations_of_many: int = 60
+    max_iterations_of_many: int = 25
     # fits whose log posterior densities differ by less are equally good; assumed
     equal_fits_nats: float = 1.0
 
