@@ -96,7 +96,7 @@ def test_noise_that_is_not_as_stated_is_no_cause(name, effect):
     verdict = diagnosed(frame).verdict
     assert verdict["effects"] == (effect or "none")
     contradicted = name in ("axes", "scatter")
-    assert ("does not repeat" in verdict["notes"]) == contradicted
+    assert ("noise stated" in verdict["notes"]) == contradicted
 
 
 def test_a_noise_that_is_known_is_not_fitted():

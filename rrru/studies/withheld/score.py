@@ -100,5 +100,7 @@ def true_share(robot, about, mechanism, calibrated, state):
     if driven is None:
         return np.nan
     case = _case(driven, about, about.library, mechanism).standing(state)
-    before, after = case.residual(State(calibrated, {})), case.residual(state)
+    # an effect of the drives' sense of arrival says nothing where that is unknown
+    known = case.complete({name for name, _ in state.effects} & case.known.keys())
+    before, after = case.residual(State(calibrated, {}))[known], case.residual(state)[known]
     return float(1.0 - np.sqrt((after**2).sum() / (before**2).sum()))

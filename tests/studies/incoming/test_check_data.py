@@ -173,7 +173,7 @@ def test_what_is_driven_once_with_one_payload_is_told(tmp_path):
 
 
 def test_too_few_points_for_a_diagnosis_are_told(tmp_path):
-    assert costs(checked(FIELD.head(10), tmp_path))[0].startswith("no diagnosis: ")
+    assert costs(checked(FIELD.head(8), tmp_path))[0].startswith("no diagnosis: ")
 
 
 def test_a_list_without_commands_says_what_to_give(tmp_path):
