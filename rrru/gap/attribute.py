@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.campaign import noise
+from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
 from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
@@ -254,9 +255,13 @@ def _rounds(case, calibrated, prior, stated):
         found = fit_hypothesis(case, evidence, (calibrated if dropped else state, start), (tried, its_level))
         if settled and not _bends(case, linear, calibrated, found.state):
             break
-        fit, state = found, found.state
-        case = case.standing(state).with_approach(state)
-        case, linear, source = looks.at(case, state, tried.terms)
+        try:
+            moved = case.standing(found.state).with_approach(found.state)
+            seen_there = looks.at(moved, found.state, tried.terms)
+        except FitError:
+            # the fitted model has no pose at a reading: what the last linearisation says stands
+            break
+        fit, state, (case, linear, source) = found, found.state, seen_there
         evidence = case.evidence(linear)
     hypothesis, level = beliefs.best()
     result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
