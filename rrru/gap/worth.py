@@ -48,13 +48,12 @@ def worth(attribution, truth, imitator, planned):
     case, evidence = attribution.case, attribution.evidence
     terms = hypothesis.terms + rival.terms
     # what the weight is off by is the same in both answers
-    here, planned = (replace(one, doubts={}) for one in (case, planned))
-    keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
-    present, there = (one.linearise(attribution.state, keys) for one in (here, planned))
+    planned = replace(planned, doubts={})
+    there = planned.linearise(attribution.state, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
-    for linear in (present, there):
+    for linear in (evidence.linear, there):
         none = np.zeros((*linear.data.shape, 0))
         made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
         designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
