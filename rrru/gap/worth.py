@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rrru.gap.state import State
 from rrru.gap.terms import signatures, spread
 
 
@@ -48,7 +49,7 @@ def worth(attribution, truth, imitator, planned):
     case, evidence = attribution.case, attribution.evidence
     terms = hypothesis.terms + rival.terms
     # what the weight is off by is the same in both answers
-    planned = replace(planned, doubts={})
+    planned = _reached(replace(planned, doubts={}), attribution.state)
     there = planned.linearise(attribution.state, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
@@ -62,6 +63,13 @@ def worth(attribution, truth, imitator, planned):
     now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
     return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
+
+
+def _reached(planned, state):
+    """The planned Case without the points at which a state's model has no pose."""
+    poses = [planned.residual(one) for one in (state, State(state.deviations, {}))]
+    lost = ~np.isfinite(poses).all(axis=(0, 2))
+    return planned.without(lost) if lost.any() else planned
 
 
 def greedy(now, candidates, most):
