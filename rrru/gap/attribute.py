@@ -181,7 +181,7 @@ def fit_hypothesis(case, evidence, starts, chosen, known=None):
     """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
 
     It is fitted to the readings at which all its effects have what they need. Where one value for all legs is probable
-    enough each leg still gets its own: nobody knows that they are equal, and the errors say so. chosen: both; known: a
+    enough each leg still gets its own: that they are equal is not known, and the errors say so. chosen: both; known: a
     ModelFit that may be the one asked for.
     """
     hypothesis, level = chosen

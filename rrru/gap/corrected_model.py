@@ -76,7 +76,7 @@ def gap_rows(attribution, corrected, section, file, shrink):
     result, known = [], attribution.case.complete({term.effect for term in attribution.fit.terms})
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
         twists = twists + _instrument(attribution.case, robot, corrected.found, kind == "corrected_model")
-        # where nobody knows from which side a drive comes the file cannot be held to a side
+        # the file is not judged where the sense of arrival of a drive is unknown
         left = np.where(known[:, None], attribution.case.by_other(robot, own, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
             result.append(model_row(shrink, kind, left, attribution.case.noise_mm))

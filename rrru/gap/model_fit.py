@@ -1,7 +1,7 @@
 """The calibrated model with effects, fitted to the readings of a case: all parameters at once, under one objective.
 
     y = h(b, c, s, w) + delta + e,    b geometric errors, c coefficients of effect terms, s their shape parameters,
-                                      w the payload and tilt that nobody knows exactly
+                                      w the payload and tilt, of which the stated values are uncertain
 
 `rrru.estimation` solves it: the exact model, the noise and the discrepancy of the hypothesis, the priors of all blocks.
 Lengths in mm, angles in rad.

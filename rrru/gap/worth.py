@@ -49,12 +49,14 @@ def worth(attribution, truth, imitator, planned):
     case, evidence = attribution.case, attribution.evidence
     terms = hypothesis.terms + rival.terms
     # what the weight is off by is the same in both answers
-    planned = _reached(replace(planned, doubts={}), attribution.state)
-    there = planned.linearise(attribution.state, list(dict.fromkeys((t.effect, t.shape) for t in terms)))
+    keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
+    here, planned = (reachable(replace(one, doubts={}), attribution.state) for one in (case, planned))
+    # both about one state: the evidence's own linearisation is that of the fit before
+    present, there = (one.linearise(attribution.state, keys) for one in (here, planned))
     mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
-    for linear in (evidence.linear, there):
+    for linear in (present, there):
         none = np.zeros((*linear.data.shape, 0))
         made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
         designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
@@ -65,11 +67,11 @@ def worth(attribution, truth, imitator, planned):
     return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
 
 
-def _reached(planned, state):
-    """The planned Case without the points at which a state's model has no pose."""
-    poses = [planned.residual(one) for one in (state, State(state.deviations, {}))]
-    lost = ~np.isfinite(poses).all(axis=(0, 2))
-    return planned.without(lost) if lost.any() else planned
+def reachable(case, state):
+    """A Case without the points at which a state's model, with its effects or without them, has no pose."""
+    left = [case.residual(one) for one in (state, State(state.deviations, {}))]
+    lost = ~np.isfinite(left).all(axis=(0, 2))
+    return case.without(lost) if lost.any() else case
 
 
 def greedy(now, candidates, most):

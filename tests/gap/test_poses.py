@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rrru.effects.protocol import Coordinates
+from rrru.errors import FitError
 from rrru.gap import poses
 from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution
@@ -16,8 +17,9 @@ from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import posterior
 from rrru.gap.search import search
 from rrru.gap.settings import Prior
+from rrru.gap.state import State
 from rrru.gap.verdict import decide
-from rrru.gap.worth import Sums, greedy
+from rrru.gap.worth import Sums, greedy, reachable
 from rrru.parameters import ParameterSet
 from tests.gap.campaigns import EFFECTS, LINES, MASSES, SIM, case_of, measure, plan_of, strong
 
@@ -113,3 +115,21 @@ def test_poses_tell_what_no_trajectory_does(between):
     middle = (listed["from_y_mm"] + listed["to_y_mm"]) / 2.0
     # the first one crosses where they differ
     assert abs(middle.iloc[0]) < 60.0 + OPTIONS.pass_length_mm / 2.0
+
+
+def test_points_at_which_the_corrected_model_has_no_pose_are_left_out_of_what_runs_are_worth():
+    """A leg that is much too short reaches some of the points only."""
+    case = case_of(measure(plan=plan_of(trajectories=LINES[1:])), {"leg_asymmetry": EFFECTS["leg_asymmetry"]})
+    plain = calibrate(case)
+    for shift_mm in np.linspace(-50.0, -700.0, 66):
+        state = State(plain.deviations, {("leg_asymmetry", 0): np.tile([0.0, 0.0, shift_mm], 3)})
+        posed = np.isfinite(case.residual(state)).all(axis=1)
+        if 0 < posed.sum() < len(posed):
+            break
+    assert 0 < posed.sum() < len(posed)
+    with pytest.raises(FitError, match="no pose"):
+        case.linearise(state, [])
+    reached = reachable(case, state)
+    assert reached.count == posed.sum()
+    assert np.isfinite(reached.linearise(state, []).data).all()
+    assert reachable(case, plain) is case

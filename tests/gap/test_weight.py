@@ -54,8 +54,7 @@ def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     nothing = replace(attribution.hypothesis, terms=(), strengths=np.zeros((len(LEVELS), 0)))
     answers = (attribution.hypothesis, attribution.level), (nothing, attribution.level)
     now, runs = worth(attribution, *answers, attribution.case)
-    # the present campaign is linearised about the fit before the last one, whose weight is a little another
-    assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=0.03)
+    assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
 
 
 def test_beside_a_weight_the_order_of_the_terms_makes_no_difference(misled):

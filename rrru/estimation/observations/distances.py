@@ -1,4 +1,4 @@
-"""Distances of places from the first one, seen in a frame that nobody registered (paper C, eqs. 8 to 15).
+"""Distances of places from the first one, seen in an unregistered frame (paper C, eqs. 8 to 15).
 
 The robot stood at n actuator triples. With d_j the seen distance of place j from the first, l_j the model's, u_j the
 direction between the two places and J_j the Jacobian by the parameters x,

@@ -1,4 +1,4 @@
-"""Lengths of belts or cables between anchors and a place that is measured, or that nobody knows.
+"""Lengths of belts or cables between anchors and a place that is measured or unknown.
 
 Reading j of row i is the count q_ij of a length that starts at s_j and grows by f_j a count:
 
@@ -8,7 +8,7 @@ over the distances from the row's place p_i to the anchors a_n; m is the routing
 of the places. A start length is what a count misses or the length at a drum's zero; a factor is 1 for a count in mm, or
 a drum's radius for one in rad.
 
-A place that nobody knows is a parameter of its row alone, with a flat prior. It is eliminated: residual and derivative
+An unknown place is a parameter of its row alone, with a flat prior. It is eliminated: residual and derivative
 are those at the places that fit the row best (variable projection: Golub and Pereyra, Inverse Problems 19, 2003; the
 derivative without second derivatives of the model: Kaufman, BIT 15, 1975). The gradient of the objective is exact.
 """

@@ -1,4 +1,4 @@
-"""The shape of places that were seen in a frame that nobody registered: displacements with sign and direction."""
+"""The shape of places that were seen in an unregistered frame: displacements with sign and direction."""
 
 from dataclasses import dataclass
 from functools import cached_property

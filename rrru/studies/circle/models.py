@@ -52,7 +52,7 @@ def errors(fresh, nominal, masses, calibrated, corrected):
         "corrected": _driven(case.motion, other, own),
     }
     left = {model: rows.measured(fresh) - position for model, position in models.items()}
-    # nobody knows from which side a drive comes to a run's first point, or right at a reversal
+    # the sense of arrival of a drive is unknown at a run's first point and next to a reversal
     known = ~np.isfinite(case.motion.approach).any(axis=1)
     used = case.used & known & np.isfinite(list(left.values())).all(axis=(0, 2))
     named = fresh.loc[used, ["run", "trajectory", "point"]]
