@@ -152,7 +152,9 @@ def test_the_diagnosis_names_compliance_and_foretells_the_held_out_rows(torso):
     robot = torso.robot("full")
     found = diagnose(torso.of(0), MeasuredRobot(robot, _NO_LOADS, None, "torso"))
     sure = found.tables["gap_attribute"].set_index("effect")["probability"]
-    assert sure[_SPRINGS] >= 0.95 and sure[_BENDING] >= 0.95 and sure[_CROSS] < 0.5
+    assert sure[_SPRINGS] >= 0.95 and sure[_BENDING] >= 0.95
+    # the evidence of correlated non-negative coefficients gives 0.11, a product of independent ones gave 0.04
+    assert sure[_CROSS] < 0.2 and _CROSS not in found.verdict["effects"]
     assert {_SPRINGS, _BENDING} <= set(found.verdict["effects"].split("+"))
     case = found.attribution.case
     test = make_case(torso.of(1), case.mechanism, _NO_LOADS, case.noise_mm, case.library)
