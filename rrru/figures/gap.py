@@ -213,7 +213,9 @@ def _along(axes, points, verdict):
         for column, look in (("before_mm", _BEFORE), ("after_mm", _AFTER)):
             axes.plot(at, rows[column].where(rows["used"]), color=look["color"], linewidth=0.8)
     out = points.index[~used]
-    axes.plot(out, np.minimum(points["before_mm"][out], 0.96 * top), "x", color=style.BLACK, clip_on=False)
+    # an empty line that is not clipped counts as one at the page's corner, and the layout makes room for it
+    if len(out):
+        axes.plot(out, np.minimum(points["before_mm"][out], 0.96 * top), "x", color=style.BLACK, clip_on=False)
     axes.axhline(noise_mm, **_NOISE)
     step = -(-len(runs) // _NUMBERED_RUNS)
     axes.set_xticks(middles[::step], labels[::step])

@@ -119,6 +119,13 @@ def test_points_left_out_are_marked_and_break_the_lines(frames):
     assert len(crosses.get_xdata()) == (~points["used"]).sum() and max(crosses.get_ydata()) < axes.get_ylim()[1]
 
 
+def test_the_layout_is_the_same_where_no_point_is_left_out(frames):
+    some = panel(draw("gap", frames), "(d)").get_position()
+    frames["gap_points"] = frames["gap_points"].assign(used=True)
+    every = panel(draw("gap", frames), "(d)").get_position()
+    np.testing.assert_allclose([every.x0, every.x1], [some.x0, some.x1], atol=0.02)
+
+
 @pytest.mark.parametrize("effects", ["none", "unexplained", "my_effect+unexplained"])
 def test_odd_verdicts_are_drawn_too(effects, frames):
     campaign = synthetic.CAMPAIGN
