@@ -2,9 +2,9 @@
 
 Every draw of a cell (robot, scene) has new true parameters and new noise, and goes through the whole diagnosis. Of all
 numbers that the diagnosis states in `gap_parameters` the error (estimate minus truth) is compared with the stated
-standard error s:
+standard error s, and the truth with the stated interval of 95 %:
 
-    coverage   share of the intervals estimate +- 1.96 s that hold the truth
+    coverage   share of the intervals that hold the truth; along directions of estimate +- 1.96 s
     ratio      rms of error / s, 1 where s is right, 2 where s is half of what it should be
 
 Parameters of one draw are correlated. Where the covariance C is known, coverage and ratio are also taken along the
@@ -35,14 +35,14 @@ from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
 from rrru.campaign.measurements import series
 from rrru.errors import FitError
+from rrru.estimation.intervals import QUANTILE_95
+from rrru.gap.case import GEOMETRY
 from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
 from rrru.gap.make_case import make_case
-from rrru.gap.model_fit import GEOMETRY
 from rrru.gap.settings import GapSettings
 from rrru.seeds import stream
 
 FOLDER = RESULTS / "benchmarks" / "coverage"
-QUANTILE_95 = 1.959964
 _SEED, _RESAMPLES = 7, 20
 _TABLES = ("parameters", "directions", "summaries")
 # kinds of parameters by the name that `gap_parameters` has in its column effect; all others are effects
@@ -178,13 +178,18 @@ def _parameter_rows(stated, campaign, truth):
             # of an effect that does not act its sizes are zero, of its shape there is no truth
             true = effects[row.effect].get(row.parameter) if row.effect in effects else 0.0
             true = None if (row.effect, row.parameter) in unseen else true
-        if true is None or (kind == "effect" and np.isnan(row.standard_error)):
+        if true is None or (kind == "effect" and np.isnan(row.low_95)):
             continue
         error = row.value - true
         if row.parameter.startswith("phase"):
             error = (error + np.pi) % (2.0 * np.pi) - np.pi
+        below, above = row.low_95 - row.value, row.high_95 - row.value
         named = {"kind": kind, "name": row.parameter if kind == "geometry" else f"{row.effect} {row.parameter}"}
-        result.append(named | {"truth": true, "error": error, "standard_error": row.standard_error})
+        result.append(
+            named
+            | {"truth": true, "error": error, "standard_error": row.standard_error}
+            | {"held": below - 1e-12 <= -error <= above + 1e-12}
+        )
     return result
 
 
@@ -232,13 +237,14 @@ def cell(robot, scene, draws, size=1.0, first=0):
     return [table.assign(robot=robot, scene=scene) for table in tables]
 
 
-def coverage(z, draw):
+def coverage(z, draw, held=None):
     """Of errors over standard errors (n,) in draws (n,): coverage, its standard error over draws, rms ratio.
 
-    A standard error that is not a number covers nothing.
+    held (n,): whether the stated interval holds the truth, None for intervals of 1.96 standard errors.
     """
-    covered = pd.Series(np.abs(z) < QUANTILE_95).groupby(np.asarray(draw))
-    rate, count = float(np.mean(np.abs(z) < QUANTILE_95)), covered.ngroups
+    held = np.abs(z) < QUANTILE_95 if held is None else np.asarray(held, dtype=bool)
+    covered = pd.Series(held).groupby(np.asarray(draw))
+    rate, count = float(held.mean()), covered.ngroups
     own = covered.mean()
     error = float(own.std(ddof=1) / np.sqrt(count)) if count > 1 else np.nan
     return rate, error, float(np.sqrt(np.nanmean(np.square(z))))
@@ -252,7 +258,7 @@ def summarize(parameters, directions, summaries):
         head = {"robot": robot, "scene": scene, "draws": len(own), "failed": len(own) - len(good)}
         head |= {"right": float(good["right"].astype(float).mean()) if len(good) else np.nan}
         for kind, some, z in _errors_by_kind(_of_cell(parameters, robot, scene), _of_cell(directions, robot, scene)):
-            rate, error, ratio = coverage(z, some["draw"])
+            rate, error, ratio = coverage(z, some["draw"], some.get("held"))
             binomial = np.sqrt(0.95 * 0.05 / len(z))
             row = head | {"kind": kind, "intervals": len(z), "coverage": rate, "coverage_se": max(error, binomial)}
             row |= {"ratio": ratio, "ratio_68": float(np.nanquantile(np.abs(z), 0.6827))}

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
+from rrru.estimation.intervals import QUANTILE_95, NormalMixture
 from rrru.estimation.parameters import Parameters
 from rrru.estimation.problem import Problem
 
@@ -65,7 +66,7 @@ class Estimate:
         Where a prior is a mixture the values move to the mean over its components, each weighted by its evidence on
         the linearisation, and the covariance is that of the mixture.
         """
-        moved, covariance = _over_mixtures(white, problem.parameters, values, free)
+        moved, covariance, _ = _over_mixtures(white, problem.parameters, values, free)
         return cls(problem, problem.parameters.clipped(values + moved), covariance, ~free, end)
 
     @cached_property
@@ -108,6 +109,32 @@ class Estimate:
     def standard_errors(self) -> FloatArray:
         """Standard errors (p,); NaN at a bound, inf for what neither readings nor prior determine."""
         return np.where(self.at_bound, np.nan, np.sqrt(np.diag(self.covariance)))
+
+    @cached_property
+    def intervals(self) -> FloatArray:
+        """Credible intervals (p, 2) of 95 %: the shortest ones of the linearised posterior between the bounds.
+
+        Of a parameter at a bound: of what its posterior would be without the bound, cut off there. From -inf to inf
+        for what neither readings nor prior determine.
+        """
+        half = QUANTILE_95 * np.sqrt(np.diag(self.covariance))
+        result, parameters = np.stack([self.values - half, self.values + half], axis=1), self.parameters
+        cut = (result[:, 0] < parameters.low) | (result[:, 1] > parameters.high)
+        mixed = np.isfinite(parameters.wide_sd).any()
+        for held in [None, *np.flatnonzero(self.at_bound)]:
+            free = ~self.at_bound
+            if held is None:
+                chosen = np.flatnonzero(free & (cut | mixed) & np.isfinite(half))
+            else:
+                free[held], chosen = True, np.array([held])
+            if not len(chosen):
+                continue
+            *_, found = _over_mixtures(self.readings_triangle, parameters, self.values, free)
+            for k in chosen[np.isfinite(found.sd[:, chosen]).all(axis=0)]:
+                bounds = parameters.low[k], parameters.high[k]
+                own = NormalMixture(found.share, self.values[k] + found.step[:, k], found.sd[:, k])
+                result[k] = own.interval(*bounds)
+        return result
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -197,10 +224,19 @@ def _seen_by_readings(columns: FloatArray, parameters: Parameters) -> tuple[Floa
     return np.pad(sizes, (0, count - len(sizes))), directions[:count] * scale
 
 
+@dataclass(frozen=True)
+class _Components:
+    """Components of a posterior: shares (c,), steps to their means (c, p) and standard deviations (c, p)."""
+
+    share: FloatArray
+    step: FloatArray
+    sd: FloatArray
+
+
 def _over_mixtures(
     white: FloatArray, parameters: Parameters, values: FloatArray, free: BoolArray
-) -> tuple[FloatArray, FloatArray]:
-    """Step (p,) from the values to the posterior mean, zero without mixtures, and the covariance (p, p).
+) -> tuple[FloatArray, FloatArray, _Components]:
+    """Step (p,) from the values to the posterior mean, zero without mixtures, covariance (p, p) and components.
 
     Every component of a mixture is a change D of the wide priors' precision, whose posterior follows from that under
     the wide ones by the matrix inversion lemma.
@@ -208,8 +244,9 @@ def _over_mixtures(
     mixed = np.flatnonzero(np.isfinite(parameters.wide_sd) & free)
     sd = np.where(np.isfinite(parameters.wide_sd), parameters.wide_sd, parameters.sd)
     step, covariance = _posterior(white, sd, parameters.mean - values, free)
+    sds = np.sqrt(np.diag(covariance))
     if not len(mixed):
-        return np.zeros(len(values)), covariance
+        return np.zeros(len(values)), covariance, _Components(np.ones(1), step[None], sds[None])
     own, off = covariance[np.ix_(mixed, mixed)], (parameters.mean - values - step)[mixed]
     change = parameters.sd[mixed] ** -2.0 - parameters.wide_sd[mixed] ** -2.0
     ratio = np.log(parameters.wide_sd / parameters.sd)[mixed]
@@ -227,7 +264,9 @@ def _over_mixtures(
     mean = share @ np.array(means)
     apart = np.array(means) - mean
     taken = np.einsum("c,cij->ij", share, np.array(gains))
-    return mean, covariance - taken + np.einsum("c,ci,cj->ij", share, apart, apart)
+    each = np.sqrt([np.maximum(np.diag(covariance - gain), 0.0) for gain in gains])
+    components = _Components(share, np.array(means), each)
+    return mean, covariance - taken + np.einsum("c,ci,cj->ij", share, apart, apart), components
 
 
 def _posterior(white: FloatArray, sd: FloatArray, mean: FloatArray, free: BoolArray) -> tuple[FloatArray, FloatArray]:

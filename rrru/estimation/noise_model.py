@@ -14,7 +14,8 @@ smooth along a run may be no larger than the instrument's stated noise allows (3
 itself), or where nobody states it than what the highest frequencies show: what is smooth and larger no noise explains.
 The numbers maximise the restricted likelihood: that of what is left when all that calibration and effects may fit has
 been projected out (Patterson and Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika
-58, 1971), times their prior.
+58, 1971), times their prior. Where the readings may hold a smooth discrepancy besides, its size is one of the numbers,
+and no part of the noise: a noise that had to account for it would be too large and too little correlated.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import dct
 from scipy.linalg import qr, toeplitz
+from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
 from rrru.campaign.noise import along_runs
@@ -44,6 +46,11 @@ CONTRADICTED = 1.3
 MIN_FREE_NUMBERS = 15.0
 # free means of series, of three numbers each, for offsets between them to show: those of two series
 MIN_FREE_MEANS = 6.0
+# deviations of a smooth discrepancy over the noise's that are tried, and the prior probability that there is one
+_DISCREPANCIES = np.concatenate([[0.0], 2.0 ** np.arange(-1.0, 11.0)])
+_SOME_DISCREPANCY = 0.1
+# the size is found to so many octaves
+_OCTAVES = 0.1
 # offsets of a smaller share of the noise's variance are none
 _NO_OFFSET = 0.05
 # prior probability of no correlation, and of no offsets: many campaigns have neither, and readings that cannot tell
@@ -63,7 +70,8 @@ class NoiseModel:
     """axis_mm (3,): deviation of each axis, offsets apart; correlation: phi; offset: rho; correlated (3,): f_a.
 
     offset_posterior: values of rho that were tried with their posterior probabilities; alike: factor of the variance by
-    which readings at one stop, which share the robot's errors, count as fewer.
+    which readings at one stop, which share the robot's errors, count as fewer; discrepancy: likeliest deviation over
+    mean_mm of what is smooth along the series beside the noise, 0 for none.
     """
 
     axis_mm: FloatArray
@@ -72,6 +80,7 @@ class NoiseModel:
     correlated: FloatArray | float = 1.0
     offset_posterior: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
     alike: float = 1.0
+    discrepancy: float = 0.0
 
     @classmethod
     def white(cls, noise_mm: float) -> Self:
@@ -166,26 +175,30 @@ def fit_noise(
     series: npt.NDArray[np.generic],
     stated_mm: float | None = None,
     repeats: tuple[float, int] | None = None,
+    discrepancy: Callable[[FloatArray], FloatArray] | None = None,
 ) -> NoiseModel:
     """NoiseModel of data (m, 3) of which columns (m, 3, k) may fit whatever they can; series (m,).
 
     stated_mm: deviation per axis that is stated, None where none is; repeats: deviation per axis of poses that were
-    measured several times and its degrees of freedom, which count where the columns leave few numbers, None for none.
+    measured several times and its degrees of freedom, which count where the columns leave few numbers, None for none;
+    discrepancy: from half-wave numbers (m,) to variances (m,), 1 on average, of what may be smooth along the series
+    and is no noise, None where nothing is.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
+    smooth = np.zeros((len(wave), 1)) if discrepancy is None else discrepancy(wave)[:, None]
     for _ in range(_ROUNDS):
-        variance = model.variance(wave, length)
+        variance = model.variance(wave, length) + (model.discrepancy * model.mean_mm) ** 2 * smooth
         white = (together / np.sqrt(variance)[..., None]).reshape(-1, together.shape[-1])
         left, share = _left(white[:, -1], white[:, :-1])
-        seen = _Seen(variance * left.reshape(-1, 3) ** 2, share.reshape(-1, 3), wave, length)
+        seen = _Seen(variance * left.reshape(-1, 3) ** 2, share.reshape(-1, 3), wave, length, smooth)
         known = [(stated_mm**2, _STATED)] if stated_mm else []
         if repeats and repeats[1] and seen.free < MIN_FREE_NUMBERS:
             known.append((repeats[0] ** 2, float(repeats[1])))
             instrument_mm = instrument_mm or repeats[0]
         instrument_mm = instrument_mm or float(np.nan_to_num(seen.rough()))
         last, model = model, seen.most_likely(instrument_mm, known)
-        new, old = ([*one.axis_mm, one.correlation, one.offset] for one in (model, last))
+        new, old = ([*one.axis_mm, one.correlation, one.offset, one.discrepancy] for one in (model, last))
         if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
     return model
@@ -266,13 +279,43 @@ def _left(data: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray
     return data - basis @ (basis.T @ data), np.clip(1.0 - (basis**2).sum(axis=1), 0.0, 1.0)
 
 
-class _Seen:
-    """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom."""
+@dataclass(frozen=True)
+class _Grid:
+    """Posterior over pairs (g, 2) of correlation and offset: weights (g,) over the highest log likelihood.
 
-    def __init__(self, squares: FloatArray, share: FloatArray, wave: FloatArray, length: npt.NDArray[np.int_]) -> None:
+    size: of the discrepancy over the noise's deviation; correlated (3,): see NoiseModel.
+    """
+
+    size: float
+    correlated: FloatArray
+    pairs: FloatArray
+    weight: FloatArray
+    highest: float
+
+    @property
+    def evidence(self) -> float:
+        """Log likelihood of the size, averaged over correlation and offset."""
+        return float(np.log(self.weight.sum()) + self.highest)
+
+
+class _Seen:
+    """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom.
+
+    smooth: variances (m, 1), 1 on average, of what is smooth along a series and no noise, or 0.
+    """
+
+    def __init__(
+        self,
+        squares: FloatArray,
+        share: FloatArray,
+        wave: FloatArray,
+        length: npt.NDArray[np.int_],
+        smooth: FloatArray | None = None,
+    ) -> None:
         self.freedom = np.where(share > _LEAST_LEFT, share, 0.0)
         self.squares = np.where(self.freedom > 0.0, squares, 0.0)
         self.wave, self.length = wave, length
+        self._smooth = smooth if smooth is not None else np.zeros((len(wave), 1))
 
     def rough(self, chosen: npt.NDArray[np.bool_] | bool = True) -> float:
         """Deviation per axis by the upper half of the frequencies of chosen rows (m,), NaN where none is free."""
@@ -290,51 +333,98 @@ class _Seen:
         """Whether the means of the series are free enough to show offsets between them."""
         return float(self.freedom[self.wave == 0].sum()) >= MIN_FREE_MEANS
 
+    @cached_property
+    def _by_wave(self) -> tuple[FloatArray, FloatArray, FloatArray, npt.NDArray[np.int_], FloatArray]:
+        """Sums of squares and freedom (u, 3), half-wave number and length (u,) and smooth (u, 1) of series alike."""
+        key = self.wave + self.length * (self.wave.max(initial=0.0) + 1.0)
+        _, first, alike_rows = np.unique(key, return_index=True, return_inverse=True)
+        summed = [np.zeros((len(first), 3)) for _ in range(2)]
+        for total, part in zip(summed, (self.squares, self.freedom), strict=True):
+            np.add.at(total, alike_rows, part)
+        return summed[0], summed[1], self.wave[first], self.length[first], self._smooth[first]
+
     def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        white, largest = self._axes(1.0, known)[0], (CONTRADICTED * instrument_mm) ** 2
+        sizes, largest = (
+            _DISCREPANCIES if self._smooth.any() else _DISCREPANCIES[:1],
+            (CONTRADICTED * instrument_mm) ** 2,
+        )
+        prior = np.full(len(sizes), _SOME_DISCREPANCY / max(len(sizes) - 1, 1))
+        prior[0] = 1.0 - _SOME_DISCREPANCY
+        value = np.array([self._over_grid(size, largest, known).evidence for size in sizes.tolist()]) + np.log(prior)
+        best = int(value.argmax())
+        size = float(sizes[best])
+        if best:
+            found = minimize_scalar(
+                lambda octaves: -self._over_grid(2.0**octaves, largest, known).evidence,
+                bounds=np.log2(size) + np.array([-1.0, 1.0]),
+                method="bounded",
+                options={"xatol": _OCTAVES},
+            )
+            size = float(2.0**found.x)
+        return self._mean(self._over_grid(size, largest, known), known)
+
+    def _over_grid(self, size: float, largest: float, known: Sequence[tuple[float, float]]) -> "_Grid":
+        """Posterior of correlation and offset where the discrepancy has so many times the noise's deviation.
+
+        largest: variance that what is smooth in the noise has at most.
+        """
+        none = np.zeros(1)
+        white = self._axes(self._shapes(none, none, size, 1.0), known)[0][0]
+        # a discrepancy that explains a part of the squares leaves less noise, of which more may be correlated
         correlated = np.minimum(1.0, largest / white)
         # what few numbers cannot show is taken as none
         offsets = _OFFSETS[_OFFSETS * white.mean() <= largest] if self._shows_offsets else _OFFSETS[:1]
         correlations = _CORRELATIONS if self.free >= MIN_FREE_NUMBERS else _CORRELATIONS[:1]
-        grid = [(correlation, offset) for correlation in correlations for offset in offsets]
-        value = np.array([self._value(*pair, correlated, known) for pair in grid])
+        pairs = np.array([(correlation, offset) for correlation in correlations for offset in offsets])
+        shapes = self._shapes(pairs[:, 0], pairs[:, 1], size, correlated)
+        value = self._axes(shapes, known)[1] - 0.5 * np.einsum("ua,gua->g", self._by_wave[1], np.log(shapes))
         prior = np.outer(_spike_and_slab(1.0 - correlations), _spike_and_slab(np.exp(-offsets)))
-        weight = prior.ravel() * np.exp(value - value.max())
-        weight /= weight.sum()
-        correlation, offset = weight @ np.array(grid)
-        axes, _ = self._axes(self._shape(correlation, offset, correlated), known)
-        each = weight.reshape(prior.shape).sum(axis=0)
-        posterior = tuple(zip(offsets.tolist(), each.tolist(), strict=True))
-        return NoiseModel(np.sqrt(axes), float(correlation), float(offset), correlated, posterior)
+        highest = float(value.max())
+        return _Grid(size, correlated, pairs, prior.ravel() * np.exp(value - highest), highest)
 
-    def _shape(self, correlation: float, offset: float, correlated: FloatArray | float) -> FloatArray:
-        """Variances (m, 3) over those of the axes."""
-        smooth, run = _densities(correlation, self.wave, self.length)
-        return 1.0 + correlated * (smooth - 1.0) + offset * run
+    def _mean(self, grid: "_Grid", known: Sequence[tuple[float, float]]) -> NoiseModel:
+        """The NoiseModel of the posterior mean of a grid, at the likeliest sizes of the axes."""
+        weight = grid.weight / grid.weight.sum()
+        correlation, offset = (float(mean) for mean in weight @ grid.pairs)
+        shape = self._shapes(np.array([correlation]), np.array([offset]), grid.size, grid.correlated)
+        values, place = np.unique(grid.pairs[:, 1], return_inverse=True)
+        posterior = tuple(zip(values.tolist(), np.bincount(place, weight).tolist(), strict=True))
+        axes = np.sqrt(self._axes(shape, known)[0][0])
+        # over the deviation with offsets
+        discrepancy = float(grid.size / np.sqrt(1.0 + offset))
+        return NoiseModel(axes, correlation, offset, grid.correlated, posterior, discrepancy=discrepancy)
 
-    def _value(
-        self, correlation: float, offset: float, correlated: FloatArray, known: Sequence[tuple[float, float]]
-    ) -> float:
-        """Log likelihood of a correlation and an offset at the likeliest sizes."""
-        shape = self._shape(correlation, offset, correlated)
-        return self._axes(shape, known)[1] - 0.5 * float((self.freedom * np.log(shape)).sum())
+    def _shapes(
+        self, correlation: FloatArray, offset: FloatArray, size: float, correlated: FloatArray | float
+    ) -> FloatArray:
+        """Variances (g, u, 3) over those of the axes at g correlations and offsets and a size of the discrepancy."""
+        _, _, wave, length, smooth = self._by_wave
+        result = np.empty((len(correlation), len(wave), 3))
+        densities = {one: _densities(one, wave, length) for one in np.unique(correlation).tolist()}
+        for row, (one, its_offset) in enumerate(zip(correlation.tolist(), offset, strict=True)):
+            along, run = densities[one]
+            result[row] = 1.0 + correlated * (along - 1.0) + its_offset * run + size**2 * smooth
+        return result
 
-    def _axes(self, shape: FloatArray | float, known: Sequence[tuple[float, float]]) -> tuple[FloatArray, float]:
-        """Variances (3,) of the axes under variances of a shape (m, 3), and their log posterior.
+    def _axes(self, shapes: FloatArray, known: Sequence[tuple[float, float]]) -> tuple[FloatArray, FloatArray]:
+        """Variances (g, 3) of the axes under variances of shapes (g, u, 3), and their log posteriors (g,).
 
         Averaged over two models of even odds: one variance for all axes, and one of each axis.
         known: statements (variance in mm^2, degrees of freedom that it is worth).
         """
-        sums, freedom = (self.squares / shape).sum(axis=0), self.freedom.sum(axis=0)
+        squares, freedoms = self._by_wave[:2]
+        sums, freedom = (squares / shapes).sum(axis=1), freedoms.sum(axis=0)
         stated = sum(worth for _, worth in known)
-        pooled = (sums.sum() + sum(worth * variance for variance, worth in known)) / (freedom.sum() + stated)
-        own = np.maximum(np.where(freedom > 0.0, sums / np.maximum(freedom, 1e-9), pooled), _LEAST_AXIS * pooled)
-        equal = -0.5 * float((freedom * np.log(pooled) + sums / pooled).sum())
+        total = sums.sum(axis=1) + sum(worth * variance for variance, worth in known)
+        pooled = (total / (freedom.sum() + stated))[:, None]
+        own = np.where(freedom > 0.0, sums / np.maximum(freedom, 1e-9), pooled)
+        own = np.maximum(own, _LEAST_AXIS * pooled)
+        equal = -0.5 * (freedom * np.log(pooled) + sums / pooled).sum(axis=1)
         # axes of their own have two numbers more (Schwarz, Annals of Statistics 6, 1978)
-        apart = -0.5 * float((freedom * np.log(own) + sums / own).sum()) - np.log(max(freedom.sum(), 1.0))
-        share = float(expit(apart - equal))
-        value = float(np.logaddexp(equal, apart))
+        apart = -0.5 * (freedom * np.log(own) + sums / own).sum(axis=1) - np.log(max(freedom.sum(), 1.0))
+        share = expit(apart - equal)[:, None]
+        value = np.logaddexp(equal, apart)
         for variance, worth in known:
-            value -= 0.5 * worth * (np.log(pooled / variance) + variance / pooled - 1.0)
+            value -= 0.5 * worth * (np.log(pooled / variance) + variance / pooled - 1.0)[:, 0]
         return share * own + (1.0 - share) * pooled, value

@@ -143,14 +143,17 @@ def calibrate(
     return assess(estimate_deviations(observations, loss, loss_scale_mm), noise_mm)
 
 
-def estimate_deviations(observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1) -> Estimate:
+def estimate_deviations(
+    observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1, geometry: Block | None = None
+) -> Estimate:
     """The Estimate of the deviations (p,) of the observed mechanism by least squares, within its bounds.
 
     Where the readings hardly determine some combinations the search does not end under vanishing noise, as it follows
     a curved valley; it is begun again under the noise of the best instruments, which leaves these to the prior.
 
     loss: one of `rrru.estimation.solver.LOSSES`, with the residual `loss_scale_mm` at which a robust loss begins to
-    bend. Combinations of parameters that the readings do not determine stay at their prior mean. Raises FitError, with
+    bend; geometry: Block with the prior of the deviations, by default what their bounds state. Combinations of
+    parameters that the readings do not determine stay at their prior mean. Raises FitError, with
     the Estimate as its result, where there are fewer equations than parameters or the search does not converge.
     """
     parameters = observations.mechanism.parameters
@@ -158,9 +161,9 @@ def estimate_deviations(observations: Any, loss: str = "linear", loss_scale_mm: 
     if equations < len(parameters):
         raise FitError(f"{len(observations)} points give {equations} equations; allowed: at least {len(parameters)}")
     start, evaluations = starting_values(observations)
-    found = solve(least_squares_problem(observations, loss, loss_scale_mm), [start], _OPTIONS)
+    found = solve(least_squares_problem(observations, loss, loss_scale_mm, geometry=geometry), [start], _OPTIONS)
     if not found.end.converged:
-        found = solve(least_squares_problem(observations, loss, loss_scale_mm, _FINE_NOISE_MM), [start])
+        found = solve(least_squares_problem(observations, loss, loss_scale_mm, _FINE_NOISE_MM, geometry), [start])
     if not found.end.converged:
         raise FitError(explain_end(found, "the calibration"), found)
     return replace(found, end=replace(found.end, evaluations=found.end.evaluations + evaluations))
@@ -172,11 +175,15 @@ def estimate_deviations_at(observations: Any, deviations: npt.ArrayLike, message
 
 
 def least_squares_problem(
-    observations: Any, loss: str = "linear", loss_scale_mm: float = 0.1, noise_mm: float = _VANISHING_SD_MM
+    observations: Any,
+    loss: str = "linear",
+    loss_scale_mm: float = 0.1,
+    noise_mm: float = _VANISHING_SD_MM,
+    geometry: Block | None = None,
 ) -> Problem:
     """The Problem whose solution is the least sum of squares, or of a robust loss that bends at `loss_scale_mm`."""
-    geometry = Parameters((Block.geometry(observations.mechanism.parameters),))
-    return Problem(observations, geometry, WhiteNoise(noise_mm), loss, loss_scale_mm / noise_mm)
+    parameters = Parameters((geometry or Block.geometry(observations.mechanism.parameters),))
+    return Problem(observations, parameters, WhiteNoise(noise_mm), loss, loss_scale_mm / noise_mm)
 
 
 def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:

@@ -22,7 +22,7 @@ from rrru.gap.spectra import with_spectra
 from rrru.gap.state import State
 from rrru.gap.terms import each_leg
 from rrru.gap.unknown import UNKNOWN
-from rrru.gap.whitened import LEVELS
+from rrru.gap.whitened import LEVELS, spectrum
 
 # what is told of the noise
 KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
@@ -100,7 +100,7 @@ def with_noise(case, linear, stated_mm):
     columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
     # an effect that acts where it is unknown how is no noise
     data, columns, series = linear.data[complete], columns[complete], case.series[complete]
-    model = fit_noise(data, columns, series, stated_mm, repeats)
+    model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if case.along_paths else None)
     model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
     repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
     if repeated is not None:

@@ -9,7 +9,7 @@ from rrru.gap.state import State
 
 def calibrate(case):
     """State of the plain calibration of the case's used points; raises FitError where there are too few of them."""
-    return State(estimate_deviations(observations_of(case)).values, {})
+    return State(estimate_deviations(observations_of(case), geometry=case.geometry).values, {})
 
 
 def origin(case):

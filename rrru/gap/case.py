@@ -17,11 +17,16 @@ from rrru.campaign.noise import reading_series
 from rrru.effects.motion import standing
 from rrru.effects.protocol import Contribution, Motion
 from rrru.estimation.noise_model import NoiseModel
+from rrru.estimation.parameters import Block
 from rrru.gap.approach_direction import estimate_approach, has_direction
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.linearise import approach_responses, linearised
+from rrru.gap.options import OPTIONS
 from rrru.gap.unknown import UNKNOWN
 from rrru.robots.readings import lacking
+
+# name of the block of geometric errors
+GEOMETRY = "geometry"
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,16 @@ class Case:
     def __len__(self):
         return len(self.at)
 
+    @cached_property
+    def geometry(self):
+        """The Block of geometric errors: links and joints are off by less than frames, targets and drives' zeros."""
+        block = Block.geometry(self.mechanism.parameters, GEOMETRY)
+        if not self.mechanism.stages:
+            return block
+        usual = {"mm": OPTIONS.body_error_sd_mm, "rad": OPTIONS.body_error_sd_rad}
+        of_bodies = np.minimum(block.sd, [usual[unit] for unit in block.units])
+        return replace(block, sd=np.where(self.mechanism.stages[-1], block.sd, of_bodies))
+
     @property
     def effects(self):
         """The library without the unknown functions."""
@@ -73,7 +88,7 @@ class Case:
         return np.flatnonzero(self.used[points])
 
     @cached_property
-    def _along_paths(self):
+    def along_paths(self):
         """Whether the points lie along paths, not in any order."""
         return follows_path(rows.command(self.measurements), self.measurements["run"].to_numpy())
 
@@ -152,7 +167,7 @@ class Case:
         noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
         rows = {name: known[self.at] for name, known in self.known.items() if name in self.library}
         incomplete = {name: known for name, known in rows.items() if not known.all()}
-        return ModelEvidence(self.library, linear, self.series, noise, self._along_paths, incomplete)
+        return ModelEvidence(self.library, linear, self.series, noise, self.along_paths, incomplete)
 
     def complete(self, effects):
         """Rows (m,) at which the campaign has all that some effects need."""

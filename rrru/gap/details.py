@@ -6,9 +6,10 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.estimation.intervals import QUANTILE_95
+from rrru.gap.case import GEOMETRY
 from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
-from rrru.gap.model_fit import GEOMETRY
 from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import sites, spread
@@ -115,25 +116,38 @@ def parameter_rows(attribution):
     """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
     fit, library = attribution.fit, attribution.case.library
     parameters, errors = attribution.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
+    intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
-        ("calibration", parameter.name, parameter.unit, value, error, False)
-        for parameter, value, error in zip(parameters, fit.state.deviations, errors, strict=True)
+        ("calibration", parameter.name, parameter.unit, value, error, *interval, False)
+        for parameter, value, error, interval in zip(
+            parameters, fit.state.deviations, errors, intervals[places[GEOMETRY]], strict=True
+        )
     ]
     for term in fit.terms:
-        effect, values, errors = library[term.effect], *_effect_values(fit, library, term)
+        effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
         bound = effect.parameters.at_bound(values) & (errors > 0.0)
         errors = np.where(errors > 0.0, errors, np.nan)
         result += [
-            (term.effect, parameter.name, parameter.unit, *numbers)
-            for parameter, *numbers in zip(effect.parameters, values, errors, bound.tolist(), strict=True)
+            (term.effect, parameter.name, parameter.unit, value, error, *interval, held)
+            for parameter, value, error, interval, held in zip(
+                effect.parameters, values, errors, ends, bound.tolist(), strict=True
+            )
         ]
-    bounds = attribution.case.bounds
-    result += [(WEIGHT, name, *rest, rest[1] in bounds[name]) for name, *rest in fit.weight]
-    return pd.DataFrame(result, columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"))
+    bounds, own = attribution.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    result += [
+        (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
+        for (name, unit, value, error), interval in zip(fit.weight, own, strict=True)
+    ]
+    numbers = ("value", "standard_error", "low_95", "high_95", "at_bound")
+    return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
 
 
 def _effect_values(fit, library, term):
-    """Parameter values (p,) of a term's effect and their standard errors (p,), 0 for what was not fitted."""
+    """Parameter values (p,) of a term's effect, standard errors (p,), 0 for what was not fitted, intervals (p, 2).
+
+    The interval of a parameter that follows one fitted number is that number's, of others it is two standard errors to
+    both sides; NaN for what was not fitted.
+    """
     state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
     shape, present, matrix = state.shape(library, key), state.effects[key], spread(coordinates, term.legs)
     names, covariance = fit.effect_covariance(term)
@@ -151,8 +165,17 @@ def _effect_values(fit, library, term):
         size = 2.0 * (sum(moved.values()) if moved else np.max(shift))
         # a phase may have gone once round
         columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / size)
-    slope = np.stack(columns, axis=-1)
-    return coordinates.to_values(present, shape), np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
+    slope, values = np.stack(columns, axis=-1), coordinates.to_values(present, shape)
+    errors = np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
+    ends = values[:, None] + QUANTILE_95 * np.outer(errors, [-1.0, 1.0])
+    numbers, intervals = fit.effect_numbers(term)
+    for row, own in enumerate(slope):
+        (followed,) = np.nonzero(own)
+        if len(followed) == 1:
+            number = followed[0]
+            ends[row] = np.sort(values[row] + own[number] * (intervals[number] - numbers[number]))
+    ends[~slope.any(axis=1)] = np.nan
+    return values, errors, ends
 
 
 def _point_rows(attribution, after, drive):

@@ -15,7 +15,7 @@ from rrru.gap.evidence import ModelEvidence
 from rrru.gap.options import OPTIONS
 from rrru.gap.terms import signatures
 from rrru.gap.terms import spread as spread_of
-from rrru.gap.whitened import LEVELS, spectrum
+from rrru.gap.whitened import levels_of, spectrum
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class HeldOut:
     def _left(self, level):
         """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
         noise, series = self.evidence.noise, self.case.series
-        misfit = (noise.mean_mm * LEVELS[level]) ** 2
+        misfit = (noise.mean_mm * levels_of(noise)[level]) ** 2
         if not self._whole_runs:
             size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
             return np.broadcast_to(size, self.evidence.linear.data.shape)

@@ -6,7 +6,6 @@ import numpy as np
 
 from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
-from rrru.estimation.parameters import Block
 from rrru.gap.state import Linear, State
 
 
@@ -23,7 +22,7 @@ def linearised(case, state, keys=None):
         keys = [(name, k) for name, effect in case.library.items() for k in range(len(effect.coordinates.shapes))]
     columns = {key: _columns(case, at, key, state) for key in dict.fromkeys((*keys, *state.effects))}
     by_shape = {key[0]: _by_shape(case, at, key, state) for key in state.effects}
-    geometry = Block.geometry(case.mechanism.parameters)
+    geometry = case.geometry
     for key, coordinates in state.effects.items():
         data = data + columns[key] @ coordinates
     return Linear(

@@ -21,14 +21,14 @@ from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
+from rrru.gap.case import GEOMETRY
 from rrru.gap.options import OPTIONS
 from rrru.gap.state import State
 from rrru.gap.terms import Term, spread
 from rrru.gap.weight import WEIGHT
-from rrru.gap.whitened import LEVELS, spectrum
+from rrru.gap.whitened import levels_of, spectrum
 from rrru.kept import last_kept
 
-GEOMETRY = "geometry"
 _SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
 _MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
 
@@ -81,7 +81,7 @@ class EffectModel:
     @cached_property
     def parameters(self):
         """The Parameters: geometry, one block a term, "shape" and "weight"."""
-        blocks, start = [Block.geometry(self.case.mechanism.parameters, GEOMETRY)], 0
+        blocks, start = [self.case.geometry], 0
         for term, matrix in zip(self.terms, self._matrices, strict=True):
             own = slice(start, start + matrix.shape[1])
             start = own.stop
@@ -218,11 +218,21 @@ class ModelFit:
 
         Of the term's k coefficients, and after them of these q parameters.
         """
+        chosen, shapes = self._places_of(term)
+        return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
+
+    def effect_numbers(self, term):
+        """Values (k + q,) of a term's coefficients and its effect's fitted shape parameters, intervals (k + q, 2)."""
+        chosen, _ = self._places_of(term)
+        return self.estimate.values[chosen], self.estimate.intervals[chosen]
+
+    def _places_of(self, term):
+        """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
         parameters, prefix = self.estimate.parameters, f"{term.effect}."
         own = np.arange(len(parameters))[parameters.places[term.effect]]
         shapes = [name for name in parameters.names if name.startswith(prefix)]
         chosen = [*own, *(parameters.names.index(name) for name in shapes)]
-        return [name.removeprefix(prefix) for name in shapes], self.estimate.covariance[np.ix_(chosen, chosen)]
+        return chosen, [name.removeprefix(prefix) for name in shapes]
 
     @property
     def weight(self):
@@ -251,7 +261,7 @@ class ModelFit:
 def whitening_of(case, level):
     """The Whitening of a case's readings under its noise and the discrepancy of a level (an index)."""
     noise = (case.noise or NoiseModel.white(case.noise_mm)).counted
-    size = LEVELS[level] * noise.mean_mm
+    size = levels_of(noise)[level] * noise.mean_mm
     discrepancy = (lambda waves: size**2 * spectrum(waves)) if size else None
     return noise.whitening(case.series, discrepancy)
 

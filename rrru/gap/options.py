@@ -29,6 +29,11 @@ class DiagnosisOptions:
     # bounds of geometric parameters: further than a calibration's, which a strong effect would press against; assumed
     parameter_bound_rad: float = 0.3
     parameter_bound_mm: float = 100.0
+    # priors of the errors of links and joints, 1 sigma: machining and assembly leave a tenth of these; readings that
+    # determine a number outweigh it, and what none determines stays near the nominal robot. Frames, targets and zeros
+    # of drives may be anywhere within the bounds; assumed
+    body_error_sd_rad: float = 0.03
+    body_error_sd_mm: float = 10.0
 
     # --- sense of arrival of the drives ---
     # steps of a drive below these are rounding of its values

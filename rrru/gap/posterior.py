@@ -10,7 +10,7 @@ from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.options import OPTIONS
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
-from rrru.gap.whitened import LEVELS
+from rrru.gap.whitened import levels_of
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,10 @@ def posterior(evidence, hypotheses, prior):
     worth = single | (log_weight.max(axis=1) > log_weight.max() - OPTIONS.negligible_nats)
     kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
     log_weight = log_weight[worth]
-    unexplained = np.zeros(log_weight.shape, dtype=bool)
+    unexplained, levels = np.zeros(log_weight.shape, dtype=bool), levels_of(evidence.noise)
     for row, hypothesis in enumerate(kept):
         tolerated = prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
-        unexplained[row] = tolerated < np.maximum(LEVELS, evidence.explained(hypothesis, set(UNKNOWN)))
+        unexplained[row] = tolerated < np.maximum(levels, evidence.explained(hypothesis, set(UNKNOWN)))
         log_weight[row] += log_prior.levels(unexplained[row])
     return Posterior(kept, log_weight, unexplained)
 

@@ -152,6 +152,9 @@ parameter              str    name of the parameter
 unit                   str    unit of the value
 value                  float  fitted value
 standard_error         float? 1 sigma, correlated among them; null at a bound and for what was not fitted
+low_95                 float? lower end of the 95 % interval; null for what was not fitted
+high_95                float? upper end of the 95 % interval, unequal distances from the value where a bound or a prior
+    of two widths makes them so; null for what was not fitted
 at_bound               bool   true where the fit ended at a bound
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank

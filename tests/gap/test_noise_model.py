@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.fft import idct
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import along_runs
-from rrru.estimation.noise_model import NoiseModel, fit_noise, lengths
+from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, lengths
 from rrru.gap.diagnose import MeasuredRobot, diagnose
+from rrru.gap.whitened import spectrum
 from tests.gap.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
 
 _RUNS, _POINTS = 12, 26
@@ -73,6 +75,37 @@ def test_what_is_smooth_and_larger_than_the_stated_noise_is_none():
     model = fit_noise(drift + 0.02 * generator.standard_normal(drift.shape), np.zeros((*drift.shape, 0)), _SERIES, 0.02)
     smooth = model.axis_mm**2 * model.correlated
     assert (smooth <= (1.31 * 0.02) ** 2).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0, 3.0])
+def test_a_smooth_discrepancy_beside_the_noise_is_no_part_of_it(size):
+    """Where a model lacks something smooth the noise is found as it is, not as large as both together."""
+    wave = half_waves(_SERIES)
+    found = []
+    for seed in range(6):
+        generator = np.random.default_rng(seed)
+        cosines = generator.standard_normal((len(_SERIES), 3)) * np.sqrt(spectrum(wave))[:, None] * size * NOISE_MM
+        smooth = _from_cosines(cosines)
+        data = smooth + NOISE_MM * generator.standard_normal(smooth.shape)
+        found.append(fit_noise(data, np.zeros((*data.shape, 0)), _SERIES, NOISE_MM, discrepancy=spectrum))
+    assert np.mean([one.mean_mm for one in found]) == pytest.approx(NOISE_MM, rel=0.15)
+    assert np.mean([one.discrepancy for one in found]) == pytest.approx(size, rel=0.25)
+
+
+def test_no_discrepancy_is_found_in_noise_alone():
+    """White noise, correlated noise and offsets of runs of the stated size: nothing is left to be unexplained."""
+    for seed, settings in enumerate(({}, {"correlation": 0.7}, {"offset_mm": NOISE_MM}) * 3):
+        noise = _noise(np.random.default_rng(seed), _SERIES, np.full(3, NOISE_MM), **settings)
+        model = fit_noise(noise, np.zeros((*noise.shape, 0)), _SERIES, NOISE_MM, discrepancy=spectrum)
+        assert model.discrepancy == 0.0, settings
+
+
+def _from_cosines(cosines):
+    """Values (m, 3) whose cosines along each series are given (m, 3)."""
+    values = np.empty_like(cosines)
+    for label in np.unique(_SERIES):
+        values[label == _SERIES] = idct(cosines[label == _SERIES], axis=0, norm="ortho")
+    return values
 
 
 SCENARIOS = {

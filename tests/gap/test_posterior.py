@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
+from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.posterior import Posterior, posterior
 from rrru.gap.search import Hypothesis
 from rrru.gap.settings import GapSettings, Prior
@@ -14,7 +15,7 @@ from rrru.gap.verdict import decide, label
 from rrru.gap.whitened import LEVELS
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
-from tests.gap.campaigns import EFFECTS
+from tests.gap.campaigns import EFFECTS, NOISE_MM
 from tests.places import ROOT
 
 WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_axis_error"}
@@ -22,7 +23,11 @@ WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_
 
 def _stub(explained=0.0, library=EFFECTS):
     """Evidence that tells how much a hypothesis explains, in units of the noise."""
-    return SimpleNamespace(library=library, explained=lambda h, effects: explained if h.effects & set(effects) else 0.0)
+    return SimpleNamespace(
+        library=library,
+        explained=lambda h, effects: explained if h.effects & set(effects) else 0.0,
+        noise=NoiseModel.white(NOISE_MM),
+    )
 
 
 def _arm():

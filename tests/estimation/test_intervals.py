@@ -1,0 +1,81 @@
+"""Credible intervals against scipy's distributions, and against truths that are drawn from the prior."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.stats import norm, truncnorm
+
+from rrru.estimation.intervals import NormalMixture
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem
+from rrru.estimation.solver import solve
+
+_ONE = np.ones(1)
+
+
+def test_of_a_normal_distribution_it_is_two_standard_errors_to_both_sides():
+    found = NormalMixture(_ONE, np.array([3.0]), np.array([0.5])).interval()
+    np.testing.assert_allclose(found, norm(3.0, 0.5).interval(0.95), atol=3e-3)
+
+
+@pytest.mark.parametrize("mean", [-30.0, -2.0, -0.1])
+def test_at_a_bound_it_begins_there(mean):
+    """The density falls from the bound on: the shortest interval ends at the 95 % quantile of what is not cut off."""
+    found = NormalMixture(_ONE, np.array([mean]), np.array([2.0])).interval(low=0.0)
+    end = truncnorm(-mean / 2.0, np.inf, loc=mean, scale=2.0).ppf(0.95)
+    assert found[0] == 0.0 and found[1] == pytest.approx(end, rel=0.01)
+
+
+def test_beyond_the_upper_bound_it_ends_there():
+    low, high = NormalMixture(_ONE, np.array([5.0]), np.array([1.0])).interval(high=4.0)
+    assert high == 4.0 and low == pytest.approx(truncnorm(-np.inf, -1.0, loc=5.0).ppf(0.05), rel=0.01)
+
+
+def test_of_a_mixture_it_holds_its_share_and_has_equal_densities_at_its_ends():
+    share, mean, sd = np.array([0.6, 0.4]), np.array([0.0, 0.3]), np.array([0.1, 1.0])
+    low, high = NormalMixture(share, mean, sd).interval()
+    assert share @ (norm.cdf(high, mean, sd) - norm.cdf(low, mean, sd)) == pytest.approx(0.95, abs=2e-3)
+    assert share @ norm.pdf(low, mean, sd) == pytest.approx(share @ norm.pdf(high, mean, sd), rel=0.02)
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Readings (n, 1) of a linear model."""
+
+    matrix: np.ndarray
+    data: np.ndarray
+
+    def residual(self, values):
+        """Readings minus prediction."""
+        return (self.data - self.matrix @ values)[:, None]
+
+    def jacobian(self, values):
+        """Derivative of the residual."""
+        return -self.matrix[:, None]
+
+
+def _parameters(narrow, wide):
+    """A free number, one that cannot be negative, and one whose prior has two widths."""
+    blocks = (
+        Block.of("free", ["free"], [""], 1.0),
+        Block.of("positive", ["positive"], [""], 1.0, bounds=(0.0, np.inf)),
+        Block.of("nuisance", ["nuisance"], [""], narrow, wide_sd=wide),
+    )
+    return Parameters(blocks)
+
+
+def test_truths_that_are_drawn_from_the_prior_lie_inside_as_often_as_stated():
+    """Numbers that the readings hardly determine, so that bound and mixture matter; 800 draws, 4 binomial errors."""
+    generator, draws, held = np.random.default_rng(5), 800, []
+    narrow, wide = 0.1, 1.0
+    parameters = _parameters(narrow, wide)
+    for _ in range(draws):
+        matrix = generator.normal(size=(6, 3))
+        truth = generator.standard_normal(3)
+        truth[1], truth[2] = abs(truth[1]), truth[2] * (narrow if generator.random() < 0.5 else wide)
+        data = matrix @ truth + 2.0 * generator.standard_normal(6)
+        estimate = solve(Problem(Linear(matrix, data), parameters, lambda v: v / 2.0), [np.zeros(3)])
+        low, high = estimate.intervals.T
+        held.append((low <= truth) & (truth <= high))
+    np.testing.assert_allclose(np.mean(held, axis=0), 0.95, atol=4.0 * np.sqrt(0.05 * 0.95 / draws))
