@@ -11,6 +11,7 @@ from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resol
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
+from rrru.campaign.ingest.gross_errors import find_gross_error
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
@@ -78,10 +79,13 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     notes = list(cells.notes)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
-    frame = convert(spec, mechanism, found, cells, problems)
-    drives = mechanism.parts.columns
+    drives = [*mechanism.parts.columns]
+    spec.check_drives(drives)
+    frame = spec.as_meant(convert(spec, mechanism, found, cells, problems), drives)
     if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(cells.names)) < len(cells.names):
         problems.refuse()
+    if not problems:
+        _refuse_gross_error(frame, spec, mechanism, found, problems)
     if not set(COMMAND) <= set(frame):
         problems.refuse()
         frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
@@ -90,6 +94,25 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     frame, more = number_runs(frame)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
+
+
+def _refuse_gross_error(
+    frame: pd.DataFrame, spec: IngestSpec, mechanism: Robot, found: dict[str, str], problems: Problems
+) -> None:
+    """Raise IngestError where a mistake in the file explains why it is far from the robot."""
+    gross, what = find_gross_error(frame, spec, mechanism), "the instrument stands"
+    if gross is None and mechanism.orients and set(COMMAND) <= set(frame):
+        sent = frame.drop(columns=["target", *TARGET], errors="ignore").assign(
+            **vector_columns("measured", command(frame))
+        )
+        gross, what = find_gross_error(sent, spec, mechanism), "the frame of the commanded positions lies"
+    if gross is None:
+        return
+    off = f"{gross.rms_mm:.3g} mm rms" if np.isfinite(gross.rms_mm) else "no pose at most of its rows"
+    value = f"the nominal robot is off by {off} however {what}"
+    allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm (probability above 0.99)"
+    columns = ", ".join(found[name] for name in mechanism.parts.columns)
+    problems.refuse_now(column=columns, value=value, allowed=allowed)
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

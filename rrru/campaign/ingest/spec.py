@@ -1,10 +1,11 @@
 """How to read a measurement file: what the configuration says of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Self
 
 import numpy as np
+import pandas as pd
 
 from rrru.campaign.ingest.formats import Format
 from rrru.errors import ConfigError
@@ -32,7 +33,8 @@ class IngestSpec:
     places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
     that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
     with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
-    day in `time_s`.
+    day in `time_s`. signs: drive -> -1 where the file counts its values the other way round; order: names of the drives
+    in the order in which the file's columns stand for them, none for the robot's own.
     """
 
     path: str
@@ -49,6 +51,8 @@ class IngestSpec:
     commands: str | None = None
     commands_format: Format = _AS_IT_ENDS
     time_format: str | None = None
+    signs: Mapping[str, int] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
@@ -64,13 +68,30 @@ class IngestSpec:
         if wrong:
             raise ConfigError(f"ingest of {self.path}: {wrong[0]}")
 
+    def check_drives(self, drives: Sequence[str]) -> None:
+        """Raise ConfigError where signs or order are not of these drives."""
+        if unknown := [name for name in self.signs if name not in drives]:
+            raise ConfigError(f"ingest of {self.path}: signs has {unknown[0]!r}; allowed: {', '.join(drives)}")
+        if wrong := [f"{name}: {sign!r}" for name, sign in self.signs.items() if sign not in (1, -1)]:
+            raise ConfigError(f"ingest of {self.path}: signs has {wrong[0]}; allowed: 1 or -1")
+        if self.order and sorted(self.order) != sorted(drives):
+            given = ", ".join(map(str, self.order))
+            raise ConfigError(f"ingest of {self.path}: order is {given}; allowed: each of {', '.join(drives)} once")
+
+    def as_meant(self, frame: pd.DataFrame, drives: Sequence[str]) -> pd.DataFrame:
+        """The frame with drive values in `order` and with `signs`, where it has all drives' columns."""
+        if not set(drives) <= set(frame):
+            return frame
+        columns = dict(zip(self.order or drives, drives, strict=True))
+        return frame.assign(**{name: self.signs.get(name, 1) * frame[columns[name]] for name in drives})
+
     @classmethod
     def from_config(cls, section: Mapping[str, Any]) -> Self:
         """From a campaign's section of the configuration, whose key `ingest` is the path."""
         given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
         points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
         places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
-        beside = tuple(given.pop("world_targets", ()))
+        beside, order = tuple(given.pop("world_targets", ())), tuple(given.pop("order", ()))
         commands = given.pop("commands", None)
         commands = commands if isinstance(commands, Mapping) else {"file": commands}
         return cls(
@@ -78,6 +99,7 @@ class IngestSpec:
             registration_points=points,
             targets=places,
             world_targets=beside,
+            order=order,
             format=Format.from_config(given.pop("format", None)),
             commands=commands["file"],
             commands_format=Format.from_config(commands.get("format")),
