@@ -5,16 +5,20 @@ is the stiffness of the drives and `backlash` their play. Anything else a file c
 that it does not carry itself. The model stands in the frame of the measurements. Lengths in mm, angles in rad.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.gap.calibrate import calibrate
 from rrru.gap.details import parameter_rows
+from rrru.gap.model_fit import fit_model
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import weight_notes
-from rrru.robots.file_changes import Found
+from rrru.robots.file_changes import Found, held_by
+from rrru.robots.from_file import mjcf_parts, urdf_parts
+from rrru.robots.from_structure import structure_of
 from rrru.robots.to_mjcf import to_mjcf
 from rrru.robots.to_urdf import to_urdf
 
@@ -64,6 +68,29 @@ def found_of(attribution):
     return found, [name for name, _ in state.effects if name not in held]
 
 
+def fitted_in_file(attribution, section):
+    """The Attribution with its hypothesis fitted in geometric numbers that the robot's own file can hold.
+
+    Numbers of others, such as shifts between the axes of a ball, can stand in for those of the file in the fit; written
+    without them the file would miss by what they did. section: the robot's entry in the configuration.
+    """
+    mechanism = attribution.case.mechanism
+    if "urdf" in section:
+        parts = urdf_parts(section["urdf"], **{key: section.get(key) for key in ("base", "tip", "home")})
+    else:
+        parts = mjcf_parts(section["mjcf"], section["platform"])
+    held = held_by(structure_of(*parts), mechanism.candidates)
+    if set(mechanism.parameters.names) <= set(held):
+        return attribution
+    names = [name for name in held if name in mechanism.among] if mechanism.among else held
+    case = replace(attribution.case, mechanism=replace(mechanism, among=tuple(names)))
+    fitted, state = attribution.fit.model, attribution.state
+    start = replace(calibrate(case), effects=state.effects, shape_values=state.shape_values)
+    of_case = replace(fitted.case, mechanism=case.mechanism)
+    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, attribution.fit.level, fitted.signed)
+    return replace(attribution, case=case, fit=fit)
+
+
 def _of_drives(numbers, effect, stem, count):
     """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
     own = numbers[numbers["effect"] == effect].set_index("parameter")
@@ -71,21 +98,22 @@ def _of_drives(numbers, effect, stem, count):
 
 
 def _places(case):
-    """Places (3,) on the platform, before what was found, of the reflectors that were found, by site."""
-    fitted = set(getattr(case.mechanism.reads, "fitted", ()))
-    if not fitted:
+    """Places (3,) on the platform, before what was found, of all reflectors on it, by site."""
+    if not case.mechanism.reads.reflectors:
         return {}
     on_world = rows.on_the_world(case.measurements)
     frame = case.measurements if on_world is None else case.measurements[~on_world]
     places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
-    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in fitted}
+    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites)}
 
 
 def corrected(attribution, section, folder):
     """The Corrected file of an attribution for a folder; section: the robot's entry in the configuration.
 
-    Raises ConfigError for a file whose bodies do not all stand in it as such.
+    Its numbers are fitted anew where the format cannot hold all that were. Raises ConfigError for a file whose bodies
+    do not all stand in it as such.
     """
+    attribution = fitted_in_file(attribution, section)
     found, others = found_of(attribution)
     if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")

@@ -133,7 +133,8 @@ def _instrument(case, robot, found, corrected):
     The frame is the file's, so that reflectors beside the robot are moved by it.
     """
     result, numbers = robot.twists(), robot.legs.site_numbers
-    named = set(found.reflectors) | ({TOOL} if corrected or found.reflectors or case.mechanism.reads.turned else set())
+    reads = case.mechanism.reads
+    named = {*reads.fitted, *((TOOL,) if corrected or reads.fitted or reads.turned else ())}
     for name in named & set(found.twists):
         result[0, numbers[name]] = found.twists[name]
     on_world = rows.on_the_world(case.measurements)

@@ -44,7 +44,7 @@ class Found:
     """What a diagnosis has found of a robot.
 
     twists: (6,) by site; spread: (q, 6) by site, what q independent errors of one standard deviation each make of them;
-    reflectors: place (3,) on the platform, before its twist, by the site of each one that is found; tool_mm (3,): the
+    reflectors: place (3,) on the platform, before its twist, by the site of each one that was read; tool_mm (3,): the
     measured point; compliance, play: by number of the drive (value, standard error), in rad/(N mm) or mm/N, and in rad
     or mm; loads: by drive the largest one, in N mm or N.
     """
@@ -72,6 +72,11 @@ def changes_of(structure, found, twists):
     if tip is not None:
         bodies[assembly.platform] = (tip,)
     return Changes(bodies, anchors, _frames(found, twists), tuple(dict.fromkeys(lost)))
+
+
+def held_by(structure, candidates):
+    """Names of the Candidates whose twists the file of a Structure can hold."""
+    return [one.name for one in candidates if not changes_of(structure, Found({}), one.twists).lost]
 
 
 def scatter(numbers, twists, spread):

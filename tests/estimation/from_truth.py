@@ -24,6 +24,7 @@ from rrru.studies.real.frame_fit import FRAMES, FrameObservations, fit_frames, f
 from tests.estimation.random_robots import NOISE_MM, draw_campaign
 
 SAME = 1e-6
+_SAME_UNDER_PRIOR = 1e-3
 # readings without a pose, so that SciPy may step there
 _LOST_MM = 1e4
 _NO_LOADS = Masses(0.0, 0.0, 0.0)
@@ -44,8 +45,12 @@ class Outcome:
     seconds: dict = field(default_factory=dict)
 
     def reached(self, name):
-        """Whether a search ended at the minimum from the truth, or lower."""
-        return self.found_mm2[name] <= (1.0 + SAME) * self.least_mm2[name]
+        """Whether a search ended at the minimum from the truth, or lower.
+
+        The core's minimum is that of its posterior: the priors of links and joints lift the sum of squares a little.
+        """
+        same = _SAME_UNDER_PRIOR if name == "core" else SAME
+        return self.found_mm2[name] <= (1.0 + same) * self.least_mm2[name]
 
 
 def unregistered_table(campaign):

@@ -31,12 +31,12 @@ def answered(budget=None, runs=(), drives=(), **verdict):
         "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN),
         "gap_parameters": pd.DataFrame(
             [
-                ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, False),
-                ("backlash", "width1", "rad", 4.04e-4, 0.2e-4, False),
-                ("backlash", "width2", "rad", 4.04e-4, 0.2e-4, False),
-                ("backlash", "width3", "rad", 0.0, np.nan, False),
+                ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, 0.00101, 0.00145, False),
+                ("backlash", "width1", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width2", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width3", "rad", 0.0, np.nan, np.nan, np.nan, False),
             ],
-            columns=("effect", "parameter", "unit", "value", "standard_error", "at_bound"),
+            columns=("effect", "parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound"),
         ),
         "gap_next_runs": pd.DataFrame(list(runs), columns=answer._RUN),
     }
