@@ -38,6 +38,8 @@ def write_corrected(diagnosis, section, masses, file):
         written = corrected(attribution, section, file.resolve().parent)
         write_text(written.text, file)
         more, why = gap_rows(attribution, written, section, file, shrink)
+        _refuse_worse(more)
+        why = "; ".join(filter(None, (why, _remainder(shrink, more))))
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
     except ConfigError as error:
         tag, said = ("mujoco" if "mjcf" in section else "robot"), " ".join(str(error).replace("--", "-").split())
@@ -47,6 +49,28 @@ def write_corrected(diagnosis, section, masses, file):
     verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(lost)}
     tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
+
+
+def _left_mm(steps, kind):
+    """Root mean square residual in mm on all trajectories of the last row of a kind of `gap_shrink`, NaN for none."""
+    own = steps[(steps["kind"] == kind) & (steps["trajectory"] == "*")] if len(steps) else steps
+    return float(own["rms_mm"].iloc[-1]) if len(own) else np.nan
+
+
+def _refuse_worse(more):
+    """Raise ConfigError where the corrected file misses by more than the file as it came."""
+    given, written = _left_mm(more, "given_model"), _left_mm(more, "corrected_model")
+    if written > given:
+        raise ConfigError(f"it would miss by {written:.3g} mm rms, the file as it came misses by {given:.3g} mm")
+
+
+def _remainder(shrink, more):
+    """What a corrected file leaves beyond what the diagnosis does, in words, empty where it is next to nothing."""
+    written, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
+    if not written > OPTIONS.max_file_remainder_ratio * whole:
+        return ""
+    left = f"the corrected file leaves {written:.3g} mm rms at the readings, the diagnosis {whole:.3g} mm"
+    return f"{left}: the format does not hold the rest, corrected_drives does"
 
 
 def gap_rows(attribution, corrected, section, file, shrink):

@@ -260,6 +260,8 @@ class DiagnosisOptions:
     tried_signal_to_noise: int = 23
 
     # --- corrected files ---
+    # a corrected file that leaves more than so many times what the diagnosis leaves gets a note
+    max_file_remainder_ratio: float = 1.1
     # lines of the grid along each axis; assumed
     drive_table_grid_lines: int = 7
     # a grid point has a measured point within so many steps of the grid: no extrapolation
