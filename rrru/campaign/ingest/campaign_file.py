@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution
+from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution, stale
 from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resolve
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.formats import read_cells
@@ -64,6 +64,14 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
             "rigid motion that is left is fitted with the calibration"
         ]
     table, more = _table(sheet, mounted, registration, digit_mm)
+    repeated = stale(sheet, digit_mm)
+    if len(repeated):
+        table.loc[sheet.frame.index.isin(repeated.index), "status"] = "outlier"
+        listed = ", ".join(map(str, repeated.index[:10])) + (", ..." if len(repeated) > 10 else "")
+        more = [
+            *more,
+            f"{len(repeated)} stale readings, equal to an earlier one in every digit, left out: rows {listed}",
+        ]
     return Ingested(table, (*notes, *more, *(mounted.notes if mounted else ())), registration)
 
 

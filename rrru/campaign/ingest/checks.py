@@ -6,6 +6,8 @@ from rrru.campaign.driven_path import follows_path
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED
 
 _LEAST_POINTS = 3
+# stale readings that are left out make at most this share of a file; more are no mishap of an instrument
+_MOST_STALE = 0.1
 # A file that prints coarser than this gives the same position twice by chance.
 _COARSE_MM = 0.005
 
@@ -121,13 +123,23 @@ def _check_order(sheet):
             sheet.note("two trajectories", "trajectory", value, "one trajectory per run", other.index[0])
 
 
-def _check_copies(sheet, digit_mm):
-    """Note rows that repeat a measured position; at the same command only where the file is fine enough to tell."""
+def stale(sheet, digit_mm):
+    """Rows that repeat an earlier reading in every digit: a series of the earlier row's number by theirs.
+
+    At the same command only where the file is fine enough to tell; digit_mm: last digit of its positions.
+    """
     known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
     first, command = _first_alike(known, MEASURED), known[[*COMMAND]]
     elsewhere = (command.to_numpy() != command.loc[first].to_numpy()).any(axis=1)
-    copied = (first != known.index) & (elsewhere | (digit_mm < _COARSE_MM))
-    for row, *measured in known.loc[copied, [*MEASURED]].itertuples():
+    return first[(first != known.index) & (elsewhere | (digit_mm < _COARSE_MM))]
+
+
+def _check_copies(sheet, digit_mm):
+    """Note rows that repeat a measured position where there are many; a few are left out as stale."""
+    first = stale(sheet, digit_mm)
+    if len(first) <= _MOST_STALE * len(sheet.frame):
+        return
+    for row, *measured in sheet.frame.loc[first.index, [*MEASURED]].itertuples():
         value = f"({', '.join(f'{one:.10g}' for one in measured)}) mm, exactly as in row {first[row]}"
         sheet.note(
             "copied row", MEASURED, value, "each measurement once: an instrument does not repeat every digit", row
@@ -141,7 +153,8 @@ def _check_counts(sheet):
     if len(sheet.frame) < needed:
         allowed = f"at least {needed}: three numbers per point for {parameters} parameters"
         sheet.note("too few points", None, f"{len(sheet.frame)} rows", allowed)
-    for number, size in sheet.frame.groupby("run").size().items():
+    # a run that nobody numbered may be short
+    for number, size in sheet.frame.groupby("run").size().items() if "run" in sheet.found else ():
         if size < _LEAST_POINTS:
             allowed = f"at least {_LEAST_POINTS} points in a run"
             sheet.note("too few points", "run", f"run {number:g} with {size} points", allowed)

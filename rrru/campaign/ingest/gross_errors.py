@@ -18,7 +18,7 @@ import pandas as pd
 from scipy.special import logsumexp
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.ingest.sheet import MEASURED, TARGET, position_text
+from rrru.campaign.ingest.sheet import MEASURED, TARGET, TURNS, position_text
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.target_registration import TargetReadings, register_targets
 from rrru.errors import FitError
@@ -44,6 +44,8 @@ _SHIFTS, _MOST_MISTAKES = (1, -1, 2, -2), 3
 _MOST_LOOKED_AT = 5
 # independent errors of a robot whose model has few parameters: its joints have more; assumed
 _LEAST_INDEPENDENT = 15
+# no target is farther from its stated place, as a share of the robot's size; assumed
+_FARTHEST_SHARE = 0.5
 # a residual of less than this share of the robot's size is as good as none: no hypothesis wins by rounding
 _NO_RESIDUAL_SHARE = 1e-5
 
@@ -175,7 +177,9 @@ class _File:
         names = frame["target"].astype(str).to_numpy() if "target" in frame else np.full(len(frame), "")
         known, number = np.unique(names, return_inverse=True)
         tool = tuple(np.asarray(robot.tool_mm, dtype=float))
-        stated = dict(spec.targets) if "target" in frame else {"": tool}
+        # where orientations are read a registration finds the tool's place, too
+        unnamed = {} if set(TURNS["measured"]) <= set(frame) else {"": tool}
+        stated = dict(spec.targets) if "target" in frame else unnamed
         place = np.array([stated.get(name, (np.nan,) * 3) for name in known.tolist()], dtype=float)
         if set(TARGET) <= set(frame):
             first = [int(np.argmax(number == k)) for k in range(len(known))]
@@ -202,7 +206,9 @@ class _File:
         if len(at) < _LEAST_ROWS:
             return impossible
         values = mistakes.applied(self.drive[at])
-        poses = self.robot.solve(values, self.robot.guess(values))
+        # poses that do not exist are an answer here
+        with np.errstate(invalid="ignore"):
+            poses = self.robot.solve(values, self.robot.guess(values))
         posed = poses.closed & np.isfinite(poses.position_mm).all(axis=1)
         if posed.mean() < _LEAST_POSED:
             return impossible
@@ -214,6 +220,9 @@ class _File:
         try:
             found = register_targets(TargetReadings(*bodies, *seen), mistakes.mirrored, robust)
         except FitError:
+            return impossible
+        moved = np.linalg.norm((found.place_mm - self.place_mm)[stated], axis=1)
+        if moved.max(initial=0.0) > _FARTHEST_SHARE * size:
             return impossible
         off = np.linalg.norm(found.residual_mm, axis=1)
         off = off[off <= _SPOILT * np.median(off)] if robust else off

@@ -182,6 +182,24 @@ def test_a_broken_beam_is_kept_and_marked(field, tmp_path):
     assert result.measurements["measured_z_mm"].to_list() == frame["measured_z_mm"].to_list()
 
 
+def test_stale_readings_are_left_out_and_named(field, expected, tmp_path):
+    spoilt = field.copy()
+    for row in (8, 100):
+        spoilt.loc[row, MEASURED] = field.loc[row - 1, MEASURED].to_numpy()
+    result = ingest(IngestSpec(written(spoilt, tmp_path / "file.csv")), ROBOT)
+    marked = np.flatnonzero(result.measurements["status"] == "outlier")
+    assert set(marked) - set(np.flatnonzero(expected["status"] == "outlier")) == {8, 100}
+    text = "2 stale readings, equal to an earlier one in every digit, left out: rows 9, 101"
+    assert text in result.notes
+
+
+def test_a_run_that_nobody_numbered_may_be_short(field, tmp_path):
+    """As where a path turns back after its first two points."""
+    rows = field.iloc[[0, 1, *range(26, 222)]].drop(columns=["run", "point"])
+    table = ingest(IngestSpec(written(rows, tmp_path / "file.csv")), ROBOT).measurements
+    assert len(table) == 198 and (table["run"] == 1).sum() == 2
+
+
 def test_rows_that_seem_shifted_or_far_off_are_noted(field, tmp_path):
     frame = field.copy()
     frame[MEASURED] = field[MEASURED].shift(1)

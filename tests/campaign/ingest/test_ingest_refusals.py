@@ -263,20 +263,20 @@ ROWS = {
         "run 1, point 3, as in row 3",
         "each point of a run once",
     ),
-    "a copied measurement": (
-        cells(*[(9, n, FIELD.loc[4, n]) for n in MEASURED]),
+    "many copied measurements": (
+        cells(*[(row, n, FIELD.loc[row - 2, n]) for row in range(9, 60, 2) for n in MEASURED]),
         {},
         9,
         XYZ,
-        "as in row 5",
+        "as in row 8",
         "repeat every digit",
     ),
     "a copied row": (
         "\n".join([*LINES[:6], *LINES[5:]]),
         {},
         6,
-        XYZ,
-        "(-620.253391, -0.27105, 609.841743) mm, exactly",
+        "run, point",
+        "run 1, point 5, as in row 5",
         "once",
     ),
     "points that go back": (
