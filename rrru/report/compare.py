@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
+from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.fit.campaign_fit import CalibrationSettings
 from rrru.store import facts, tables
@@ -98,6 +99,17 @@ def check(first, second):
         if values[0] != values[1]:
             what = f"{first.name} has {key} {values[0]}, {second.name} {values[1]}"
             raise ConfigError(f"compare: the nominal robots differ: {what}; deviations count from these")
+    read = _read_in(first), _read_in(second)
+    if read[0] != read[1]:
+        what = f"of {first.name} {read[0]}, of {second.name} {read[1]}"
+        raise ConfigError(f"compare: other things were read: {what}; allowed: campaigns with the same readings")
+
+
+def _read_in(side):
+    """What was read in a campaign, in words."""
+    measurements = side.frames["measurements"]
+    named = sorted(measurements["target"].dropna().unique()) if "target" in measurements else ["the tool"]
+    return ", ".join(named) + (", with orientations" if rows.has_turns(measurements) else "")
 
 
 def difference(first, second, calibration):

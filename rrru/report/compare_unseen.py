@@ -16,6 +16,8 @@ from rrru.studies import setup
 
 # with fewer trajectories or runs than this a campaign is cut into as many stretches
 _FOLDS = 4
+# stretches that a few runs are cut into to judge chance, of so many points at least
+_STRETCHES, _LEAST_STRETCH = 12, 3
 _SAME = [f"{kind}_{axis}_mm" for kind in ("command", "measured") for axis in "xyz"]
 
 
@@ -54,15 +56,24 @@ def unseen(first, second, calibration):
 def _compared(campaign, frame):
     """The Unseen of errors (mm) a and b with their trajectory and run."""
     frame = frame.assign(gain=frame["b"] ** 2 - frame["a"] ** 2)
-    gain, error = over_runs(frame["gain"], frame["run"])
-    count = frame["run"].nunique()
-    chance = float(2.0 * t.sf(abs(gain) / error, count - 1)) if error > 0.0 else 1.0
+    drawn = _drawn(frame["run"])
+    gain, error = over_runs(frame["gain"], drawn)
+    count = drawn.nunique()
+    chance = float(2.0 * t.sf(abs(gain) / error, count - 1)) if error > 0.0 and count > 1 else 1.0
     table = frame.groupby("trajectory", sort=False).agg(
         points=("a", "size"), a_rms_mm=("a", _rms), b_rms_mm=("b", _rms)
     )
     table = table.reset_index()
     table.insert(0, "measured_in", campaign)
     return Unseen(campaign, table, len(frame), (_rms(frame["a"]), _rms(frame["b"])), gain, chance)
+
+
+def _drawn(run):
+    """What chance draws of points in runs (n,): the runs, or stretches of points where there are few of them."""
+    if run.nunique() >= _FOLDS:
+        return run
+    count = min(_STRETCHES, len(run) // _LEAST_STRETCH)
+    return pd.Series(np.arange(len(run)) * max(count, 1) // max(len(run), 1), index=run.index)
 
 
 def over_runs(values, runs):

@@ -8,7 +8,7 @@ from scipy.stats import chi2, kstest
 from rrru.errors import ConfigError
 from rrru.report import compare, compare_page
 from rrru.report.compare_gap import gap_difference
-from rrru.report.compare_unseen import over_runs, same_points, unseen
+from rrru.report.compare_unseen import _compared, over_runs, same_points, unseen
 from tests.report import campaigns
 from tests.report.campaigns import ERRORS, NOMINAL, joined, leave, measured
 
@@ -112,6 +112,21 @@ def test_the_error_over_runs_is_that_of_a_mean_of_runs():
     assert np.sqrt((found[:, 1] ** 2).mean()) == pytest.approx(found[:, 0].std(), rel=0.1)
 
 
+@pytest.mark.parametrize("runs", [1, 3])
+def test_chance_is_known_where_there_are_few_runs(runs):
+    """All poses in one run: a side that is thirty times worse is no chance, and equal ones are."""
+    generator = np.random.default_rng(2)
+    errors = pd.DataFrame({"trajectory": "poses", "run": np.arange(120) * runs // 120})
+    errors["a"] = np.abs(generator.normal(0.0, 0.055, 120))
+    clear = _compared("x", errors.assign(b=np.abs(generator.normal(0.0, 1.8, 120))))
+    assert clear.chance < 1e-3 and clear.gain_mm2 > 0.0
+    equal = [
+        _compared("x", errors.assign(b=np.abs(np.random.default_rng(k).normal(0.0, 0.055, 120)))) for k in range(20)
+    ]
+    assert np.median([one.chance for one in equal]) > 0.1
+    assert _compared("x", errors.head(2).assign(b=1.0)).chance == 1.0
+
+
 def test_a_page_of_two_folders_has_every_campaign_that_both_have(folder, tmp_path):
     leave(tmp_path, "a", measured(7))
     leave(tmp_path, "alone", measured(8))
@@ -135,6 +150,9 @@ def others(tmp_path_factory):
     numbers = place / "campaigns/framed/parameters.parquet"
     own = pd.read_parquet(numbers)
     pd.concat([own, own[own["parameter"] == "dL1"].assign(parameter="world_x")]).to_parquet(numbers)
+    leave(place, "turned", frame)
+    readings = place / "campaigns/turned/measurements.parquet"
+    pd.read_parquet(readings).assign(target="ball").to_parquet(readings)
     leave(place, "bare", frame)
     (place / "campaigns/bare/verdict.json").unlink()
     (place / "empty").mkdir()
@@ -156,6 +174,7 @@ def others(tmp_path_factory):
             "{1}:framed",
             r"of framed the instrument's frame is calibrated, too \(world_x\), of a it is not",
         ),
+        ("{0}:a", "{1}:turned", "other things were read: of a the tool, of turned ball; allowed"),
         ("{0}:a", "{1}:bare", "lacks verdict.json; run `snakemake` for it first"),
         ("nothing", "{0}:a", "'nothing' is no folder, and no calibrated campaign of results"),
     ],
