@@ -2,7 +2,7 @@ from pathlib import Path
 
 from snakemake.utils import min_version, validate
 
-from rrru.studies.checks import check_once, check_schema
+from rrru.studies.checks import check_keys, check_once, check_schema
 
 min_version("9.0")
 # the last digits of sums depend on how many threads of linear algebra share them: one, whatever `threads` a rule has
@@ -12,6 +12,7 @@ shell.prefix("set -euo pipefail; export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 configfile: "config.yaml"
 
 
+check_keys(workflow.configfiles)
 check_schema(config, Path(workflow.basedir, "workflow/schemas/config.schema.yaml"))
 # it sets what is absent to the defaults
 validate(config, "workflow/schemas/config.schema.yaml")

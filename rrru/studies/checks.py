@@ -13,6 +13,7 @@ from rrru.store.digest import code_digest
 
 # a larger number is a slip, and what is reckoned from it may overflow
 _MOST = 1e15
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def check_schema(config, file):
@@ -26,13 +27,42 @@ def check_schema(config, file):
 
     kinds = {name: lambda _, value, fits=fits: fits(value) for name, (fits, _) in _STRICT.items()}
     strict = validators.extend(Usual, type_checker=Usual.TYPE_CHECKER.redefine_many(kinds))
-    rules = yaml.load(Path(file).read_text(), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    rules = yaml.load(Path(file).read_text(), Loader=_LOADER)
     error = exceptions.best_match(strict(rules).iter_errors(config))
     if error:
         kind = error.validator_value if error.validator == "type" else None
         allowed = f"; allowed: {_STRICT[kind][1]}" if isinstance(kind, str) and kind in _STRICT else ""
         place = ".".join(map(str, error.absolute_path)) or "configuration"
         raise ConfigError(f"{place}: {error.message}{allowed}{_as_number(error)}{_meant(error)}")
+
+
+def check_keys(files):
+    """Raise ConfigError with file and line where a YAML file has a key twice: YAML would keep the last one silently."""
+    for file in map(Path, files):
+        try:
+            root = yaml.compose(file.read_text(encoding="utf-8"), Loader=_LOADER)
+        except (OSError, UnicodeDecodeError, yaml.YAMLError):
+            # who reads it says so
+            continue
+        for place, key in _repeated(root, ""):
+            line = key.start_mark.line + 1
+            raise ConfigError(f"{file}, line {line}: {place}{key.value} stands twice; allowed: each name once")
+
+
+def _repeated(node, place):
+    """Nodes of keys that stand twice in a mapping, below a YAML node, with the place of their mapping as text."""
+    if isinstance(node, yaml.SequenceNode):
+        for item in node.value:
+            yield from _repeated(item, place)
+    if not isinstance(node, yaml.MappingNode):
+        return
+    seen = set()
+    for key, value in node.value:
+        if key.value in seen and key.tag != "tag:yaml.org,2002:merge":
+            yield place, key
+        if isinstance(key.value, str):
+            seen.add(key.value)
+            yield from _repeated(value, f"{place}{key.value}.")
 
 
 def _as_number(error):

@@ -44,6 +44,10 @@ from tests.workflow.folder import dry_run, run
         ("delta: {tilted_views: {count: 2}}", "2 is less than the minimum of 3"),
         ("delta: {plane: {radius_mm: 2000.0}}", "delta.plane: a point is out of the robot's reach"),
         ("ptt: {network: {train: 180}}", "ptt.network.train is 180"),
+        (
+            "campaigns:\n  mine: {robot: rrru3, ingest: a.csv}\n  mine: {robot: delta, ingest: b.csv}",
+            "wrong.yaml, line 3: campaigns.mine stands twice",
+        ),
         ("ptt: {joint: {all: [ptt_9, ptt_1]}}", "ptt.joint.all: no experiment 'ptt_9'"),
     ],
 )

@@ -14,6 +14,7 @@ from rrru.campaign.ingest.columns import REQUIRED, resolve
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.errors import ConfigError, IngestError, RrruError
+from rrru.studies.checks import check_keys
 from rrru.studies.incoming.costs import costs, without_times
 from rrru.studies.incoming.propose import fitting_robots, propose
 
@@ -116,6 +117,7 @@ def _used(section, cells, mechanism):
 def read_config(overlays, base="config.yaml"):
     """The configuration under overlays; raises ConfigError for what is no YAML mapping."""
     config = {}
+    check_keys((base, *overlays))
     for file in (base, *overlays):
         try:
             section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
