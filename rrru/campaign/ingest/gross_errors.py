@@ -44,8 +44,9 @@ _SHIFTS, _MOST_MISTAKES = (1, -1, 2, -2), 3
 _MOST_LOOKED_AT = 5
 # independent errors of a robot whose model has few parameters: its joints have more; assumed
 _LEAST_INDEPENDENT = 15
-# no target is farther from its stated place, as a share of the robot's size; assumed
-_FARTHEST_SHARE = 0.5
+# a target that is nearer to its stated place than the first share of the robot's size is not grossly wrong, one that
+# is farther than the second cannot be; assumed
+_NEAREST_SHARE, _FARTHEST_SHARE = 0.01, 0.5
 # a residual of less than this share of the robot's size is as good as none: no hypothesis wins by rounding
 _NO_RESIDUAL_SHARE = 1e-5
 
@@ -222,7 +223,7 @@ class _File:
         except FitError:
             return impossible
         moved = np.linalg.norm((found.place_mm - self.place_mm)[stated], axis=1)
-        if moved.max(initial=0.0) > _FARTHEST_SHARE * size:
+        if mistakes.free and not _NEAREST_SHARE * size < moved.max(initial=0.0) < _FARTHEST_SHARE * size:
             return impossible
         off = np.linalg.norm(found.residual_mm, axis=1)
         off = off[off <= _SPOILT * np.median(off)] if robust else off
