@@ -12,6 +12,7 @@ from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
 from rrru.campaign.ingest.gross_errors import find_gross_error
+from rrru.campaign.ingest.guess import guess_columns
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
 from rrru.campaign.ingest.problems import Problems
@@ -83,7 +84,7 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
             raise ConfigError(f"ingest of {spec.path}: columns has the key {key!r}; allowed: {', '.join(known)}")
     problems = Problems(spec.path)
     cells = with_commands(spec, read_cells(Path(spec.path), spec.format, problems), problems)
-    found, extra = resolve(spec, cells, mechanism, problems)
+    found, extra = resolve(spec, cells, mechanism, problems, guess_columns(cells, mechanism, spec.columns))
     notes = list(cells.notes)
     if extra:
         notes.append(f"left out, as nobody declared them: {', '.join(extra)}")

@@ -49,10 +49,11 @@ def known_columns(mechanism):
     return (*REQUIRED, *_BEFORE_DRIVES, *mechanism.parts.columns, *_AFTER_DRIVES, *_MORE)
 
 
-def resolve(spec, cells, mechanism, problems):
+def resolve(spec, cells, mechanism, problems, guessed=None):
     """{our name: the file's name} of the columns that a file's Cells have, and those that nobody declared.
 
-    Missing columns, repeated ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
+    guessed: {our name: the file's name} of what undeclared columns look like, which messages propose. Missing columns,
+    repeated ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
     """
     drives, names = mechanism.parts.columns, cells.names
     for name in sorted({name for name in names if names.count(name) > 1}):
@@ -85,7 +86,14 @@ def resolve(spec, cells, mechanism, problems):
             problems.add("missing column", column=given, value=part, allowed=allowed)
     if spec.extra_columns == "refuse":
         unused = [ours for ours in wanted if ours not in found]
+        meant = {theirs: ours for ours, theirs in (guessed or {}).items()}
+        if spare := {ours: theirs for theirs, ours in meant.items() if ours in drives and theirs in extra}:
+            pairs = ", ".join(f'{ours}: "{theirs}"' for ours, theirs in spare.items())
+            value, allowed = "columns that look like the drives' values", f"columns: {{{pairs}}}"
+            problems.add("drives", column=", ".join(spare.values()), value=value, allowed=allowed)
         for name in dict.fromkeys(extra):
+            if meant.get(name) in spare:
+                continue
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
             advice = _advice(_nearest(name, unused), name)
             allowed = f"extra_columns: ignore, which leaves it out{advice}; known: {', '.join(wanted)}"

@@ -13,6 +13,7 @@ from rrru.campaign.ingest.columns import convert, known_columns, resolve
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import frame_limit
+from rrru.campaign.ingest.guess import guess_clock, guess_columns, guess_format, guess_units
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
@@ -20,7 +21,6 @@ from rrru.errors import IngestError, RrruError
 from rrru.robots.robot import Robot
 from rrru.studies import config as parts
 from rrru.studies import setup
-from rrru.studies.incoming.guess import guess_clock, guess_columns, guess_format, guess_units
 
 # points that tell whether a file is of a robot
 _PROBES = 20

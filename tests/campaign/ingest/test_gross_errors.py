@@ -147,3 +147,16 @@ def test_drive_values_that_contradict_the_commands_are_named(tmp_path):
     few.to_csv(path, index=False)
     with pytest.raises(IngestError, match=rf"signs: {{{drives[2]}: -1}}"):
         ingest(IngestSpec(str(path)), robot)
+
+
+def test_columns_that_look_like_the_drives_are_proposed_as_such(tmp_path):
+    """`extra_columns: ignore` would drop the joint values."""
+    robot, frame = _made(8)
+    path, drives = tmp_path / "file.csv", [*robot.parts.columns]
+    named = frame.rename(columns={name: f"J{k} [rad]" for k, name in enumerate(drives, 1)})
+    named.assign(**rows.vector_columns("command", rows.measured(frame)), remark="").to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(_SPEC, path=str(path)), robot)
+    text = str(refused.value)
+    assert f'columns: {{{drives[0]}: "J1 [rad]", {drives[1]}: "J2 [rad]"' in text
+    assert "extra_columns: ignore" in text.split("remark")[1] and "J1 [rad]: got a column that nobody" not in text
