@@ -107,3 +107,15 @@ def test_a_column_of_another_robot_is_refused_with_the_names_of_this_one(tmp_pat
     """theta1_rad is no joint of the arm."""
     with pytest.raises(IngestError, match=r"theta1_rad.*nobody declared"):
         _ingested(_file().assign(theta1_rad=0.0), tmp_path)
+
+
+def test_a_target_s_own_offset_is_no_second_problem(tmp_path):
+    """A reflector 120 mm beside the tool, and a point that stands twice: one problem, not `frame: register` besides."""
+    frame = _file()
+    drives = frame[[*ARM.parts.columns]].to_numpy()
+    seen = ARM.solve(drives, rows.command(frame)).point(np.array([120.0, 0.0, 0.0]))
+    numbered = frame.assign(**rows.vector_columns("measured", seen), target="ball", run=1)
+    spoilt = numbered.assign(point=np.arange(1, 41)).drop(columns="point").assign(time_s=np.r_[0:39, 5])
+    with pytest.raises(IngestError) as refused:
+        _ingested(spoilt, tmp_path, targets={"ball": (120.0, 0.0, 0.0)})
+    assert "time" in str(refused.value) and "register" not in str(refused.value)
