@@ -119,8 +119,11 @@ def _write_fixed(document, behind, links, placement):
 
 
 def _find_meshes(root, source, folder):
-    """Have files that are named by their place beside the old file found from a folder."""
+    """Have meshes and textures that are named by their place beside the old file found from a folder.
+
+    Names of other files, such as the shared libraries of a simulator's plugins, are no places beside it.
+    """
     for mesh in root.iter():
-        name = mesh.get("filename") if isinstance(mesh.tag, str) else None
+        name = mesh.get("filename") if mesh.tag in ("mesh", "texture") else None
         if name and "://" not in name and not Path(name).is_absolute():
             mesh.set("filename", os.path.relpath(source / name, folder))

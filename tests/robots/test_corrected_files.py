@@ -207,3 +207,19 @@ def test_tool_and_reflectors_are_frames_on_the_platform(tmp_path):
     arm, _ = to_urdf(ARM, replace(found, tool_mm=(0.0, 0.0, 0.0)), tmp_path)
     place = next(one for one in ElementTree.fromstring(arm).iter("joint") if one.get("name") == "measured_tool_mount")
     assert place.find("parent").get("link") == "tool0" and place.find("origin").get("xyz") == "0.001 0.002 0.003"
+
+
+def test_files_beside_a_urdf_are_found_from_the_new_place_and_plugins_keep_their_names(tmp_path):
+    extra = (
+        '<gazebo><plugin name="control" filename="libgazebo_ros2_control.so"/></gazebo>'
+        '<link name="shape"><visual><geometry><mesh filename="meshes/arm.stl"/></geometry></visual></link>'
+        '<joint name="shape_joint" type="fixed"><parent link="tool0"/><child link="shape"/></joint></robot>'
+    )
+    old, new = tmp_path / "old", tmp_path / "new"
+    for folder in (old / "meshes", new):
+        folder.mkdir(parents=True)
+    path = old / "arm.urdf"
+    path.write_text(ARM.read_text().replace("</robot>", extra))
+    robot = from_urdf(path, tip="tool0")
+    text, _ = to_urdf(path, _found(robot, robot.twists()), new, tip="tool0")
+    assert 'filename="libgazebo_ros2_control.so"' in text and 'filename="../old/meshes/arm.stl"' in text
