@@ -40,8 +40,11 @@ class Corrected:
     in_file: dict = field(default_factory=dict)
 
 
-def found_of(attribution):
-    """The Found of an attribution, and the names of its effects that no file holds."""
+def found_of(attribution, stated_reflectors=False):
+    """The Found of an attribution, and the names of its effects that no file holds.
+
+    stated_reflectors: whether reflectors whose places are stated belong to it, too.
+    """
     case, state = attribution.case, attribution.state
     library, sites = case.library, case.mechanism.legs.sites
     constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
@@ -58,7 +61,7 @@ def found_of(attribution):
     found = Found(
         {sites[k]: twists[k] for k in moves},
         {sites[k]: spread[:, k] for k in moves},
-        _places(case),
+        _places(case, stated_reflectors),
         tuple(case.mechanism.tool_mm),
         _of_drives(numbers, *_COMPLIANCE, count),
         _of_drives(numbers, *_PLAY, count),
@@ -97,14 +100,16 @@ def _of_drives(numbers, effect, stem, count):
     return {k: tuple(own.loc[f"{stem}{k + 1}", ["value", "standard_error"]]) for k in range(count) if len(own)}
 
 
-def _places(case):
-    """Places (3,) on the platform, before what was found, of all reflectors on it, by site."""
-    if not case.mechanism.reads.reflectors:
+def _places(case, stated):
+    """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
+    reads = case.mechanism.reads
+    wanted = set(reads.reflectors if stated else reads.fitted)
+    if not wanted:
         return {}
     on_world = rows.on_the_world(case.measurements)
     frame = case.measurements if on_world is None else case.measurements[~on_world]
     places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
-    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites)}
+    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in wanted}
 
 
 def corrected(attribution, section, folder):
@@ -114,7 +119,8 @@ def corrected(attribution, section, folder):
     do not all stand in it as such.
     """
     attribution = fitted_in_file(attribution, section)
-    found, others = found_of(attribution)
+    # more links at the end of a URDF's chain would leave its tip open
+    found, others = found_of(attribution, stated_reflectors="mjcf" in section)
     if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
     others += weight_notes(attribution)
