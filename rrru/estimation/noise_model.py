@@ -14,7 +14,7 @@ smooth along a run may be no larger than the instrument's stated noise allows (3
 itself), or where nobody states it than what the highest frequencies show: what is smooth and larger no noise explains.
 The numbers maximise the restricted likelihood: that of what is left when all that calibration and effects may fit has
 been projected out (Patterson and Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika
-58, 1971), times their prior. Where the readings may hold a smooth discrepancy besides, its size is one of the numbers,
+58, 1971), times their prior. Where the readings may also hold a smooth discrepancy, its size is one of the numbers,
 and no part of the noise: a noise that had to account for it would be too large and too little correlated.
 """
 
@@ -71,7 +71,7 @@ class NoiseModel:
 
     offset_posterior: values of rho that were tried with their posterior probabilities; alike: factor of the variance by
     which readings at one stop, which share the robot's errors, count as fewer; discrepancy: likeliest deviation over
-    mean_mm of what is smooth along the series beside the noise, 0 for none.
+    mean_mm of a smooth discrepancy along the series, 0 for none.
     """
 
     axis_mm: FloatArray
@@ -301,7 +301,7 @@ class _Grid:
 class _Seen:
     """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom.
 
-    smooth: variances (m, 1), 1 on average, of what is smooth along a series and no noise, or 0.
+    smooth: variances (m, 1), 1 on average, of a smooth discrepancy along a series, or 0.
     """
 
     def __init__(
@@ -345,10 +345,8 @@ class _Seen:
 
     def most_likely(self, instrument_mm: float, known: Sequence[tuple[float, float]]) -> NoiseModel:
         """The NoiseModel of the posterior mean of correlation and offset, over a grid, and the likeliest sizes."""
-        sizes, largest = (
-            _DISCREPANCIES if self._smooth.any() else _DISCREPANCIES[:1],
-            (CONTRADICTED * instrument_mm) ** 2,
-        )
+        sizes = _DISCREPANCIES if self._smooth.any() else _DISCREPANCIES[:1]
+        largest = (CONTRADICTED * instrument_mm) ** 2
         prior = np.full(len(sizes), _SOME_DISCREPANCY / max(len(sizes) - 1, 1))
         prior[0] = 1.0 - _SOME_DISCREPANCY
         value = np.array([self._over_grid(size, largest, known).evidence for size in sizes.tolist()]) + np.log(prior)
@@ -367,7 +365,7 @@ class _Seen:
     def _over_grid(self, size: float, largest: float, known: Sequence[tuple[float, float]]) -> "_Grid":
         """Posterior of correlation and offset where the discrepancy has so many times the noise's deviation.
 
-        largest: variance that what is smooth in the noise has at most.
+        largest: upper limit of the variance of the correlated part of the noise.
         """
         none = np.zeros(1)
         white = self._axes(self._shapes(none, none, size, 1.0), known)[0][0]

@@ -70,7 +70,7 @@ def _remainder(shrink, more):
     if not written > OPTIONS.max_file_remainder_ratio * whole:
         return ""
     left = f"the corrected file leaves {written:.3g} mm rms at the readings, the diagnosis {whole:.3g} mm"
-    return f"{left}: the format does not hold the rest, corrected_drives does"
+    return f"{left}; corrected_drives holds all that was found, a file of this format does not"
 
 
 def gap_rows(attribution, corrected, section, file, shrink):

@@ -119,9 +119,9 @@ def _write_fixed(document, behind, links, placement):
 
 
 def _find_meshes(root, source, folder):
-    """Have meshes and textures that are named by their place beside the old file found from a folder.
+    """Have meshes and textures that are named relative to the old file found from a folder.
 
-    Names of other files, such as the shared libraries of a simulator's plugins, are no places beside it.
+    Names of other files, such as the shared libraries of a simulator's plugins, are not relative to it.
     """
     for mesh in root.iter():
         name = mesh.get("filename") if mesh.tag in ("mesh", "texture") else None

@@ -43,7 +43,8 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     """
     sheet, notes = _read(spec, mechanism)
     digit_mm = MM[spec.unit] * resolution(measured(sheet.frame) / MM[spec.unit])
-    check_runs(sheet, digit_mm)
+    repeated = stale(sheet, digit_mm)
+    check_runs(sheet, repeated)
     if not check_commands(sheet):
         sheet.problems.refuse()
     check_speed(sheet)
@@ -66,7 +67,6 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
             "rigid motion that is left is fitted with the calibration"
         ]
     table, more = _table(sheet, mounted, registration, digit_mm)
-    repeated = stale(sheet, digit_mm)
     if len(repeated):
         table.loc[sheet.frame.index.isin(repeated.index), "status"] = "outlier"
         listed = ", ".join(map(str, repeated.index[:10])) + (", ..." if len(repeated) > 10 else "")
@@ -118,11 +118,12 @@ def _refuse_gross_error(
         gross, what = find_gross_error(sent, spec, mechanism), "the frame of the commanded positions lies"
     if gross is None:
         return
-    off = f"{gross.rms_mm:.3g} mm rms" if np.isfinite(gross.rms_mm) else "no pose at most of its rows"
-    value = f"the nominal robot is off by {off} however {what}"
-    allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm (probability above 0.99)"
-    columns = ", ".join(found[name] for name in mechanism.parts.columns)
-    problems.refuse_now(column=columns, value=value, allowed=allowed)
+    value = f"a nominal robot that is off by {gross.rms_mm:.3g} mm rms however {what}"
+    if not np.isfinite(gross.rms_mm):
+        value = "values at which the nominal robot has no pose in more than a tenth of the rows"
+    allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm rms (probability above 0.99)"
+    concerned = MEASURED if gross.of_readings else mechanism.parts.columns
+    problems.refuse_now(column=", ".join(found.get(name, name) for name in concerned), value=value, allowed=allowed)
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

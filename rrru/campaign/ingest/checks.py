@@ -77,11 +77,11 @@ def resolution(position):
     return next(digits, 1e-7)
 
 
-def check_runs(sheet, digit_mm):
-    """Note rows that do not make sense as runs; digit_mm: last digit of the file's positions."""
+def check_runs(sheet, repeated):
+    """Note rows that do not make sense as runs; repeated: the `stale` readings."""
     _check_repeats(sheet)
     _check_order(sheet)
-    _check_copies(sheet, digit_mm)
+    _check_copies(sheet, repeated)
     _check_counts(sheet)
     if "time_s" in sheet.frame:
         _check_time(sheet)
@@ -134,9 +134,8 @@ def stale(sheet, digit_mm):
     return first[(first != known.index) & (elsewhere | (digit_mm < _COARSE_MM))]
 
 
-def _check_copies(sheet, digit_mm):
-    """Note rows that repeat a measured position where there are many; a few are left out as stale."""
-    first = stale(sheet, digit_mm)
+def _check_copies(sheet, first):
+    """Note `stale` rows, with the first of each, where there are many; a few are left out."""
     if len(first) <= _MOST_STALE * len(sheet.frame):
         return
     for row, *measured in sheet.frame.loc[first.index, [*MEASURED]].itertuples():
@@ -153,7 +152,7 @@ def _check_counts(sheet):
     if len(sheet.frame) < needed:
         allowed = f"at least {needed}: three numbers per point for {parameters} parameters"
         sheet.note("too few points", None, f"{len(sheet.frame)} rows", allowed)
-    # a run that nobody numbered may be short
+    # a run that the file does not number may be short
     for number, size in sheet.frame.groupby("run").size().items() if "run" in sheet.found else ():
         if size < _LEAST_POINTS:
             allowed = f"at least {_LEAST_POINTS} points in a run"

@@ -5,7 +5,7 @@ every mistake that could be in it, the nominal robot is posed at the drive value
 closed form (`rrru.campaign.target_registration`), and the rms that is left is compared. A mistake is named where its
 posterior probability is above 0.99. The nominal robot's own errors have an unknown size, alike under all hypotheses, so
 that with k independent errors the likelihood of a residual rms r is proportional to r^-k (Jeffreys' prior on the
-size); numbers that a hypothesis fits besides cost half the logarithm of the readings each (Schwarz, Annals of
+size); further numbers that a hypothesis fits cost half the logarithm of the readings each (Schwarz, Annals of
 Statistics 6, 1978). Lengths in mm, angles in rad.
 """
 
@@ -79,6 +79,13 @@ class Mistakes:
         result[:, list(self.order)] = drive
         return result * self.signs
 
+    def after(self, first: "Mistakes") -> "Mistakes":
+        """Signs and order of both, where another one has been applied before."""
+        signs = [0] * len(self.signs)
+        for k, drive in enumerate(self.order):
+            signs[drive] = self.signs[drive] * first.signs[k]
+        return replace(self, signs=tuple(signs), order=tuple(self.order[k] for k in first.order))
+
     def further(self) -> Iterator["Mistakes"]:
         """All that are one mistake away."""
         count = len(self.signs)
@@ -103,6 +110,11 @@ class GrossError:
     rms_mm: float
     rms_without_mm: float
     advice: str
+
+    @property
+    def of_readings(self) -> bool:
+        """Whether the mistake is in what was measured alone, not in the drive values."""
+        return self.mistakes.order == tuple(sorted(self.mistakes.order)) and min(self.mistakes.signs) > 0
 
 
 def find_gross_error(frame: pd.DataFrame, spec: IngestSpec, robot: Robot) -> GrossError | None:
@@ -132,7 +144,7 @@ def find_gross_error(frame: pd.DataFrame, spec: IngestSpec, robot: Robot) -> Gro
             break
         best = ahead
         if best.rms_mm <= _ORDINARY_SHARE * robot.size_mm:
-            # what is left is no mistake
+            # the remainder is no mistake
             break
     scores = np.array([one.log_evidence for one in tried.values()])
     certain = np.exp(best.log_evidence - logsumexp(scores)) > _CERTAIN
@@ -155,7 +167,8 @@ class _Hypothesis:
 class _File:
     """Drive values (n, K), measured positions (n, 3), runs (n,), and each row's target (n,).
 
-    names, place_mm (k, 3): of the targets, NaN where no place is stated; chosen: rows that decide.
+    names, place_mm (k, 3): of the targets, NaN where no place is stated; chosen: rows that decide;
+    configured: signs and order that the configuration states and that the drive values have already.
     """
 
     robot: Robot
@@ -166,6 +179,7 @@ class _File:
     names: tuple[str, ...]
     place_mm: np.ndarray
     chosen: np.ndarray
+    configured: Mistakes
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -193,7 +207,10 @@ class _File:
         chosen = np.flatnonzero(right)
         if len(chosen) > _MOST_ROWS:
             chosen = np.sort(np.random.default_rng(0).choice(chosen, _MOST_ROWS, replace=False))
-        return cls(robot, drive, measured, labels, number, tuple(known.tolist()), place, chosen)
+        drives = [*robot.parts.columns]
+        order = tuple(drives.index(name) for name in spec.order or drives)
+        configured = Mistakes(tuple(spec.signs.get(name, 1) for name in drives), order)
+        return cls(robot, drive, measured, labels, number, tuple(known.tolist()), place, chosen, configured)
 
     def hypothesis(self, mistakes: Mistakes, robust: bool = True) -> _Hypothesis:
         """The _Hypothesis of some mistakes; of an endless rms where the nominal robot has no poses then.
@@ -251,10 +268,13 @@ class _File:
     def advice(self, found: _Hypothesis) -> str:
         """What to write into the configuration or to mend in the file."""
         mistakes, drives, texts = found.mistakes, self.robot.parts.columns, []
-        if mistakes.order != tuple(sorted(mistakes.order)):
-            texts.append(f"order: [{', '.join(drives[k] for k in mistakes.order)}]")
-        if turned := [drives[k] for k, sign in enumerate(mistakes.signs) if sign < 0]:
-            texts.append(f"signs: {{{', '.join(f'{name}: -1' for name in turned)}}}")
+        whole = mistakes.after(self.configured)
+        if whole.order != self.configured.order:
+            named = f"order: [{', '.join(drives[k] for k in whole.order)}]"
+            texts.append(named if whole.order != tuple(sorted(whole.order)) else "no `order`")
+        if whole.signs != self.configured.signs:
+            turned = [f"{drives[k]}: -1" for k, sign in enumerate(whole.signs) if sign < 0]
+            texts.append(f"signs: {{{', '.join(turned)}}}" if turned else "no `signs`")
         if mistakes.shift:
             side, count = ("late", mistakes.shift) if mistakes.shift > 0 else ("early", -mistakes.shift)
             texts.append(f"measured columns that are not {count} row{'s' * (count > 1)} {side}")
@@ -262,7 +282,8 @@ class _File:
             named = [name for name in self.names if name]
             places = ", ".join(
                 f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]"
-                for name, place in zip(self.names, found.place_mm, strict=True)
+                for name, place, stated in zip(self.names, found.place_mm, self.place_mm, strict=True)
+                if np.isfinite(stated).all()
             )
             texts.append(f"targets: {{{places}}}" if named else f"a tool at {position_text(found.place_mm[0])}")
         if mistakes.mirrored:

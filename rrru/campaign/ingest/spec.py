@@ -34,7 +34,7 @@ class IngestSpec:
     that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
     with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
     day in `time_s`. signs: drive -> -1 where the file counts its values the other way round; order: names of the drives
-    in the order in which the file's columns stand for them, none for the robot's own.
+    to which the file's columns of drive values belong, in their order, none for the robot's own order.
     """
 
     path: str

@@ -123,6 +123,29 @@ def test_what_the_message_says_mends_the_file(tmp_path):
     np.testing.assert_allclose(table[drives], frame[drives])
 
 
+def test_what_to_write_replaces_what_the_configuration_states(tmp_path):
+    """A right file with a sign or an exchange stated that it does not have, and a file that needs one more sign."""
+    robot, frame = _made(3)
+    drives = [*robot.parts.columns]
+    path = tmp_path / "file.csv"
+    frame.to_csv(path, index=False)
+    spec = replace(_SPEC, path=str(path))
+    with pytest.raises(IngestError, match="allowed: no `signs`, which leaves"):
+        ingest(replace(spec, signs={drives[1]: -1}), robot)
+    exchanged = (drives[1], drives[0], *drives[2:])
+    with pytest.raises(IngestError, match="allowed: no `order`, which leaves"):
+        ingest(replace(spec, order=exchanged), robot)
+    frame.assign(**{drives[1]: -frame[drives[1]], drives[4]: -frame[drives[4]]}).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(spec, signs={drives[1]: -1}), robot)
+    assert f"allowed: signs: {{{drives[1]}: -1, {drives[4]}: -1}}, which leaves" in str(refused.value)
+    # what is advised for exchanged columns of which one is counted in the opposite direction, too
+    order, turned = Mistakes((1, 1, 1), (1, 0, 2)), Mistakes((-1, 1, 1), (0, 1, 2))
+    drive = np.arange(6.0).reshape(2, 3)
+    for first, second in ((order, turned), (turned, order)):
+        np.testing.assert_array_equal(second.after(first).applied(drive), second.applied(first.applied(drive)))
+
+
 @pytest.mark.parametrize(
     ("wrong", "text"),
     [
