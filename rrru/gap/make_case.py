@@ -72,8 +72,11 @@ def _tested(library, motion, used, told):
             untestable[name] = "the calibration's own parameters take it up"
             continue
         if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
-            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
-            continue
+            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * told) if effect.coarser else None
+            if coarser is None:
+                untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
+                continue
+            effect = coarser
         lacking = _lacking(effect, motion, used)
         if lacking:
             untestable[name] = lacking

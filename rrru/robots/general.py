@@ -203,6 +203,12 @@ class GeneralRobot(Robot):
             return bar_lengths(self.legs, self.drive_range, place, twists)
         return drives_from_home(self, (position, wanted), twists, deviations is not None)
 
+    @property
+    def strokes(self):
+        """Widths (K,) of the drives' ranges, NaN where none is stated."""
+        stated = [column not in self.assumed for column in self.parts.columns]
+        return np.where(stated, np.ptp(np.asarray(self.drive_range, dtype=float), axis=1), np.nan)
+
     def in_range(self, actuators):
         """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""
         return in_range(self, np.asarray(actuators, dtype=float))

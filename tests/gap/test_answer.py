@@ -10,7 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrru.effects.library import BY_NAME_ONLY, NAMES, summary
+from rrru.effects.library import NAMES, summary
 from rrru.gap import answer
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 from rrru.robots.catalogue import make_mechanism
@@ -134,7 +134,7 @@ def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
     assert "Parts of it could be: drive compliance." in unknown
 
 
-@pytest.mark.parametrize("name", [*NAMES, *BY_NAME_ONLY])
+@pytest.mark.parametrize("name", NAMES)
 def test_every_effect_of_the_library_is_told_in_a_few_words(name):
     words = summary(name)
     assert 20 < len(words) < 130 and "\n" not in words and not words.endswith(".")
