@@ -160,6 +160,8 @@ def _table(
         told |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
     if mounted:
         told |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
+    if sheet.spec.motion:
+        told |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**told, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         places = frame.loc[outlier, ["run", "point"]].to_numpy()
@@ -167,7 +169,7 @@ def _table(
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
+    optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on", "motion", "motion_between")
     extra = [name for name in optional if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes
