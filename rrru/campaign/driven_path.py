@@ -20,6 +20,9 @@ _MOST_TURNS = 0.5
 _CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
+# ASSUME a robot that rests at each reading and moves by less than this, in mm and rad, has not moved: its drive values
+# are read back at each reading, with some noise
+_STILL_MM, _STILL_RAD = 0.05, 1e-4
 
 
 def driven_path(measurements, degree=DEGREE):
@@ -64,10 +67,14 @@ def stops(measurements):
 
     Rows at one command are one stop, too, where the campaign states that the robot rests at each reading.
     """
-    if "target" not in measurements and not rests(measurements):
+    at_rest = rests(measurements)
+    if "target" not in measurements and not at_rest:
         return np.arange(len(measurements))
-    told = measurements[["run", *(name for name in measurements if name.startswith("command_"))]].to_numpy(dtype=float)
-    return np.cumsum(np.concatenate([[False], (np.nan_to_num(told[1:]) != np.nan_to_num(told[:-1])).any(axis=1)]))
+    names = [name for name in measurements if name.startswith("command_")]
+    still = np.array([_STILL_MM if name.endswith("_mm") else _STILL_RAD for name in names]) if at_rest else 0.0
+    told, run = np.nan_to_num(measurements[names].to_numpy(dtype=float)), measurements["run"].to_numpy()
+    moved = (np.abs(np.diff(told, axis=0)) > still).any(axis=1) | (np.diff(run) != 0)
+    return np.cumsum(np.concatenate([[False], moved]))
 
 
 def _path_through(measurements, degree):

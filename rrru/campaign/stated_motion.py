@@ -9,7 +9,7 @@ import pandas as pd
 from rrru.errors import ConfigError
 
 STOP_AND_GO, CONTINUOUS = "stop_and_go", "continuous"
-# paths between stops: straight line of the tool, its orientation turning about one axis (LIN); joint interpolation (PTP)
+# what is straight from stop to stop: the tool's path, its orientation turning about one axis (LIN), or the drives (PTP)
 TOOL, DRIVES = "tool", "drives"
 KINDS, BETWEEN = (STOP_AND_GO, CONTINUOUS), (TOOL, DRIVES)
 

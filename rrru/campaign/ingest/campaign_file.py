@@ -139,6 +139,8 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
         upright = sheet.mechanism.orients and not set(TURNS["command"]) <= set(frame)
         held = "; nor orientations: it is taken to be turned as at home all the time" if upright else ""
         notes.append(f"no {sheet.drive_name}: {names} computed from the commanded positions ({which}){held}")
+    if sheet.spec.motion:
+        notes.append(f"motion: {sheet.spec.motion.words}, as stated")
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")
     return notes
@@ -169,7 +171,7 @@ def _table(
         more = ", ..." if len(places) > 10 else ""
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
-    optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on", "motion", "motion_between")
-    extra = [name for name in optional if name in frame]
+    optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
+    extra = [name for name in (*optional, "motion", "motion_between") if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes

@@ -35,8 +35,8 @@ class IngestSpec:
     that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
     with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
     day in `time_s`. signs: drive -> -1 where the file counts its values the other way round; order: names of the drives
-    to which the file's columns of drive values belong, in their order, none for the robot's own order. motion: how the robot moved
-    between the rows, None where nobody states it.
+    to which the file's columns of drive values belong, in their order, none for the robot's own order. motion: how the
+    robot moved between the rows, None where nobody states it.
     """
 
     path: str

@@ -21,7 +21,7 @@ _SHOWN = 8
 _REMEDIES = {
     "time_s": "a column time_s, in seconds or times of day",
     "drive_rate": "a column time_s on runs along a path",
-    "last_move": "points that are stops at poses in no order",
+    "last_move": "`motion: stop_and_go` of a robot that rests at each reading",
 }
 
 
