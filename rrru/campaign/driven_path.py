@@ -22,7 +22,7 @@ _CORNER, _STRAIGHT = 0.2, 0.02
 _SLOWER = 0.9
 # ASSUME a robot that rests at each reading and moves by less than this, in mm and rad, has not moved: its drive values
 # are read back at each reading, with some noise
-_STILL_MM, _STILL_RAD = 0.05, 1e-4
+_STILL_MM, _STILL_RAD = 0.05, 5e-4
 
 
 def driven_path(measurements, degree=DEGREE):

@@ -101,7 +101,7 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
-    frame, more = number_runs(frame)
+    frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
 
