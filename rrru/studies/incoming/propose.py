@@ -18,7 +18,7 @@ from rrru.campaign.ingest.guess import guess_clock, guess_columns, guess_format,
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
-from rrru.campaign.stated_motion import STOP_AND_GO, StatedMotion
+from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import IngestError, RrruError
 from rrru.robots.robot import Robot
 from rrru.studies import config as parts
@@ -59,10 +59,8 @@ def _with_motion(found):
     table = found.result.measurements
     if not (np.bincount(stops(table)) > 1).any() and passes_points(table):
         return found
-    table = table.assign(**StatedMotion(STOP_AND_GO).columns())
-    return replace(
-        found, section=found.section | {"motion": STOP_AND_GO}, result=replace(found.result, measurements=table)
-    )
+    section = found.section | {"motion": STOP_AND_GO}
+    return replace(found, section=section, result=ingest(IngestSpec.from_config(section), found.mechanism))
 
 
 def fitting_robots(section, config):
