@@ -15,8 +15,8 @@ from rrru.robots.drive_step import drives_at
 # points of a way, closer to each other near its ends: what a drive turns back by just before a stop is its last stretch
 _STEPS = 16
 _SHARES = 0.5 * (1.0 - np.cos(np.pi * np.arange(_STEPS + 1) / _STEPS))
-# shares of a sense of arrival that differ by less are the same
-_SAME = 1e-6
+# senses of arrival that differ by less are the same: a long drive's value is rounded to some 1e-5 of what is no motion
+_SAME = 0.01
 
 
 def paths_between_stops(mechanism, drive, position_mm, between):
