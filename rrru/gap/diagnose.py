@@ -9,7 +9,6 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
-from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
 from rrru.gap.bias import bias_notes
@@ -20,7 +19,7 @@ from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.result_notes import fit_notes, noise_notes, weight_notes
+from rrru.gap.result_notes import fit_notes, noise_notes, weight_doubts, weight_notes, zero_notes
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
@@ -106,9 +105,10 @@ def diagnose(
 def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
     """What the data lack for a better answer, what they contradict, and what a user has to know of the robot."""
     case = attribution.case
-    yield from mastering_notes(attribution.state, case.mechanism, attribution.fit.geometry_errors)
+    yield from zero_notes(attribution.fit.estimate, case.mechanism)
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
+    yield from weight_doubts(attribution)
     yield from fit_notes(attribution)
     if case.count < OPTIONS.min_used_share * len(case.used):
         which = "not measured, out of reach, near singularities, held out or outliers"

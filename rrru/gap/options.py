@@ -184,6 +184,13 @@ class DiagnosisOptions:
     # --- notes and text of the answer ---
     # standard errors from which on a note says that payload or tilt differ from the stated ones; the usual 3 sigma
     min_nuisance_z: float = 3.0
+    # the same of a drive's zero; assumed, a false note has somebody master a robot that needs it not
+    min_zero_z: float = 4.0
+    # a number most of whose variance comes from the priors is not determined by the readings
+    max_prior_variance_share: float = 0.5
+    # how far the instrument's frame, a tool or a target may be off its stated place; assumed
+    outside_error_mm: float = 10.0
+    outside_error_rad: float = 0.03
     # rows of the table of sets; assumed
     max_listed_sets: int = 20
     # a function of the discrepancy is named where it is more probable than not
