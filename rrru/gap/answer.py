@@ -17,6 +17,10 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", 
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+_CHECK = (
+    "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
+    "robot: make check-data FILE=... names what reconciles them."
+)
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -44,6 +48,7 @@ def answer(campaign, verdict, tables, drives=()):
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
         **_row(verdict, ("points", "dropped_points")),
         "notes": [note for note in verdict["notes"].split("; ") if note],
+        "no_answer": verdict["no_answer"],
     }
     return facts | {"sentences": sentences(facts)}
 
@@ -54,7 +59,9 @@ def arm_drives(robot):
 
 
 def sentences(facts):
-    """What the facts say, in sentences for somebody who knows the robot and no statistics."""
+    """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
+    if facts["no_answer"]:
+        return [_no_answer(facts), _CHECK]
     said = [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
     return [*said, *_open(facts), _next(facts)]
@@ -123,6 +130,11 @@ def _place(number, drives):
     if not drives:
         return f"in leg {number}"
     return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
+
+
+def _no_answer(facts):
+    """Why nothing is said of causes."""
+    return f"No cause is named: {facts['no_answer']}."
 
 
 def _missed(facts):

@@ -35,6 +35,8 @@ def write_corrected(diagnosis, section, masses, file):
     file, attribution = Path(file), diagnosis.attribution
     shrink, why = diagnosis.tables["gap_shrink"], ""
     try:
+        if why_not := diagnosis.verdict["no_answer"]:
+            raise ConfigError(why_not)
         written = corrected(attribution, section, file.resolve().parent)
         write_text(written.text, file)
         more, why = gap_rows(attribution, written, section, file, shrink)

@@ -131,6 +131,9 @@ class DiagnosisOptions:
     min_share_with_unexplained: float = 0.5
     # something unexplained is more probable than not
     min_unexplained_probability: float = 0.5
+    # a best answer that leaves so many times the noise is not of the robot that was measured: an arm without an effect
+    # for its worst cause leaves ten or twenty times, exchanged drives or a wrong tool thousands of times; assumed
+    max_left_per_noise: float = 100.0
     # a verdict of this probability needs no further run; one of less has rivals even where none is named; assumed
     min_sure_probability: float = 0.9
 

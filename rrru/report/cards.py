@@ -76,7 +76,7 @@ def card(facts, source="", found=None, models=()):
         following,
         facts["notes"],
         list(models),
-        _parts(facts["budget"]),
+        [] if facts["no_answer"] else _parts(facts["budget"]),
         _steps(facts),
     )
 
@@ -84,6 +84,8 @@ def card(facts, source="", found=None, models=()):
 def _short(facts):
     """The answer in a line: causes with their shares, how sure, and what is next."""
     named = [(readable(effect["name"]), effect["share"]) for effect in facts["effects"]]
+    if facts["no_answer"]:
+        return f"No cause is named: {facts['no_answer']}."
     if facts["unexplained"]:
         share = next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained")
         named.append(("something unexplained", share))
