@@ -21,6 +21,8 @@ _CHECK = (
     "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
     "robot: make check-data FILE=... names what reconciles them."
 )
+# first words of what no file holds where none was written
+NOT_CORRECTED = "not corrected: "
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -49,8 +51,22 @@ def answer(campaign, verdict, tables, drives=()):
         **_row(verdict, ("points", "dropped_points")),
         "notes": [note for note in verdict["notes"].split("; ") if note],
         "no_answer": verdict["no_answer"],
+        "corrected_file": _corrected_file(verdict),
     }
     return facts | {"sentences": sentences(facts)}
+
+
+def _corrected_file(verdict):
+    """What the robot's corrected file is worth; None where the robot has no file."""
+    known = np.isfinite(verdict["file_error_mm"])
+    if not (known or verdict["not_in_model"]):
+        return None
+    return {
+        **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
+        "remainder": verdict["file_remainder"],
+        "headline": verdict["file_headline"],
+        "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
+    }
 
 
 def arm_drives(robot):
@@ -62,7 +78,9 @@ def sentences(facts):
     """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
     if facts["no_answer"]:
         return [_no_answer(facts), _CHECK]
-    said = [_missed(facts), *_causes(facts), *_scatter(facts)]
+    file = facts["corrected_file"] or {"headline": ""}
+    said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
+    said += [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
     return [*said, *_open(facts), _next(facts)]
 

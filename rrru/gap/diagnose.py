@@ -162,6 +162,10 @@ def _row(
         "notes": "; ".join([*([] if verdict.no_answer else _found(attribution)), *_notes(attribution, stated_mm)]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
+        "file_error_mm": np.nan,
+        "file_error_fresh_mm": np.nan,
+        "file_remainder": "",
+        "file_headline": "",
     }
 
 

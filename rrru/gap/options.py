@@ -272,6 +272,8 @@ class DiagnosisOptions:
     # --- corrected files ---
     # a corrected file that leaves more than so many times what the diagnosis leaves gets a note
     max_file_remainder_ratio: float = 1.1
+    # poses at which a corrected file is compared with the diagnosis beside the measured ones: their rms is good to 5 %
+    fresh_poses: int = 200
     # lines of the grid along each axis; assumed
     drive_table_grid_lines: int = 7
     # a grid point has a measured point within so many steps of the grid: no extrapolation
