@@ -17,6 +17,12 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", 
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+_CHECK = (
+    "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
+    "robot: make check-data FILE=... names what reconciles them."
+)
+# first words of what no file holds where none was written
+NOT_CORRECTED = "not corrected: "
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -44,8 +50,23 @@ def answer(campaign, verdict, tables, drives=()):
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
         **_row(verdict, ("points", "dropped_points")),
         "notes": [note for note in verdict["notes"].split("; ") if note],
+        "no_answer": verdict["no_answer"],
+        "corrected_file": _corrected_file(verdict),
     }
     return facts | {"sentences": sentences(facts)}
+
+
+def _corrected_file(verdict):
+    """What the robot's corrected file is worth; None where the robot has no file."""
+    known = np.isfinite(verdict["file_error_mm"])
+    if not (known or verdict["not_in_model"]):
+        return None
+    return {
+        **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
+        "remainder": verdict["file_remainder"],
+        "headline": verdict["file_headline"],
+        "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
+    }
 
 
 def arm_drives(robot):
@@ -54,8 +75,12 @@ def arm_drives(robot):
 
 
 def sentences(facts):
-    """What the facts say, in sentences for somebody who knows the robot and no statistics."""
-    said = [_missed(facts), *_causes(facts), *_scatter(facts)]
+    """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
+    if facts["no_answer"]:
+        return [_no_answer(facts), _CHECK]
+    file = facts["corrected_file"] or {"headline": ""}
+    said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
+    said += [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
     return [*said, *_open(facts), _next(facts)]
 
@@ -123,6 +148,11 @@ def _place(number, drives):
     if not drives:
         return f"in leg {number}"
     return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
+
+
+def _no_answer(facts):
+    """Why nothing is said of causes."""
+    return f"No cause is named: {facts['no_answer']}."
 
 
 def _missed(facts):

@@ -12,7 +12,7 @@ _NONE = (frozenset(), False)
 class Verdict:
     """effects: names in order of share, () for none; unexplained: something is left that no effect explains;
     probability of both together; leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the
-    data leave open, each (names, unexplained, probability).
+    data leave open, each (names, unexplained, probability); no_answer: why the fit allows none, else empty.
     """
 
     effects: tuple
@@ -20,6 +20,7 @@ class Verdict:
     probability: float
     leg: int
     rivals: tuple
+    no_answer: str = ""
 
     @property
     def label(self):
@@ -38,6 +39,11 @@ class Verdict:
                 others.append("none")
             names.extend(name for name in others if name not in names)
         return tuple(names)
+
+
+def without_answer(why):
+    """The Verdict on a fit that describes its readings too badly for any answer, see `rrru.gap.validity`."""
+    return Verdict((), True, 1.0, 0, (), why)
 
 
 def label(effects, unexplained):

@@ -107,6 +107,13 @@ class Robot(ABC):
         """By number that is no parameter in words what stands for it; none of a fixed set."""
         return {}
 
+    def imitated_outside(self, name):
+        """Candidates outside the robot that are no parameters since a parameter imitates them, and its size for a unit.
+
+        None of a fixed set.
+        """
+        return ()
+
     @property
     def offered(self):
         """Which components (sites, 6) of constant twists its parameters are chosen from; none of a fixed set."""

@@ -46,6 +46,7 @@ def _verdict(studied: Studied) -> dict:
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
     notes = (
+        f"no cause is named: {found['no_answer']}" if found["no_answer"] else "",
         found["notes"],
         _waves(studied),
         _far(studied),
@@ -78,7 +79,7 @@ def _found(studied: Studied) -> Mapping[str, Any]:
     """The verdict of the diagnosis; without one what a series has that nobody has diagnosed."""
     if studied.diagnosis:
         return studied.diagnosis.verdict
-    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes"), "")
+    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes", "no_answer"), "")
     return defaultdict(lambda: np.nan, texts, effects=UNDIAGNOSED, points=studied.plain.count, dropped_points=0)
 
 
