@@ -14,7 +14,6 @@ _AFTER = {"color": style.BLUE, "marker": "s"}
 _NOISE = style.TOLERANCE
 # rows that stand below the library's effects
 _APART = ("none", "unexplained")
-_LEGS = {"each": "each leg", "same": "all legs alike", "": ""}
 _NOTHING = {"none": "nothing to add", "unexplained": "nothing in the library to add"}
 # characters in a line of the headline, its height, and the height of a row of bars
 _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
@@ -43,13 +42,14 @@ def gap(tables, options):
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
         frames[name] = choose.of_campaign(tables, name, campaign, "gap")
     verdict, causes, shrink = frames["gap_verdicts"].iloc[0], _ordered(frames["gap_attribute"]), frames["gap_shrink"]
-    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, options["drives"])
+    words = {"drives": options["drives"], "noun": options["drive_noun"]}
+    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, words)
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
     gap_budget.draw(panels["budget"], frames["gap_budget"])
     _map(figure, panels, used, verdict, options["z_down"], "(a) ")
-    _causes(panels["causes"], causes, verdict, options["drives"])
+    _causes(panels["causes"], causes, verdict, words)
     _shrink(panels["shrink"], shrink, verdict)
     _along(panels["along"], points, verdict)
     gap_arrows.fit(figure, panels, used)
@@ -113,9 +113,9 @@ def _page(lines, causes, trajectories, used):
     return figure, panels
 
 
-def _headline(verdict, drives):
+def _headline(verdict, words):
     """Lines of the verdict itself, and of what is to be known and done about it."""
-    name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), drives)}" if verdict["leg"] else "")
+    name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else "")
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
     sure = _probability(verdict["probability"], "= ", " ")
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
@@ -144,22 +144,22 @@ def _ordered(causes):
     return causes.assign(apart=apart).sort_values(["apart", "probability", "effect"], ascending=[True, False, True])
 
 
-def _leg(legs, drives):
-    """Legs of an effect in words; drives: names of an arm's drives, none of other robots."""
-    words = _LEGS.get(legs, f"leg {legs}")
-    if not drives:
-        return words
-    return drives[int(legs) - 1] if legs.isdigit() and int(legs) <= len(drives) else words.replace("leg", "drive")
+def _leg(legs, drives, noun):
+    """Legs of an effect in words; drives: names of the robot's drives; noun: the word for one of them."""
+    words = {"each": f"each {noun}", "same": f"all {noun}s alike", "": ""}
+    if legs in words:
+        return words[legs]
+    return drives[int(legs) - 1] if int(legs) <= len(drives) else f"{noun} {legs}"
 
 
-def _causes(axes, causes, verdict, drives):
+def _causes(axes, causes, verdict, words):
     """Probability of every effect; those of the verdict in colour, with their legs."""
     rows = np.arange(len(causes)) + 0.5 * causes["apart"].to_numpy()
     chosen = causes["effect"].isin(verdict["effects"].split("+")).to_numpy()
     value = causes["probability"].to_numpy()
     axes.barh(rows, value, height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
-        probability, legs = cause["probability"], _leg(cause["legs"], drives)
+        probability, legs = cause["probability"], _leg(cause["legs"], **words)
         text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
         if not (cause["apart"] or np.isfinite(cause["log_evidence"])):
             text = "not tested"

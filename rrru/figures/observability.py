@@ -30,7 +30,7 @@ def observability(tables, options):
         weights.set_ylabel("" if place % 2 else "direction, best seen first")
         _errors(errors, part, limits)
     bar = figure.colorbar(image, ax=figure.axes, location="top", fraction=0.03, aspect=50, shrink=0.6)
-    bar.set_label("size of the weight in the unit direction (angles as arcs at the end of the drive arm)")
+    bar.set_label("size of the weight in the unit direction (angles as arcs at the robot's own length)")
     return figure
 
 

@@ -5,9 +5,10 @@
 
 import numpy as np
 
-from rrru.effects.library import summary
+from rrru.effects.causes import cause_texts
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
+from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
 _VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
@@ -17,14 +18,15 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", 
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+_WORDS = DriveWords()
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
-def answer(campaign, verdict, tables, drives=()):
+def answer(campaign, verdict, tables, drives=_WORDS):
     """The facts of one campaign as a mapping, which `rrru.store.facts` writes.
 
     verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
-    drives: names of an arm's drives, see `arm_drives`.
+    drives: the robot's DriveWords.
     """
     budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
     budget = [part | {"probability": _clipped(part["probability"])} for part in budget]
@@ -48,11 +50,6 @@ def answer(campaign, verdict, tables, drives=()):
     return facts | {"sentences": sentences(facts)}
 
 
-def arm_drives(robot):
-    """Names of the drives of an arm, whose effects act drive by drive; none for robots that have them leg by leg."""
-    return tuple(drive.site for drive in robot.parts.drives) if robot.legs.arm_joints else ()
-
-
 def sentences(facts):
     """What the facts say, in sentences for somebody who knows the robot and no statistics."""
     said = [_missed(facts), *_causes(facts), *_scatter(facts)]
@@ -73,12 +70,16 @@ def rounded(value, digits=2):
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def with_error(value, error):
-    """A number and its standard error, both to the error's digits: one, two where it begins with 1."""
-    exponent = int(np.floor(np.log10(error)))
-    places = -exponent + (error < 2.0 * 10.0**exponent)
-    value, error = round(value, places), round(error, places)
-    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f}"
+def with_interval(value, low, high, unit=""):
+    """A number with its 95 % interval, all to two digits of the interval's half width.
+
+    >>> with_interval(0.12014, 0.11902, 0.12126, "mm")
+    '0.1201 mm (95 %: 0.1190 to 0.1213)'
+    """
+    places = 1 - int(np.floor(np.log10(0.5 * (high - low))))
+    # a rounded number below zero that is zero has no sign
+    value, low, high = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
+    return f"{value}{' ' if unit else ''}{unit} (95 %: {low} to {high})"
 
 
 def probability(value):
@@ -107,22 +108,16 @@ def _effect(name, tables, budget, drives):
     cause = tables["gap_attribute"].set_index("effect").loc[name]
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
+    one = (int(legs),) if legs.isdigit() else ()
     return {
         "name": name,
-        "meaning": summary(name),
+        **vars(cause_texts(name, drives, one)),
         "probability": _clipped(cause["probability"]),
         "legs": legs,
-        "place": _place(int(legs), drives) if legs.isdigit() else "",
+        "place": drives.place(*one) if one else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
     }
-
-
-def _place(number, drives):
-    """Where an effect of one leg or drive, by number from 1 on, acts, in words."""
-    if not drives:
-        return f"in leg {number}"
-    return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
 
 
 def _missed(facts):
@@ -146,7 +141,7 @@ def _causes(facts):
     elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
-        share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
+        share = _share(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
             said.append(f"Beside that {share} is systematic and like no effect of the library.")
         else:
@@ -169,22 +164,28 @@ def _cause(effect, follow, told):
     """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{percent(effect['share'])}{follow} is" if told else f"{rounded(effect['rms_mm'])} mm is"
+        share = f"{_share(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
-    size = f" ({listed})" if sizes else ""
+    size = f", {listed}" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
     return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
 
 
+def _share(part, follow=""):
+    """The share of a part of the budget, or of an effect, with its 95 % interval."""
+    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
+
+
 def _sizes(parameters):
-    """Numbers that were fitted with their errors, those that are one number under several names once."""
+    """Numbers that were fitted with their 95 % intervals, those that are one number under several names once."""
     by_size = {}
     for one in parameters:
         if np.isfinite(one["standard_error"] or np.nan):
-            unit = "" if one["unit"] == "1" else f" {one['unit']}"
-            by_size.setdefault(with_error(one["value"], one["standard_error"]) + unit, []).append(one["parameter"])
+            unit = "" if one["unit"] == "1" else one["unit"]
+            size = with_interval(one["value"], one["low_95"], one["high_95"], unit)
+            by_size.setdefault(size, []).append(one["parameter"])
     return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
 
 

@@ -12,7 +12,7 @@ from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import shrink_table
-from rrru.gap.terms import sites, spread
+from rrru.gap.terms import per_leg, sites, spread
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 from rrru.gap.weight import WEIGHT
@@ -71,7 +71,7 @@ def _effect_row(attribution, name):
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - attribution.evidence.on_library().none.max())
-    if legs := beliefs.legs(name):
+    if per_leg(attribution.case.library[name]) and (legs := beliefs.legs(name)):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:

@@ -37,9 +37,19 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Advice:
+    """What to inspect on the machine for one cause and what to do about it, with the source."""
+
+    cause: str
+    inspect: str
+    remedy: str
+    source: str
+
+
+@dataclass(frozen=True)
 class Card:
-    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead
-    sentence, the others, what is next, notes, links to corrected files of the robot, and parts and steps of the bars.
+    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead sentence, the others,
+    Advice on each cause, what is next, notes, links to corrected files of the robot, and parts and steps of the bars.
     """
 
     campaign: str
@@ -50,6 +60,7 @@ class Card:
     noise: str
     lead: str
     sentences: list
+    advice: list
     next: str
     notes: list
     models: list
@@ -73,6 +84,7 @@ def card(facts, source="", found=None, models=()):
         rounded(facts["noise_rms_mm"]),
         lead,
         others,
+        _advice(facts["effects"]),
         following,
         facts["notes"],
         list(models),
@@ -90,6 +102,17 @@ def _short(facts):
     causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
+
+
+def _advice(effects):
+    """Advice on the named causes that are the library's."""
+    return [
+        Advice(
+            f"{readable(one['name']).capitalize()} {one['place']}".strip(), one["inspect"], one["remedy"], one["source"]
+        )
+        for one in effects
+        if one["inspect"]
+    ]
 
 
 def _parts(budget):

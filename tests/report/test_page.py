@@ -3,6 +3,7 @@
 import shutil
 
 import pytest
+from markupsafe import escape
 
 from rrru.figures import style
 from rrru.report import page
@@ -56,6 +57,13 @@ def test_the_corrected_file_of_a_robot_is_linked_from_where_the_page_lies(folder
 
 def test_texts_of_files_are_texts_on_the_page(folder):
     assert "a &lt;b&gt; &amp; c" in written(folder)
+
+
+def test_each_cause_says_what_to_inspect_and_what_to_do_with_its_source(folder):
+    text = written(folder)
+    for cause in answered()["effects"]:
+        assert all(str(escape(cause[part])) in text for part in ("inspect", "remedy", "source"))
+    assert "<dt>Link flexure in leg 2</dt>" in text
 
 
 def test_a_folder_without_a_diagnosis_says_what_to_run(tmp_path):
