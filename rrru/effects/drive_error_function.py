@@ -47,7 +47,7 @@ def for_robot(robot):
     ]
     none = np.zeros(len(parameters), dtype=int)
     coordinates = Coordinates(spectra[0], none, none > 0, lambda values, _: values, spectra=tuple(spectra), broad=True)
-    return Effect("drive_error_function", parameters, coordinates, _err, along_drives=_functions)
+    return Effect("drive_error_function", parameters, coordinates, _err, along_drives=_functions, of_drive_value=True)
 
 
 def _functions(motion):

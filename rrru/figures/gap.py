@@ -190,7 +190,7 @@ def _shrink(axes, shrink, verdict):
         axes.secondary_yaxis("right").set_yticks(place, [_share(row) for _, row in last.reindex(names).iterrows()])
         above = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "fontsize": 7.0, "in_layout": False}
         axes.text(1.05, 1.035, "closed (95 %)", **above)
-    axes.set_yticks(place, ["all" if name == "*" else choose.trajectory_label(name) for name in names])
+    axes.set_yticks(place, ["all" if name == "*" else choose.plain(name) for name in names])
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
     axes.set(xlim=(0.0, most), ylim=(len(names) - 0.5, -0.5))
     axes.set(xlabel=f"{_KINDS[kind]} gap, rms (mm)", ylabel="trajectory")
@@ -205,7 +205,7 @@ def _along(axes, points, verdict):
     middles, labels = [], []
     runs = list(points.groupby("run", sort=False))
     for number, (run, rows) in enumerate(runs):
-        at, trajectory = rows.index.to_numpy(), choose.trajectory_label(rows["trajectory"].iloc[0])
+        at, trajectory = rows.index.to_numpy(), choose.plain(rows["trajectory"].iloc[0])
         middles.append(at.mean())
         labels.append(f"{run}\n{trajectory}" if len(runs) <= _NAMED_RUNS else f"{run}")
         if number % 2:

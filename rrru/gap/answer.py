@@ -14,6 +14,7 @@ SCHEMA = 1
 _VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
 _NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
 _PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
+_WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
 _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
@@ -45,6 +46,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "budget": budget,
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
         **_row(verdict, ("points", "dropped_points")),
+        "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
         "notes": [note for note in verdict["notes"].split("; ") if note],
     }
     return facts | {"sentences": sentences(facts)}
@@ -108,6 +110,7 @@ def _effect(name, tables, budget, drives):
     cause = tables["gap_attribute"].set_index("effect").loc[name]
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
+    places = tables["gap_drive_functions"].query("effect == @name and worst")
     one = (int(legs),) if legs.isdigit() else ()
     return {
         "name": name,
@@ -117,6 +120,7 @@ def _effect(name, tables, budget, drives):
         "place": drives.place(*one) if one else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
+        "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
     }
 
 
@@ -170,7 +174,18 @@ def _cause(effect, follow, told):
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
     size = f", {listed}" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
+    return f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
+
+
+def _worst(places):
+    """Where the drive errs most of those whose errors have the unit of the largest; empty without places."""
+    if not places:
+        return ""
+    one = max(places, key=lambda place: (place["unit"] == places[0]["unit"], abs(place["error"])))
+    turning = one["unit"] == "rad"
+    at = f"{np.degrees(one['drive_value']):.1f} degrees" if turning else f"{one['drive_value']:.1f} mm"
+    size = with_interval(one["error"], one["low_95"], one["high_95"], one["unit"])
+    return f" It is largest for {one['name']} at {at}: {size} off its mean."
 
 
 def _share(part, follow=""):

@@ -16,6 +16,8 @@ from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
 from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.determined import few_readings, require_determined
+from rrru.gap.drive_functions import drive_functions
+from rrru.gap.left_out import left_out, left_out_note
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.options import OPTIONS
@@ -26,6 +28,7 @@ from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
+from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.seeds import stream
@@ -92,27 +95,31 @@ def diagnose(
     residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
     worst = worst_spot(case.motion.position_mm[case.at], residual)
-    row = _row(attribution, verdict, steps, worst, further.runs, robot.noise_mm)
+    excluded = left_out(case, near)
+    row = _row(attribution, verdict, steps, worst, further.runs, (robot.noise_mm, excluded))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     own = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
-    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses}
+    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = parameter_rows(attribution)
+    tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
     if details:
         tables |= details_of(attribution, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
-def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
-    """What the data lack for a better answer, what they contradict, and what a user has to know of the robot."""
+def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
+    """What the data lack for a better answer, what they contradict, and what a user has to know of the robot.
+
+    excluded: the rows of `gap_left_out`.
+    """
     case = attribution.case
     yield from mastering_notes(attribution.state, case.mechanism, attribution.fit.geometry_errors)
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
     yield from fit_notes(attribution)
     if case.count < OPTIONS.min_used_share * len(case.used):
-        which = "not measured, out of reach, near singularities, held out or outliers"
-        yield f"{case.count} of {len(case.used)} points used; the others are {which}"
+        yield left_out_note(excluded, case.count, len(case.used))
     if few := few_readings(case):
         yield few
     acting = {name for name, _ in attribution.state.effects} & case.known.keys()
@@ -130,9 +137,10 @@ def _row(
     steps: Sequence,
     worst_mm: np.ndarray,
     further: pd.DataFrame,
-    stated_mm: float | None,
+    told: tuple[float | None, pd.DataFrame],
 ) -> dict:
-    """The row of `gap_verdicts` without the campaign."""
+    """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
+    stated_mm, excluded = told
     case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
     return {
         "effects": verdict.label,
@@ -152,7 +160,7 @@ def _row(
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join(_notes(attribution, stated_mm)),
+        "notes": "; ".join(_notes(attribution, stated_mm, excluded)),
         "not_in_model": "",
     }
 

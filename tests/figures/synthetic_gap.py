@@ -68,7 +68,10 @@ def gap_attribute(
     for name, probability, legs in likely:
         rows[name] |= {"probability": probability, "legs": legs}
     frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("effect").reset_index()
-    return check("gap_attribute", frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_se=1.5, note=""))
+    return check(
+        "gap_attribute",
+        frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_low=9.0, heldout_gain_high=15.0, note=""),
+    )
 
 
 def gap_shrink(campaign, trajectories, steps=2, kinds=("held_out", "resimulated")):

@@ -96,7 +96,7 @@ def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
     rows = frames["gap_shrink"].query("kind == 'held_out'")
     for line, step in zip(axes.lines[1:], (0, 2), strict=True):
         np.testing.assert_allclose(line.get_xdata(), rows.loc[rows["step"] == step, "gap_rms_mm"])
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "group 1", "group 2", "spiral"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "line 1", "line 2", "spiral"]
     closed = [label.get_text() for label in axes.child_axes[0].get_yticklabels()]
     assert closed[:2] == ["96 % (94 to 98)", "95 % (93 to 97)"]
 

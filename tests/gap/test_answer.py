@@ -27,7 +27,7 @@ SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_tex
 _LEGS = DriveWords()
 
 
-def answered(budget=None, runs=(), drives=_LEGS, **verdict):
+def answered(budget=None, runs=(), drives=_LEGS, places=(), **verdict):
     """Facts of a made-up diagnosis as a file holds them; drives: the robot's DriveWords."""
     tables = {
         "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
@@ -42,6 +42,8 @@ def answered(budget=None, runs=(), drives=_LEGS, **verdict):
             columns=("effect", "parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound"),
         ),
         "gap_next_runs": pd.DataFrame(list(runs), columns=answer._RUN),
+        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "worst", *answer._WORST)),
+        "gap_left_out": pd.DataFrame({"reason": ["outlier in the file"], "points": [2]}),
     }
     row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
     return answer.answer(CAMPAIGN, row, tables, drives)
@@ -138,6 +140,19 @@ def test_every_cause_tells_what_to_inspect_and_what_to_do_by_the_kind_of_the_dri
     ]
     assert texts[0]["inspect"].startswith("Block the motor and pull and push the leg") and texts[0]["remedy"]
     assert texts[0]["source"] == cause_texts("backlash").source and "drive arm" not in str(texts)
+
+
+def test_where_a_drive_errs_most_is_told_with_its_interval():
+    places = [
+        ("backlash", True, "axis1", "rad", 0.5, 2e-4, 1e-4, 3e-4),
+        ("backlash", True, "axis2", "rad", np.radians(-37.0), -5e-4, -5.5e-4, -4.5e-4),
+        ("backlash", False, "axis2", "rad", 0.1, 9e-4, 8e-4, 1e-3),
+    ]
+    facts_of = answered(places=places)
+    said = " ".join(facts_of["sentences"])
+    text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean."
+    assert text in said
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
