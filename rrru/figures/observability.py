@@ -1,5 +1,7 @@
 """Which combinations of parameters each set of trajectories sees, and how well."""
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.ticker import LogLocator
 
@@ -9,6 +11,8 @@ from rrru.figures import choose, style
 _WRITTEN_FROM = 0.15
 # half width of a normal distribution's interval of 95 % over its standard deviation
 _QUANTILE_95 = 1.959964
+# letters in a line of a narrow figure
+_NARROW = 44
 # with more parameters there is no room for numbers, and names stand upright
 _ROOM_FOR = 9
 
@@ -33,7 +37,8 @@ def observability(tables, options):
         weights.set_ylabel("" if place % 2 else "direction, best seen first")
         _errors(errors, part, limits)
     bar = figure.colorbar(image, ax=figure.axes, location="top", fraction=0.03, aspect=50, shrink=0.6)
-    bar.set_label("size of the weight in the unit direction (angles as arcs at the robot's own length)")
+    label = "size of the weight in the unit direction (angles as arcs at the robot's own length)"
+    bar.set_label(label if len(names) > 1 else fill(label, _NARROW))
     return figure
 
 
