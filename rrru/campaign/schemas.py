@@ -77,8 +77,8 @@ campaign
 number                 str    translation_x, .. rotation_x, ..
 unit                   str    {mm, rad}
 value                  float  of the number
-low_95                 float? lower end, 95 %, if what is left at the points were random; null for three points
-high_95                float? upper end, 95 %
+random_95              float? half width of the 95 % interval that random errors of the size left at the points would
+    give; null for three points. The robot's own errors, which the calibration fits, move the numbers further
 points                 int    points that the motion was found from
 
 ## campaigns | tables/campaigns.parquet | campaign

@@ -142,7 +142,7 @@ CAUSES = {
     ),
     "transmission_error": Cause(
         {
-            TURNING: "the gear leads and lags with a whole number of waves per turn of the {moved}",
+            TURNING: "the gear leads and lags in waves, as many per turn of the {moved} as the ratio says",
             SLIDING: "the screw, or the pulley of the belt, leads and lags once per turn",
             LENGTH: "the screw of the leg, or the drum of the cable, leads and lags once per turn",
         },

@@ -16,10 +16,9 @@ def drive_functions(tables, options):
     """Errors of the drives over their own values, as the named effects make them, over the range that was measured and
     minus their mean there: a constant is the drive's zero. Band: 95 % interval. Ring: where the error is largest.
     """
-    rows = tables["gap_drive_functions"]
-    rows = rows[rows["campaign"] == options["campaign"]]
-    if rows.empty:
+    if tables["gap_drive_functions"].empty:
         return style.note("no effect over a drive's value was found")
+    rows = choose.of_campaign(tables, "gap_drive_functions", options["campaign"], "drive_functions")
     panels = list(rows.groupby(["effect", "drive"], sort=False))
     figure, axes = style.panel_grid(len(panels), 50.0, above_mm=4.0)
     for place, (one, (_, part)) in enumerate(zip(axes[:, 0], panels, strict=True)):
@@ -47,10 +46,11 @@ def _panel(axes, part):
     at, size = value[worst].iloc[0], error[worst].iloc[0]
     axes.plot([at], [size], linestyle="none", color=style.VERMILION, **_WORST, label="largest")
     text = f"{style.number(size)} {error_unit} at {style.number(at)}{_SHORT[value_unit]}"
-    right = at > value.mean()
-    look = {"color": style.VERMILION, "fontsize": 7.0, "ha": "right" if right else "left", "va": "center"}
-    axes.annotate(text, (at, size), xytext=(-8.0 if right else 8.0, 0.0), textcoords="offset points", **look)
-    axes.margins(x=0.02, y=0.15)
+    side = "right" if at > value.mean() else "left"
+    beyond = 8.0 if size > 0.0 else -8.0
+    look = {"color": style.VERMILION, "fontsize": 7.0, "ha": side, "va": "bottom" if size > 0.0 else "top"}
+    axes.annotate(text, (at, size), xytext=(0.0, beyond), textcoords="offset points", in_layout=False, **look)
+    axes.margins(x=0.02, y=0.3)
     axes.set_xlabel(f"value of {part['name'].iloc[0]} ({value_unit})")
     axes.set_ylabel(f"error ({error_unit})")
     axes.grid(True)

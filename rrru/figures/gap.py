@@ -252,4 +252,4 @@ def _share(row, words=""):
     if not np.isfinite(shares[0]):
         return "–"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
-    return f"{value} %{words} ({low} to {high})"
+    return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"

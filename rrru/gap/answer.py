@@ -20,6 +20,9 @@ _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "poi
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
 _WORDS = DriveWords()
+# units of sentences for those of tables, and the factor: without rows of zeros
+_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
+_READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -94,6 +97,11 @@ def percent(share):
     return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
 
 
+def share_with_interval(part, follow=""):
+    """The share of a part of the budget, or of an effect, with its 95 % interval."""
+    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
+
+
 def _row(values, names):
     """Some entries of a mapping."""
     return {name: values[name] for name in names}
@@ -145,7 +153,7 @@ def _causes(facts):
     elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
-        share = _share(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
+        share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
             said.append(f"Beside that {share} is systematic and like no effect of the library.")
         else:
@@ -160,7 +168,7 @@ def _causes(facts):
 def _shares_told(facts):
     """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
-    shares.append(_scatter_share(facts))
+    shares.append(sum(part["share"] for part in _scatter_parts(facts)))
     return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
@@ -168,7 +176,7 @@ def _cause(effect, follow, told):
     """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{_share(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
+        share = f"{share_with_interval(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
@@ -185,12 +193,7 @@ def _worst(places):
     turning = one["unit"] == "rad"
     at = f"{np.degrees(one['drive_value']):.1f} degrees" if turning else f"{one['drive_value']:.1f} mm"
     size = with_interval(one["error"], one["low_95"], one["high_95"], one["unit"])
-    return f" It is largest for {one['name']} at {at}: {size} off its mean."
-
-
-def _share(part, follow=""):
-    """The share of a part of the budget, or of an effect, with its 95 % interval."""
-    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
+    return f" It is largest for {one['name']} at {at}: {size} off its mean over the measured range."
 
 
 def _sizes(parameters):
@@ -198,15 +201,16 @@ def _sizes(parameters):
     by_size = {}
     for one in parameters:
         if np.isfinite(one["standard_error"] or np.nan):
-            unit = "" if one["unit"] == "1" else one["unit"]
-            size = with_interval(one["value"], one["low_95"], one["high_95"], unit)
+            unit, factor = _READABLE.get(one["unit"], (one["unit"], 1.0))
+            size = with_interval(*(factor * one[key] for key in ("value", "low_95", "high_95")), unit)
             by_size.setdefault(size, []).append(one["parameter"])
     return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
 
 
 def _scatter(facts):
     """What does not repeat, where it acts and matters."""
-    share = _scatter_share(facts, OPTIONS.min_scatter_probability)
+    parts = _scatter_parts(facts, OPTIONS.min_scatter_probability)
+    share = sum(part["share"] for part in parts)
     if share < OPTIONS.min_mentioned_share:
         return []
     unknown = REPEATABILITY_UNKNOWN in facts["notes"]
@@ -214,15 +218,18 @@ def _scatter(facts):
         if unknown:
             return [f"Some of it is {_RANDOM}"]
         return ["Some of it does not repeat from pass to pass: no model can take that away."]
+    # of a sum the interval is not known
+    acting = [part for part in parts if part["share"]]
+    size = share_with_interval(acting[0]) if len(acting) == 1 else percent(share)
     if unknown:
-        return [f"{percent(share)} is {_RANDOM}"]
-    return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
+        return [f"{size} is {_RANDOM}"]
+    return [f"{size} does not repeat from pass to pass: no model can take that away."]
 
 
-def _scatter_share(facts, least=0.0):
-    """Share of the gap that does not repeat, of the parts that act with a least probability."""
+def _scatter_parts(facts, least=0.0):
+    """Parts of the gap that do not repeat and act with a least probability."""
     parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
-    return sum(part["share"] for part in parts if not part["probability"] < least)
+    return [part for part in parts if not part["probability"] < least]
 
 
 def _left(facts):

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import percent, probability, readable, rounded
+from rrru.gap.answer import percent, probability, readable, rounded, share_with_interval
 from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
@@ -126,7 +126,7 @@ def _parts(budget):
             _WORDS.get(part["kind"], readable(part["part"])),
             _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
             round(100.0 * part["share"] / whole, 2),
-            f"{percent(part['share'])} ({percent(part['share_low'])} to {percent(part['share_high'])})",
+            share_with_interval(part),
         )
         for number, part in enumerate([*effects, *others])
     ]

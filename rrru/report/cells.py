@@ -49,6 +49,8 @@ def words(name):
 
 def head(name, meaning=""):
     """A column's name as words; of an end of a 95 % interval, as its meaning says, with the interval."""
+    if name == "random_95":
+        return "random part, 95 %: ±"
     found = _END.search(name)
     if not (found and "95 %" in meaning):
         return words(name)

@@ -65,18 +65,16 @@ def campaign_row(robot, section, measurements, singular, noise, notes, registrat
 
 def registration_table(registration):
     """Rows of `registration`; none without one."""
-    columns = ["number", "unit", "value", "low_95", "high_95", "points"]
+    columns = ["number", "unit", "value", "random_95", "points"]
     if registration is None:
         return pd.DataFrame(columns=columns)
     names = [f"{kind}_{axis}" for kind in ("translation", "rotation") for axis in "xyz"]
-    value, half = registration.numbers, QUANTILE_95 * np.sqrt(np.diag(registration.covariance))
     return pd.DataFrame(
         {
             "number": names,
             "unit": np.repeat(["mm", "rad"], 3),
-            "value": value,
-            "low_95": value - half,
-            "high_95": value + half,
+            "value": registration.numbers,
+            "random_95": QUANTILE_95 * np.sqrt(np.diag(registration.covariance)),
             "points": registration.points,
         }
     )

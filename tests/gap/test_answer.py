@@ -76,11 +76,11 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
     for words in (
         "misses by 0.37 mm at points left out of it (noise taken out)",
         "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
-        "flexure2 = 0.00123 mm/N (95 %: 0.00101 to 0.00145): ",
+        "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
         "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): play ",
         "play between motor and drive arm.",
         "Probability of this answer: 0.97.",
-        "10 % does not repeat",
+        "10 % (95 %: 8 % to 13 %) does not repeat",
         "Add them to the simulator and 0.020 mm is left",
         "the noise is 0.035 mm",
         "cannot rule out: drive compliance, servo lag.",
@@ -99,7 +99,10 @@ def test_what_does_not_repeat_is_told_where_it_more_likely_acts_than_not(sure, t
 def test_without_a_pose_measured_twice_repeatability_is_unknown():
     said = " ".join(answered(notes=REPEATABILITY_UNKNOWN)["sentences"])
     assert "does not repeat" not in said
-    assert "10 % is random error above the stated noise. Repeatability is unknown: no pose was measured twice." in said
+    assert (
+        "10 % (95 %: 8 % to 13 %) is random error above the stated noise. "
+        "Repeatability is unknown: no pose was measured twice." in said
+    )
 
 
 @pytest.mark.parametrize(("factor", "gap"), [(12.0, 0.02), (1.0, 0.0)])
@@ -150,7 +153,7 @@ def test_where_a_drive_errs_most_is_told_with_its_interval():
     ]
     facts_of = answered(places=places)
     said = " ".join(facts_of["sentences"])
-    text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean."
+    text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean over "
     assert text in said
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
 
