@@ -70,8 +70,8 @@ constraint_determinant float? as in singularity; null out of reach
 
 ## registration | tables/registration.parquet | campaign number
 The rigid motion from the instrument's frame to the robot's that `frame: register` found, robot = R instrument + t: its
-translation t and the rotation vector of R. What is left of it is fitted with the calibration (world_ numbers of
-`parameters`). No rows where the frame was the robot's.
+translation t and the rotation vector of R. What is left of it is fitted with the calibration, as world_ numbers of
+`parameters` or those that stand for them in `gauge`. No rows where the frame was the robot's.
 --
 campaign
 number                 str    translation_x, .. rotation_x, ..

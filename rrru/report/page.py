@@ -19,6 +19,8 @@ from rrru.studies import glossary
 TEMPLATES = Path(__file__).parent / "templates"
 # a figure that is larger than this as SVG is shown as its PNG
 _LARGEST_SVG = 400_000
+# words of columns that hold numbers of legs or, of robots without, of drives
+_HEADS = {"legs": "leg or drive"}
 _TRUST = ("parameters", "correlations", "calibrations", "gap_parameters", "gap_verdicts")
 
 
@@ -129,7 +131,8 @@ class Results:
         columns = [name for name in shown.columns.split() or frame if name in frame]
         frame = frame[columns].dropna(axis="columns", how="all")
         place = self.place(shown.name).relative_to(self.folder)
-        made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place))
+        heads = {name: text for name, text in _HEADS.items() if name in frame}
+        made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place), heads)
         return made if made.rows else None
 
 
