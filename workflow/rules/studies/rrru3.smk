@@ -90,7 +90,10 @@ rule redraws:
         settings={
             "nominal": parts.nominal(config, REPRODUCED),
             "virtual": parts.virtual(config, REPRODUCED),
-            "sets": parts.sets(config, REPRODUCED),
+            "sets": {
+                config["reproduce"][key]: parts.sets(config, REPRODUCED)[config["reproduce"][key]]
+                for key in ("line_calibration", "spiral_calibration")
+            },
             **reads(
                 "calibration.use_near_singularity",
                 *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("campaign", "sets")),
