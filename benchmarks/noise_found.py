@@ -22,9 +22,10 @@ import pandas as pd
 from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import draw_truth, measure, pose_campaign
 from rrru.errors import FitError
-from rrru.gap.answer import answer, arm_drives
+from rrru.gap.answer import answer
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
+from rrru.robots.drive_words import drive_words
 from rrru.seeds import stream
 
 NOISE_MM = 0.03
@@ -51,7 +52,7 @@ def one_campaign(acting, number, effects=None):
         found = diagnose(frame, known, settings)
     except (FitError, np.linalg.LinAlgError) as problem:
         return row | {"failed": str(problem)[:200], "seconds": time.process_time() - began}
-    facts = answer("arm", found.verdict, found.tables, arm_drives(campaign.mechanism))
+    facts = answer("arm", found.verdict, found.tables, drive_words(campaign.mechanism))
     return row | {"failed": "", "seconds": time.process_time() - began} | _said(found, facts)
 
 

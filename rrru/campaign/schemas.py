@@ -15,8 +15,9 @@ command_{xyz}_mm       float  commanded position, robot frame
 measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
 speed_mm_s             float? speed of the run; null where the file has none
 payload_kg             float? payload on the platform; null where the file has none
-status                 str    every point is kept; outlier, unsolved and held_out (kept for a test) are left out of
-    fits, near_singularity only with use_near_singularity: false {ok, outlier, near_singularity, unsolved, held_out}
+status                 str    every point is kept; outlier, stale (equal to an earlier reading in every digit), unsolved
+    and held_out (kept for a test) are left out of fits, near_singularity only with use_near_singularity: false {ok,
+    outlier, stale, near_singularity, unsolved, held_out}
 campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
@@ -53,7 +54,7 @@ point                  int    as in measurements
 translational_measure  float  0 where the platform can move with locked drives
 constraint_measure     float  0 where the platform can turn with locked drives; eq. (8) does not see it
 constraint_determinant float  changes its sign across a constraint singularity; positive for own robots of chains
-status                 str    as in measurements {ok, outlier, near_singularity, unsolved, held_out}
+status                 str    as in measurements {ok, outlier, stale, near_singularity, unsolved, held_out}
 
 ## workspace | campaigns/{campaign}/workspace.parquet | slice x_mm y_mm z_mm
 Regular grid over two slices of the workspace: xz at y = 0, xy through the middle of the commanded points;
@@ -69,6 +70,19 @@ translational_measure  float? as in singularity; null out of reach
 constraint_measure     float? as in singularity; null out of reach
 constraint_determinant float? as in singularity; null out of reach
 
+## registration | tables/registration.parquet | campaign number
+The rigid motion from the instrument's frame to the robot's that `frame: register` found, robot = R instrument + t: its
+translation t and the rotation vector of R. What is left of it is fitted with the calibration, as world_ numbers of
+`parameters` or those that stand for them in `gauge`. No rows where the frame was the robot's.
+--
+campaign
+number                 str    translation_x, .. rotation_x, ..
+unit                   str    {mm, rad}
+value                  float  of the number
+random_95              float? half width of the 95 % interval that random errors of the size left at the points would
+    give; null for three points. The robot's own errors, which the calibration fits, move the numbers further
+points                 int    points that the motion was found from
+
 ## campaigns | tables/campaigns.parquet | campaign
 One row per campaign: where it came from and what state it is in.
 --
@@ -80,6 +94,7 @@ points                 int    commanded points
 runs                   int    passes
 ok                     int    points with status ok
 outlier                int    points with status outlier
+stale                  int    points with status stale
 near_singularity       int    points with status near_singularity
 unsolved               int    points with status unsolved
 noise_mm               float  measuring noise per axis, 1 sigma

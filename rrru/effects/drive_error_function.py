@@ -65,8 +65,8 @@ def _of_orders(robot, orders):
         own = np.reshape(values, (len(units), -1))
         return motion.at_drives(np.stack([f @ one for f, one in zip(functions(motion), own, strict=True)], axis=1))
 
-    coarser = partial(_coarser, robot)
-    return Effect("drive_error_function", parameters, coordinates, err, along_drives=functions, coarser=coarser)
+    laws = {"along_drives": functions, "coarser": partial(_coarser, robot), "of_drive_value": True}
+    return Effect("drive_error_function", parameters, coordinates, err, **laws)
 
 
 def _per_unit(robot):

@@ -63,7 +63,7 @@ def of_encoders(robot, name, periods, source, typical_rad):
     def law(motion, values):
         return at_harmonic(motion, turning, periods, values)
 
-    return Effect(name, parameters, harmonic_coordinates(parameters, typical_rad), law)
+    return Effect(name, parameters, harmonic_coordinates(parameters, typical_rad), law, of_drive_value=True)
 
 
 def waves(angle, orders):

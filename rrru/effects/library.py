@@ -53,13 +53,6 @@ def library(robot):
     return {name: effect for name, effect in made.items() if effect is not None}
 
 
-def summary(name):
-    """What an effect of the library is, in a few words: its file's first line. Empty for one of the user's own."""
-    if name not in NAMES:
-        return ""
-    return _module(name).__doc__.split("\n\n")[0].partition(": ")[2].rstrip(".")
-
-
 def find(name, robot):
     """The effect on a robot of a library name or of `module:object`, an effect or a class without arguments.
 

@@ -247,6 +247,7 @@ class Effect:
     needs: fields of Motion without which the law says nothing, "path_drive" of a law that depends on the sense in which
     a drive comes to a reading; along_drives: of a law that changes nothing but actuator
     values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
+    of_drive_value: whether the law changes actuator values alone, each by a function of itself;
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
     law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
     calibration that leaves it out is wrong; switches: whether the law knows no more of a load than its sign; coarser:
@@ -261,6 +262,7 @@ class Effect:
     needs: tuple[str, ...] = ()
     spoils: str = ""
     along_drives: Callable[[Motion], list[np.ndarray]] | None = None
+    of_drive_value: bool = False
     with_waves: Callable[..., "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
     switches: bool = False

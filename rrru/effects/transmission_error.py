@@ -75,4 +75,4 @@ def _effect(sizes, known, search, typical, law):
     """The Effect of amplitudes and phases, and of a ratio or lead that is known or searched."""
     parameters = ParameterSet((*sizes, known))
     coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
-    return Effect("transmission_error", parameters, replace(coordinates, searched=search), law)
+    return Effect("transmission_error", parameters, replace(coordinates, searched=search), law, of_drive_value=True)

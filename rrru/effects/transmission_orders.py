@@ -56,4 +56,5 @@ def _with_waves(pairs, log_prior=0.0):
             changes[:, drive] = waves(motion.drive[:, drive], orders[its]) @ np.reshape(values, (-1, 2))[its].ravel()
         return motion.at_drives(changes)
 
-    return Effect("transmission_orders", parameters, coordinates, err, with_waves=_with_waves, waves=tuple(pairs))
+    own = {"of_drive_value": True, "with_waves": _with_waves, "waves": tuple(pairs)}
+    return Effect("transmission_orders", parameters, coordinates, err, **own)

@@ -35,9 +35,14 @@ def parameter_label(parameter):
 
 
 def trajectory_label(trajectory):
-    """Name of a trajectory in a figure: the paper calls the lines groups."""
+    """Name of a trajectory in a figure of paper A, which calls the lines groups."""
     found = re.fullmatch(r"line_(\d+)", trajectory)
-    return f"group {found[1]}" if found else trajectory.replace("_", " ")
+    return f"group {found[1]}" if found else plain(trajectory)
+
+
+def plain(name):
+    """A name as words."""
+    return name.replace("_", " ")
 
 
 def natural(name):

@@ -63,7 +63,7 @@ def _panel(axes, matrix, scale, rows, columns):
         dark = np.isfinite(value) and scale(max(value, scale.vmin)) > 0.6
         look = {"ha": "center", "va": "center", "fontsize": 7.0, "in_layout": False}
         axes.text(column, row, style.number(value), color="white" if dark else "black", **look)
-    axes.set_xticks(range(len(columns)), [choose.trajectory_label(name) for name in columns], rotation=90)
+    axes.set_xticks(range(len(columns)), [choose.plain(name) for name in columns], rotation=90)
     axes.set_yticks(range(len(rows)), [name.replace("_", " ") for name in rows])
     axes.tick_params(length=0.0)
     axes.axhline(0.5, color="white", linewidth=2.0)

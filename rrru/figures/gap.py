@@ -14,7 +14,6 @@ _AFTER = {"color": style.BLUE, "marker": "s"}
 _NOISE = style.TOLERANCE
 # rows that stand below the library's effects
 _APART = ("none", "unexplained")
-_LEGS = {"each": "each leg", "same": "all legs alike", "": ""}
 _NOTHING = {"none": "nothing to add", "unexplained": "nothing in the library to add"}
 # characters in a line of the headline, its height, and the height of a row of bars
 _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
@@ -43,13 +42,14 @@ def gap(tables, options):
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
         frames[name] = choose.of_campaign(tables, name, campaign, "gap")
     verdict, causes, shrink = frames["gap_verdicts"].iloc[0], _ordered(frames["gap_attribute"]), frames["gap_shrink"]
-    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, options["drives"])
+    words = {"drives": options["drives"], "noun": options["drive_noun"]}
+    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, words)
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
     gap_budget.draw(panels["budget"], frames["gap_budget"])
     _map(figure, panels, used, verdict, options["z_down"], "(a) ")
-    _causes(panels["causes"], causes, verdict, options["drives"])
+    _causes(panels["causes"], causes, verdict, words)
     _shrink(panels["shrink"], shrink, verdict)
     _along(panels["along"], points, verdict)
     gap_arrows.fit(figure, panels, used)
@@ -113,9 +113,9 @@ def _page(lines, causes, trajectories, used):
     return figure, panels
 
 
-def _headline(verdict, drives):
+def _headline(verdict, words):
     """Lines of the verdict itself, and of what is to be known and done about it."""
-    name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), drives)}" if verdict["leg"] else "")
+    name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else "")
     if verdict["no_answer"]:
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
@@ -146,22 +146,22 @@ def _ordered(causes):
     return causes.assign(apart=apart).sort_values(["apart", "probability", "effect"], ascending=[True, False, True])
 
 
-def _leg(legs, drives):
-    """Legs of an effect in words; drives: names of an arm's drives, none of other robots."""
-    words = _LEGS.get(legs, f"leg {legs}")
-    if not drives:
-        return words
-    return drives[int(legs) - 1] if legs.isdigit() and int(legs) <= len(drives) else words.replace("leg", "drive")
+def _leg(legs, drives, noun):
+    """Legs of an effect in words; drives: names of the robot's drives; noun: the word for one of them."""
+    words = {"each": f"each {noun}", "same": f"all {noun}s alike", "": ""}
+    if legs in words:
+        return words[legs]
+    return drives[int(legs) - 1] if int(legs) <= len(drives) else f"{noun} {legs}"
 
 
-def _causes(axes, causes, verdict, drives):
+def _causes(axes, causes, verdict, words):
     """Probability of every effect; those of the verdict in colour, with their legs."""
     rows = np.arange(len(causes)) + 0.5 * causes["apart"].to_numpy()
     chosen = causes["effect"].isin(verdict["effects"].split("+")).to_numpy()
     value = causes["probability"].to_numpy()
     axes.barh(rows, value, height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
-        probability, legs = cause["probability"], _leg(cause["legs"], drives)
+        probability, legs = cause["probability"], _leg(cause["legs"], **words)
         text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
         if not (cause["apart"] or np.isfinite(cause["log_evidence"])):
             text = "not tested"
@@ -192,7 +192,7 @@ def _shrink(axes, shrink, verdict):
         axes.secondary_yaxis("right").set_yticks(place, [_share(row) for _, row in last.reindex(names).iterrows()])
         above = {"transform": axes.transAxes, "ha": "left", "va": "bottom", "fontsize": 7.0, "in_layout": False}
         axes.text(1.05, 1.035, "closed (95 %)", **above)
-    axes.set_yticks(place, ["all" if name == "*" else choose.trajectory_label(name) for name in names])
+    axes.set_yticks(place, ["all" if name == "*" else choose.plain(name) for name in names])
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
     axes.set(xlim=(0.0, most), ylim=(len(names) - 0.5, -0.5))
     axes.set(xlabel=f"{_KINDS[kind]} gap, rms (mm)", ylabel="trajectory")
@@ -207,7 +207,7 @@ def _along(axes, points, verdict):
     middles, labels = [], []
     runs = list(points.groupby("run", sort=False))
     for number, (run, rows) in enumerate(runs):
-        at, trajectory = rows.index.to_numpy(), choose.trajectory_label(rows["trajectory"].iloc[0])
+        at, trajectory = rows.index.to_numpy(), choose.plain(rows["trajectory"].iloc[0])
         middles.append(at.mean())
         labels.append(f"{run}\n{trajectory}" if len(runs) <= _NAMED_RUNS else f"{run}")
         if number % 2:
@@ -254,4 +254,4 @@ def _share(row, words=""):
     if not np.isfinite(shares[0]):
         return "–"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
-    return f"{value} %{words} ({low} to {high})"
+    return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"

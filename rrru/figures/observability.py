@@ -1,5 +1,7 @@
 """Which combinations of parameters each set of trajectories sees, and how well."""
 
+from textwrap import fill
+
 import numpy as np
 from matplotlib.ticker import LogLocator
 
@@ -7,6 +9,10 @@ from rrru.figures import choose, style
 
 # weights smaller than this are left unwritten
 _WRITTEN_FROM = 0.15
+# half width of a normal distribution's interval of 95 % over its standard deviation
+_QUANTILE_95 = 1.959964
+# letters in a line of a narrow figure
+_NARROW = 44
 # with more parameters there is no room for numbers, and names stand upright
 _ROOM_FOR = 9
 
@@ -14,15 +20,16 @@ _ROOM_FOR = 9
 @style.printed
 def observability(tables, options):
     """What every set of trajectories can see: directions of parameter space from the best seen to the worst, what
-    each is made of (weights below 0.15, or of more than nine parameters, are not written), the standard error along
-    it and its singular value.
+    each is made of (weights below 0.15, or of more than nine parameters, are not written), the half width of
+    the 95 % interval along it, and its singular value.
     """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
+    rows = rows.assign(half_mm=_QUANTILE_95 * rows["standard_error_mm"])
     names = list(dict.fromkeys(rows["calibration"]))
     widths = [2.6, 1.0] * min(len(names), 2)
     crowded = rows["parameter"].nunique() > _ROOM_FOR
     figure, panels = style.panel_grid(len(names), 80.0 if crowded else 58.0, each=2, width_ratios=widths)
-    limits = _error_limits(rows["standard_error_mm"])
+    limits = _error_limits(rows["half_mm"])
     for place, (name, (weights, errors)) in enumerate(zip(names, panels, strict=True)):
         part = rows[rows["calibration"] == name]
         image = _weights(weights, part)
@@ -30,7 +37,8 @@ def observability(tables, options):
         weights.set_ylabel("" if place % 2 else "direction, best seen first")
         _errors(errors, part, limits)
     bar = figure.colorbar(image, ax=figure.axes, location="top", fraction=0.03, aspect=50, shrink=0.6)
-    bar.set_label("size of the weight in the unit direction (angles as arcs at the end of the drive arm)")
+    label = "size of the weight in the unit direction (angles as arcs at the robot's own length)"
+    bar.set_label(label if len(names) > 1 else fill(label, _NARROW))
     return figure
 
 
@@ -53,12 +61,12 @@ def _weights(axes, part):
 
 
 def _errors(axes, part, limits):
-    """Standard error along each direction on a log axis, the singular value as a number beside it."""
+    """Half width of the 95 % interval along each direction on a log axis, the singular value as a number beside it."""
     each = part.drop_duplicates("direction").set_index("direction").sort_index()
     rows = np.arange(len(each))
-    seen = each["standard_error_mm"].notna().to_numpy()
-    axes.hlines(rows[seen], limits[0], each["standard_error_mm"][seen], color=style.BLUE, linewidth=1.0)
-    axes.plot(each["standard_error_mm"], rows, "o", color=style.BLUE)
+    seen = each["half_mm"].notna().to_numpy()
+    axes.hlines(rows[seen], limits[0], each["half_mm"][seen], color=style.BLUE, linewidth=1.0)
+    axes.plot(each["half_mm"], rows, "o", color=style.BLUE)
     for row in rows[~seen]:
         axes.text(0.5, row, "not seen", transform=axes.get_yaxis_transform(), ha="center", va="center", fontsize=7.0)
     axes.set(xscale="log", xlim=limits, ylim=(len(each) - 0.5, -0.5))
@@ -67,13 +75,13 @@ def _errors(axes, part, limits):
     axes.xaxis.set_major_locator(LogLocator(numticks=4))
     style.plain_log(axes.xaxis)
     axes.tick_params(axis="y", length=0.0)
-    axes.set_xlabel("std. error (mm)")
+    axes.set_xlabel("95 %: ± (mm)")
     axes.set_title("singular value (mm/mm)", loc="right", fontsize=7.0)
     axes.grid(True, axis="x")
 
 
 def _error_limits(errors):
-    """Common limits of all panels' standard errors, whole decades."""
+    """Common limits of all panels' half widths, whole decades."""
     finite = errors[np.isfinite(errors) & (errors > 0.0)]
     if finite.empty:
         return 0.1, 1.0

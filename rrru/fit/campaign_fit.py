@@ -63,7 +63,8 @@ def fit_sets(
 ) -> dict[tuple[str, str], Calibration]:
     """{(set, method): Calibration} of all sets of the CalibrationSettings that the campaign has points for.
 
-    noise_mm, arm_mm: of the campaign, see `rrru.fit.campaign_noise.Noise`. Raises ConfigError where no set matches.
+    By least squares, and by least mean distance where the genetic algorithm knows the robot. noise_mm, arm_mm: of the
+    campaign, see `rrru.fit.campaign_noise.Noise`. Raises ConfigError where no set matches.
     """
     fits = {}
     for name, patterns in settings.sets.items():
@@ -71,7 +72,9 @@ def fit_sets(
         if residuals is not None:
             fit = calibrate(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
             fits[name, "least_squares"] = fit
-            fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
+            if mechanism.SEARCHED:
+                # what the genetic algorithm searches for is of no use where it is left out
+                fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
         present = f"the campaign's trajectories ({', '.join(measurements['trajectory'].unique())})"
         raise ConfigError(f"calibration.sets: no set matches {present} with enough points")

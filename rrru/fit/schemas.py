@@ -22,7 +22,7 @@ noise_mm               float  noise per axis that the standard errors assume
 noise_from             str    given: by the configuration or of the whole campaign, see campaigns; residuals: of
     this fit, where more is left {given, residuals}
 rank                   int    parameter combinations that the points see, of 7
-condition              float  condition number of the scaled Jacobian (angles as arcs at the end of the drive arm)
+condition              float  condition number of the scaled Jacobian (angles as arcs at the robot's own length)
 O1_observability       float  geometric mean of the singular values over sqrt(points)
 O2_observability       float  inverse condition
 O3_observability       float  smallest singular value
@@ -66,5 +66,5 @@ direction              int    1: best seen
 singular_value         float  mm of the stacked positions per mm along the direction
 standard_error_mm      float? 1 sigma along the direction; null where it is not seen
 parameter              str    name
-weight                 float  entry of the unit direction, angles as arcs at the end of the drive arm
+weight                 float  entry of the unit direction, angles as arcs at the robot's own length
 """)

@@ -5,14 +5,16 @@
 
 import numpy as np
 
-from rrru.effects.library import summary
+from rrru.effects.causes import cause_texts
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
+from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
 _VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
 _NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
 _PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
+_WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
 _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
@@ -23,14 +25,18 @@ _CHECK = (
 )
 # first words of what no file holds where none was written
 NOT_CORRECTED = "not corrected: "
+_WORDS = DriveWords()
+# units of sentences for those of tables, and the factor: without rows of zeros
+_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
+_READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
-def answer(campaign, verdict, tables, drives=()):
+def answer(campaign, verdict, tables, drives=_WORDS):
     """The facts of one campaign as a mapping, which `rrru.store.facts` writes.
 
     verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
-    drives: names of an arm's drives, see `arm_drives`.
+    drives: the robot's DriveWords.
     """
     budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
     budget = [part | {"probability": _clipped(part["probability"])} for part in budget]
@@ -49,6 +55,7 @@ def answer(campaign, verdict, tables, drives=()):
         "budget": budget,
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
         **_row(verdict, ("points", "dropped_points")),
+        "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
         "notes": [note for note in verdict["notes"].split("; ") if note],
         "no_answer": verdict["no_answer"],
         "corrected_file": _corrected_file(verdict),
@@ -67,11 +74,6 @@ def _corrected_file(verdict):
         "headline": verdict["file_headline"],
         "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
     }
-
-
-def arm_drives(robot):
-    """Names of the drives of an arm, whose effects act drive by drive; none for robots that have them leg by leg."""
-    return tuple(drive.site for drive in robot.parts.drives) if robot.legs.arm_joints else ()
 
 
 def sentences(facts):
@@ -98,12 +100,16 @@ def rounded(value, digits=2):
     return f"{round(value, places):.{max(places, 0)}f}"
 
 
-def with_error(value, error):
-    """A number and its standard error, both to the error's digits: one, two where it begins with 1."""
-    exponent = int(np.floor(np.log10(error)))
-    places = -exponent + (error < 2.0 * 10.0**exponent)
-    value, error = round(value, places), round(error, places)
-    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f}"
+def with_interval(value, low, high, unit=""):
+    """A number with its 95 % interval, all to two digits of the interval's half width.
+
+    >>> with_interval(0.12014, 0.11902, 0.12126, "mm")
+    '0.1201 mm (95 %: 0.1190 to 0.1213)'
+    """
+    places = 1 - int(np.floor(np.log10(0.5 * (high - low))))
+    # a rounded number below zero that is zero has no sign
+    value, low, high = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
+    return f"{value}{' ' if unit else ''}{unit} (95 %: {low} to {high})"
 
 
 def probability(value):
@@ -114,6 +120,11 @@ def probability(value):
 def percent(share):
     """A share in per cent; what effects that imitate each other have too much is left out."""
     return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
+
+
+def share_with_interval(part, follow=""):
+    """The share of a part of the budget, or of an effect, with its 95 % interval."""
+    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
 
 
 def _row(values, names):
@@ -132,22 +143,18 @@ def _effect(name, tables, budget, drives):
     cause = tables["gap_attribute"].set_index("effect").loc[name]
     legs = cause["legs"] if isinstance(cause["legs"], str) else ""
     numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
+    places = tables["gap_drive_functions"].query("effect == @name and worst")
+    one = (int(legs),) if legs.isdigit() else ()
     return {
         "name": name,
-        "meaning": summary(name),
+        **vars(cause_texts(name, drives, one)),
         "probability": _clipped(cause["probability"]),
         "legs": legs,
-        "place": _place(int(legs), drives) if legs.isdigit() else "",
+        "place": drives.place(*one) if one else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
         "parameters": [_row(number, _NUMBER) for number in numbers],
+        "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
     }
-
-
-def _place(number, drives):
-    """Where an effect of one leg or drive, by number from 1 on, acts, in words."""
-    if not drives:
-        return f"in leg {number}"
-    return f"at {drives[number - 1]}" if number <= len(drives) else f"at driven joint {number}"
 
 
 def _no_answer(facts):
@@ -176,7 +183,7 @@ def _causes(facts):
     elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:
-        share = percent(next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained"))
+        share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
             said.append(f"Beside that {share} is systematic and like no effect of the library.")
         else:
@@ -191,7 +198,7 @@ def _causes(facts):
 def _shares_told(facts):
     """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
     shares = [effect["share"] or 0.0 for effect in facts["effects"]]
-    shares.append(_scatter_share(facts))
+    shares.append(sum(part["share"] for part in _scatter_parts(facts)))
     return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
 
 
@@ -199,28 +206,41 @@ def _cause(effect, follow, told):
     """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
     share = "Also there is"
     if effect["share"] is not None:
-        share = f"{percent(effect['share'])}{follow} is" if told else f"{rounded(effect['rms_mm'])} mm is"
+        share = f"{share_with_interval(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
     place = f" {effect['place']}" if effect["place"] else ""
     sizes = _sizes(effect["parameters"])
     listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
-    size = f" ({listed})" if sizes else ""
+    size = f", {listed}" if sizes else ""
     meaning = f": {effect['meaning']}" if effect["meaning"] else ""
-    return f"{share} {readable(effect['name'])}{place}{size}{meaning}."
+    return f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
+
+
+def _worst(places):
+    """Where the drive errs most of those whose errors have the unit of the largest; empty without places."""
+    if not places:
+        return ""
+    one = max(places, key=lambda place: (place["unit"] == places[0]["unit"], abs(place["error"])))
+    turning = one["unit"] == "rad"
+    at = f"{np.degrees(one['drive_value']):.1f} degrees" if turning else f"{one['drive_value']:.1f} mm"
+    size = with_interval(one["error"], one["low_95"], one["high_95"], one["unit"])
+    return f" It is largest for {one['name']} at {at}: {size} off its mean over the measured range."
 
 
 def _sizes(parameters):
-    """Numbers that were fitted with their errors, those that are one number under several names once."""
+    """Numbers that were fitted with their 95 % intervals, those that are one number under several names once."""
     by_size = {}
     for one in parameters:
         if np.isfinite(one["standard_error"] or np.nan):
-            unit = "" if one["unit"] == "1" else f" {one['unit']}"
-            by_size.setdefault(with_error(one["value"], one["standard_error"]) + unit, []).append(one["parameter"])
+            unit, factor = _READABLE.get(one["unit"], (one["unit"], 1.0))
+            size = with_interval(*(factor * one[key] for key in ("value", "low_95", "high_95")), unit)
+            by_size.setdefault(size, []).append(one["parameter"])
     return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
 
 
 def _scatter(facts):
     """What does not repeat, where it acts and matters."""
-    share = _scatter_share(facts, OPTIONS.min_scatter_probability)
+    parts = _scatter_parts(facts, OPTIONS.min_scatter_probability)
+    share = sum(part["share"] for part in parts)
     if share < OPTIONS.min_mentioned_share:
         return []
     unknown = REPEATABILITY_UNKNOWN in facts["notes"]
@@ -228,15 +248,18 @@ def _scatter(facts):
         if unknown:
             return [f"Some of it is {_RANDOM}"]
         return ["Some of it does not repeat from pass to pass: no model can take that away."]
+    # of a sum the interval is not known
+    acting = [part for part in parts if part["share"]]
+    size = share_with_interval(acting[0]) if len(acting) == 1 else percent(share)
     if unknown:
-        return [f"{percent(share)} is {_RANDOM}"]
-    return [f"{percent(share)} does not repeat from pass to pass: no model can take that away."]
+        return [f"{size} is {_RANDOM}"]
+    return [f"{size} does not repeat from pass to pass: no model can take that away."]
 
 
-def _scatter_share(facts, least=0.0):
-    """Share of the gap that does not repeat, of the parts that act with a least probability."""
+def _scatter_parts(facts, least=0.0):
+    """Parts of the gap that do not repeat and act with a least probability."""
     parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
-    return sum(part["share"] for part in parts if not part["probability"] < least)
+    return [part for part in parts if not part["probability"] < least]
 
 
 def _left(facts):

@@ -4,6 +4,7 @@ from itertools import zip_longest
 
 import numpy as np
 import pandas as pd
+from scipy.stats import t as student_t
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.intervals import QUANTILE_95
@@ -12,14 +13,15 @@ from rrru.gap.identify import identify
 from rrru.gap.locate import drive_errors, locate
 from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import shrink_table
-from rrru.gap.terms import sites, spread
+from rrru.gap.terms import per_leg, sites, spread
 from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 from rrru.gap.weight import WEIGHT
 
 # the table has columns for so many drives of either unit, whatever the robot
 _LEAST_DRIVES = 3
-_EMPTY = {"legs": "", "log_evidence": np.nan, "heldout_gain": np.nan, "heldout_gain_se": np.nan, "note": ""}
+_EMPTY = {"legs": "", "log_evidence": np.nan}
+_EMPTY |= dict.fromkeys(("heldout_gain", "heldout_gain_low", "heldout_gain_high"), np.nan) | {"note": ""}
 
 
 def details_of(attribution, steps, residual_mm, generator, draws):
@@ -71,7 +73,7 @@ def _effect_row(attribution, name):
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
     row["log_evidence"] = float(best.evidence.max() - attribution.evidence.on_library().none.max())
-    if legs := beliefs.legs(name):
+    if per_leg(attribution.case.library[name]) and (legs := beliefs.legs(name)):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
@@ -81,7 +83,8 @@ def _effect_row(attribution, name):
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
         row["heldout_gain"] = float(by_fold.sum())
         if len(by_fold) > 1:
-            row["heldout_gain_se"] = float(np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
+            half = float(student_t.ppf(0.975, len(by_fold) - 1) * np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
+            row |= {"heldout_gain_low": row["heldout_gain"] - half, "heldout_gain_high": row["heldout_gain"] + half}
     return row
 
 
@@ -147,18 +150,16 @@ def parameter_rows(attribution):
     return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
 
 
-def _effect_values(fit, library, term):
-    """Parameter values (p,) of a term's effect, standard errors (p,), 0 for what was not fitted, intervals (p, 2).
+def value_steps(fit, library, term):
+    """Parameter values (p,) of a term's effect a step above and below what was fitted, and the size between both.
 
-    The interval of a parameter that follows one fitted number is that number's, of others it is two standard errors to
-    both sides; NaN for what was not fitted.
+    One such step for each number of `ModelFit.effect_covariance`, for derivatives by these.
     """
     state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
     shape, present, matrix = state.shape(library, key), state.effects[key], spread(coordinates, term.legs)
-    names, covariance = fit.effect_covariance(term)
+    names, _ = fit.effect_covariance(term)
     shifts = [(1e-4 * column * coordinates.typical.max(), {}) for column in matrix.T]
     shifts += [(0.0, {name: 1e-4 * max(abs(shape[name]), 1e-6)}) for name in names]
-    columns = []
     for shift, moved in shifts:
         up, down = (
             coordinates.to_values(
@@ -166,11 +167,23 @@ def _effect_values(fit, library, term):
             )
             for sign in (1.0, -1.0)
         )
-        difference = up - down
-        size = 2.0 * (sum(moved.values()) if moved else np.max(shift))
-        # a phase may have gone once round
-        columns.append(np.where(np.abs(difference) > np.pi, 0.0, difference) / size)
-    slope, values = np.stack(columns, axis=-1), coordinates.to_values(present, shape)
+        yield up, down, 2.0 * (sum(moved.values()) if moved else np.max(shift))
+
+
+def _effect_values(fit, library, term):
+    """Parameter values (p,) of a term's effect, standard errors (p,), 0 for what was not fitted, intervals (p, 2).
+
+    The interval of a parameter that follows one fitted number is that number's, of others it is two standard errors to
+    both sides; NaN for what was not fitted.
+    """
+    state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
+    covariance, values = (
+        fit.effect_covariance(term)[1],
+        coordinates.to_values(state.effects[key], state.shape(library, key)),
+    )
+    # a phase may have gone once round
+    differences = [(up - down, size) for up, down, size in value_steps(fit, library, term)]
+    slope = np.stack([np.where(np.abs(step) > np.pi, 0.0, step) / size for step, size in differences], axis=-1)
     errors = np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
     ends = values[:, None] + QUANTILE_95 * np.outer(errors, [-1.0, 1.0])
     numbers, intervals = fit.effect_numbers(term)

@@ -15,6 +15,8 @@ from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
 from rrru.gap.details import details_of, parameter_rows, where
 from rrru.gap.determined import few_readings, require_determined
+from rrru.gap.drive_functions import drive_functions
+from rrru.gap.left_out import left_out, left_out_note
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.options import OPTIONS
@@ -26,6 +28,7 @@ from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
 from rrru.gap.validity import why_no_answer
 from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide, without_answer
+from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
 from rrru.seeds import stream
@@ -94,12 +97,14 @@ def diagnose(
     residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
     worst = worst_spot(case.motion.position_mm[case.at], residual)
-    row = _row(attribution, verdict, steps, worst, further.runs, robot.noise_mm)
+    excluded = left_out(case, near)
+    row = _row(attribution, verdict, steps, worst, further.runs, (robot.noise_mm, excluded))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     own = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
-    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses}
+    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = parameter_rows(attribution)
+    tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
     if details:
         tables |= details_of(attribution, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, attribution.state, attribution)
@@ -113,13 +118,12 @@ def _found(attribution: Attribution) -> Iterator[str]:
     yield from weight_doubts(attribution)
 
 
-def _notes(attribution: Attribution, stated_mm: float | None) -> Iterator[str]:
-    """What the data lack for a better answer, and what they contradict."""
+def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
+    """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
     case = attribution.case
     yield from fit_notes(attribution)
     if case.count < OPTIONS.min_used_share * len(case.used):
-        which = "not measured, out of reach, near singularities, held out or outliers"
-        yield f"{case.count} of {len(case.used)} points used; the others are {which}"
+        yield left_out_note(excluded, case.count, len(case.used))
     if few := few_readings(case):
         yield few
     acting = {name for name, _ in attribution.state.effects} & case.known.keys()
@@ -137,9 +141,11 @@ def _row(
     steps: Sequence,
     worst_mm: np.ndarray,
     further: pd.DataFrame,
-    stated_mm: float | None,
+    told: tuple[float | None, pd.DataFrame],
 ) -> dict:
-    """The row of `gap_verdicts` without the campaign."""
+    """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
+    stated_mm, excluded = told
+    found = [] if verdict.no_answer else _found(attribution)
     case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
     return {
         "effects": verdict.label,
@@ -159,7 +165,7 @@ def _row(
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join([*([] if verdict.no_answer else _found(attribution)), *_notes(attribution, stated_mm)]),
+        "notes": "; ".join([*found, *_notes(attribution, stated_mm, excluded)]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,

@@ -1,4 +1,4 @@
-"""Where the gap lies: its variance by trajectory, region, direction, leg, sense of motion, speed, payload and time."""
+"""Where the gap lies: its variance by trajectory, region, direction, drive, sense of motion, speed, load and time."""
 
 from dataclasses import dataclass
 
@@ -9,6 +9,7 @@ from scipy.special import chdtri
 
 from rrru.gap.heldout import resampled_rows
 from rrru.gap.options import OPTIONS
+from rrru.robots.drive_words import drive_words
 
 # regions are cells of the points' box
 _CELLS = 3, 3, 2
@@ -35,7 +36,7 @@ def locate(case, residual_mm, drive, generator, draws=200):
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
     one = np.ones(len(residual_mm))
     rows.extend(whole.row("direction", axis, residual_mm[:, k] ** 2, one) for k, axis in enumerate("xyz"))
-    rows.extend(_leg_rows(case, residual_mm, drive, resampled))
+    rows.extend(_drive_rows(case, residual_mm, drive, resampled))
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
 
@@ -100,12 +101,11 @@ def _levels(case):
         quarter = np.char.add("quarter ", (np.searchsorted(edges, time, side="right") + 1).astype(str))
         result["time"] = np.where(np.isfinite(time), quarter, "").astype(object)
     if np.isfinite(rate).any():
-        for leg, unit in enumerate(case.mechanism.parts.units):
-            more, less = ("down", "up") if unit == "rad" else ("out", "in")
-            backwards = np.where(rate[:, leg] < -OPTIONS.min_drive_rate, less, "at rest")
-            sense = np.where(rate[:, leg] > OPTIONS.min_drive_rate, more, backwards)
-            named = np.char.add(f"leg {leg + 1} ", sense)
-            result[f"motion_direction {leg + 1}"] = np.where(np.isfinite(rate[:, leg]), named, "").astype(object)
+        for k, name in enumerate(drive_words(case.mechanism).all_names):
+            backwards = np.where(rate[:, k] < -OPTIONS.min_drive_rate, "falling", "at rest")
+            sense = np.where(rate[:, k] > OPTIONS.min_drive_rate, "rising", backwards)
+            named = np.char.add(f"{name} ", sense)
+            result[f"motion_direction {k + 1}"] = np.where(np.isfinite(rate[:, k]), named, "").astype(object)
     return result
 
 
@@ -116,8 +116,8 @@ def _cells(position):
     return np.array([f"x{i + 1} y{j + 1} z{k + 1}" for i, j, k in index], dtype=object)
 
 
-def _leg_rows(case, residual_mm, drive, resampled):
-    """Rows of the factor leg: shares of the squared errors of the drives."""
+def _drive_rows(case, residual_mm, drive, resampled):
+    """Rows of the factor drive: shares of the squared errors of the drives."""
     residual_mm, drive = case.by_point(residual_mm), case.by_point(drive)
     errors, number = drive_errors(residual_mm, drive), np.flatnonzero(case.used)
     resampled = np.searchsorted(number, case.at[resampled])
@@ -126,10 +126,11 @@ def _leg_rows(case, residual_mm, drive, resampled):
     # a drive of another arm than the one that is read moves nothing, none what is fixed to the world
     scaled = np.divide(errors**2, own, out=np.zeros_like(own), where=own > 0.0)
     whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
-    for leg, unit in enumerate(case.mechanism.parts.units):
-        moved = np.linalg.norm(drive[:, :3, leg] * errors[:, leg, None], axis=1)
-        row = whole.row("leg", f"leg {leg + 1}", scaled[:, leg], np.ones(len(scaled)))
+    names = drive_words(case.mechanism).all_names
+    for k, (name, unit) in enumerate(zip(names, case.mechanism.parts.units, strict=True)):
+        moved = np.linalg.norm(drive[:, :3, k] * errors[:, k, None], axis=1)
+        row = whole.row("drive", name, scaled[:, k], np.ones(len(scaled)))
         row["rms_mm"] = float(np.sqrt((moved**2).mean()))
-        row[f"drive_rms_{unit}"] = float(np.sqrt((errors[:, leg] ** 2).mean()))
+        row[f"drive_rms_{unit}"] = float(np.sqrt((errors[:, k] ** 2).mean()))
         rows.append(row)
     return rows

@@ -55,6 +55,14 @@ file_error_fresh_mm    float? the same at 200 fresh poses between the measured o
 file_remainder         str    what the corrected file leaves beyond the diagnosis and what to use; empty where nothing
 file_headline          str    that the corrected file is worse than the calibration, and why; empty where it is not
 
+## gap_left_out | tables/gap_left_out.parquet | campaign reason
+How many points the diagnosis did not use, by reason; a point has the first reason that fits. None where all are used.
+--
+campaign
+reason                 str    why {not measured, stale reading, outlier in the file, held out for a test, not solved,
+    out of reach, near a singularity, outlier to the diagnosis}
+points                 int    points left out
+
 ## gap_budget | tables/gap_budget.parquet | campaign part
 What the gap's mean square is made of. Shares add up to 1; calibration is no part of what is measured on fitted points
 and is added to their gap.
@@ -75,9 +83,10 @@ probability            float? that the part is real; null where that is no quest
 Where the gap lies: its variance split over the levels of each factor.
 --
 campaign
-factor                 str    what the points are split by {trajectory, region, direction, leg, motion_direction,
+factor                 str    what the points are split by {trajectory, region, direction, drive, motion_direction,
     speed, payload, time}
-level                  str    value of the factor
+level                  str    value of the factor; of the sense of motion: the drive, and whether its value is rising or
+    falling
 points
 rms_mm                 float  residual at this level
 share                  float  share of the gap's variance, 0 to 1
@@ -85,7 +94,7 @@ share_low              float  lower end, 95 %
 share_high             float  upper end, 95 %
 share_of_noise         float  share that noise alone would give this level
 noise_could            bool   true where noise alone could give this share
-drive_rms_rad          float? the residual as equivalent error of the drive angle; null for every factor but leg
+drive_rms_rad          float? the residual as equivalent error of the drive angle; null for every factor but drive
 drive_rms_mm           float? the same of a slider's position, for robots with sliders
 x_mm                   float? centre of the region, x, robot frame; null for other factors
 y_mm                   float? centre of the region, y, robot frame; null for other factors
@@ -112,7 +121,8 @@ legs                   str    on each leg its own value, one value on all (same)
     make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm
 heldout_gain           float? log predictive score gained on left-out runs by adding it to the calibration
-heldout_gain_se        float? its standard error
+heldout_gain_low       float? lower end, 95 %, from the folds; null where there is one
+heldout_gain_high      float? upper end, 95 %
 note                   str    empty where there is nothing to say
 
 ## gap_sets | tables/gap_sets.parquet | campaign rank
@@ -163,6 +173,21 @@ low_95                 float? lower end of the 95 % interval; null for what was 
 high_95                float? upper end of the 95 % interval, unequal distances from the value where a bound or a prior
     of two widths makes them so; null for what was not fitted
 at_bound               bool   true where the fit ended at a bound
+
+## gap_drive_functions | tables/gap_drive_functions.parquet | campaign effect drive drive_value
+Errors of the drives over their own values, over the measured range, of effects in the verdict that depend on these
+alone. Minus their mean: a constant is the drive's zero, which the calibration has.
+--
+campaign
+effect
+drive                  int    number of the drive, from 1 on
+name                   str    name of the drive
+unit                   str    of the drive's value and of its error {rad, mm}
+drive_value            float  value of the drive
+error                  float  what the drive is off by there
+low_95                 float  lower end of the 95 % interval
+high_95                float  upper end of the 95 % interval
+worst                  bool   true where the error of this drive is largest
 
 ## gap_next_runs | tables/gap_next_runs.parquet | campaign rank
 Runs that would separate effects which this campaign cannot tell apart, best first.

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import NOT_CORRECTED, percent, probability, readable, rounded
+from rrru.gap.answer import NOT_CORRECTED, percent, probability, readable, rounded, share_with_interval
 from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
@@ -39,9 +39,19 @@ class Step:
 
 
 @dataclass(frozen=True)
+class Advice:
+    """What to inspect on the machine for one cause and what to do about it, with the source."""
+
+    cause: str
+    inspect: str
+    remedy: str
+    source: str
+
+
+@dataclass(frozen=True)
 class Card:
-    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead
-    sentence, the others, what is next, notes, links to corrected files of the robot, what they are worth, and parts and
+    """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead sentence, the others,
+    Advice on each cause, what is next, notes, links to corrected files of the robot, what they are worth, and parts and
     steps of the bars.
     """
 
@@ -53,6 +63,7 @@ class Card:
     noise: str
     lead: str
     sentences: list
+    advice: list
     next: str
     notes: list
     models: list
@@ -77,6 +88,7 @@ def card(facts, source="", found=None, models=()):
         rounded(facts["noise_rms_mm"]),
         lead,
         others,
+        _advice(facts["effects"]),
         following,
         facts["notes"],
         [] if _not_corrected(facts) else list(models),
@@ -97,6 +109,17 @@ def _short(facts):
     causes = ", ".join(words if share is None else f"{words} {percent(share)}" for words, share in named)
     following = f" Next: {facts['next'][0]['run']}." if facts["next"] else ""
     return f"{causes.capitalize() or 'Nothing to add'} (probability {probability(facts['probability'])}).{following}"
+
+
+def _advice(effects):
+    """Advice on the named causes that are the library's."""
+    return [
+        Advice(
+            f"{readable(one['name']).capitalize()} {one['place']}".strip(), one["inspect"], one["remedy"], one["source"]
+        )
+        for one in effects
+        if one["inspect"]
+    ]
 
 
 def _not_corrected(facts):
@@ -131,7 +154,7 @@ def _parts(budget):
             _WORDS.get(part["kind"], readable(part["part"])),
             _OTHERS.get(part["kind"], _EFFECTS[number % len(_EFFECTS)]),
             round(100.0 * part["share"] / whole, 2),
-            f"{percent(part['share'])} ({percent(part['share_low'])} to {percent(part['share_high'])})",
+            share_with_interval(part),
         )
         for number, part in enumerate([*effects, *others])
     ]

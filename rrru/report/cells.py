@@ -10,6 +10,8 @@ import pandas as pd
 _UNITS = {unit: unit for unit in ("mm", "rad", "deg", "s", "kg", "nats")}
 _UNITS |= {"mm_s": "mm/s", "percent": "%", "um": "µm", "um_per_mm": "µm/mm", "px": "pixel"}
 _UNIT = re.compile(rf"_({'|'.join(sorted(_UNITS, key=len, reverse=True))})$")
+# what names of columns end in that are ends of intervals
+_END = re.compile(r"_?(low|high)(?:_95)?$")
 _DIGITS = 4
 # letters of a text that needs a wide column, and a wider one
 _LONG, _LONGER = 40, 150
@@ -45,6 +47,17 @@ def words(name):
     return stem.replace("_", " ") + (f" ({_UNITS[found[1]]})" if found else "")
 
 
+def head(name, meaning=""):
+    """A column's name as words; of an end of a 95 % interval, as its meaning says, with the interval."""
+    if name == "random_95":
+        return "random part, 95 %: ±"
+    found = _END.search(name)
+    if not (found and "95 %" in meaning):
+        return words(name)
+    end = {"low": "from", "high": "to"}[found[1]]
+    return ", ".join(part for part in (words(name[: found.start()]), f"95 % {end}") if part)
+
+
 def text(value):
     """A cell's text: numbers to four digits, yes and no, a dash for nothing."""
     if isinstance(value, bool | np.bool_):
@@ -75,7 +88,7 @@ def grid(frame, key, title, table=None, path="", heads=None):
     table: the Table whose columns it has, for what they mean, None where there is none; heads: words of single columns.
     """
     meaning = {column.name: column.description for column in table.columns} if table else {}
-    heads = {name: words(name) for name in frame} | (heads or {})
+    heads = {name: head(name, meaning.get(name, "")) for name in frame} | (heads or {})
     rows = [[text(value) for value in row] for row in frame.itertuples(index=False)]
     longest = [max(map(len, cells), default=0) for cells in zip(*rows, strict=True)] or [0] * len(frame.columns)
     looks = [

@@ -19,8 +19,8 @@ class Shown:
 class Section:
     """A section: its key, title and introduction, names of figures with their titles, and tables.
 
-    own: figures of every campaign, which lie in a folder of its name; those of the reproduced one lie beside the
-    study's.
+    own: figures of every campaign, which lie in a folder of its name, with their titles, and the table that has to have
+    rows of the campaign, empty where none has to; those of the reproduced one lie beside the study's.
     """
 
     key: str
@@ -39,12 +39,26 @@ SECTIONS = (
         "Behind the answers",
         "How each answer came about. The gap is what the calibrated simulator still gets wrong, with the measuring "
         "noise taken out. Probabilities are meant literally: of answers with 0.9, nine in ten should be right.",
-        own=(("gap", "The whole diagnosis"),),
+        own=(
+            ("gap", "The whole diagnosis", ""),
+            ("drive_functions", "Errors of the drives over their values", "gap_drive_functions"),
+        ),
         tables=(
+            Shown("gap_left_out", "Points that were left out, by reason"),
             Shown("gap_budget", "What the gap is made of"),
             Shown("gap_attribute", "How probable each cause is"),
             Shown("gap_shrink", "How far the gap shrinks", rows="trajectory == '*'"),
-            Shown("gap_parameters", "Numbers for the simulator, calibration and effects fitted together"),
+            Shown(
+                "gap_parameters",
+                "Numbers for the simulator, calibration and effects fitted together",
+                "campaign effect parameter unit value low_95 high_95 at_bound",
+            ),
+            Shown(
+                "gap_drive_functions",
+                "Where each drive errs most",
+                "campaign effect name unit drive_value error low_95 high_95",
+                "worst",
+            ),
             Shown("gap_locate", "Where the gap lies"),
             Shown("gap_identifiability", "What these data could show at all"),
             Shown("gap_next_runs", "Runs that would tell more"),
@@ -54,12 +68,12 @@ SECTIONS = (
     Section(
         "calibration",
         "Calibration: which numbers may be trusted",
-        "Each number with its standard error: the truth lies within twice that in 95 of 100 cases, if the model lacks "
-        "nothing. Where the diagnosis has found effects, numbers that change by more with them are biased.",
+        "Each number with its 95 % interval: the truth lies within in 95 of 100 cases, if the model lacks nothing. "
+        "Where the diagnosis has found effects, numbers that change by more with them are biased.",
         own=(
-            ("observability", "What the measured points see"),
-            ("workspace", "Where the points lie"),
-            ("convergence", "How the genetic algorithm converges"),
+            ("observability", "What the measured points see", ""),
+            ("workspace", "Where the points lie", ""),
+            ("convergence", "How the genetic algorithm converges", "genetic"),
         ),
         tables=(
             Shown(
@@ -70,6 +84,7 @@ SECTIONS = (
             ),
             Shown("genetic_against_least_squares", "The genetic algorithm beside least squares"),
             Shown("gauge", "Numbers that these poses do not tell apart"),
+            Shown("registration", "The instrument's frame in the robot's, as registered"),
             Shown("campaigns", "Campaigns: where they came from, and what was noted"),
         ),
     ),
@@ -78,7 +93,7 @@ SECTIONS = (
         "Every calibration on every trajectory",
         "A calibration that helps only where it learned is of little use: rows say where it learned, columns where it "
         "was applied.",
-        own=(("cross", "Calibrated here, applied there"),),
+        own=(("cross", "Calibrated here, applied there", ""),),
         tables=(
             Shown(
                 "error_summary",
@@ -193,7 +208,7 @@ SECTIONS = (
         "real",
         "Measured series of real robots",
         "Robots that others measured; rows that were left out say how well the model foretells.",
-        own=(("steps", "Step by step"), ("spectrum", "Waves of every joint"), ("lengths", "Lengths")),
+        own=(("steps", "Step by step", ""), ("spectrum", "Waves of every joint", ""), ("lengths", "Lengths", "")),
         tables=(
             Shown("real_verdicts", "Answers"),
             Shown("real_budget", "What the gap is made of"),

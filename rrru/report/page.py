@@ -19,6 +19,8 @@ from rrru.studies import glossary
 TEMPLATES = Path(__file__).parent / "templates"
 # a figure that is larger than this as SVG is shown as its PNG
 _LARGEST_SVG = 400_000
+# words of columns that hold numbers of legs or, of robots without, of drives
+_HEADS = {"legs": "leg or drive"}
 _TRUST = ("parameters", "correlations", "calibrations", "gap_parameters", "gap_verdicts")
 
 
@@ -129,7 +131,8 @@ class Results:
         columns = [name for name in shown.columns.split() or frame if name in frame]
         frame = frame[columns].dropna(axis="columns", how="all")
         place = self.place(shown.name).relative_to(self.folder)
-        made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place))
+        heads = {name: text for name, text in _HEADS.items() if name in frame}
+        made = cells.grid(frame, shown.name, shown.title, self.schemas.get(shown.name), str(place), heads)
         return made if made.rows else None
 
 
@@ -167,7 +170,7 @@ def save(text, path):
 def _part(results, section):
     """A section with what there is for it, None where there is nothing."""
     wanted = [(name, title) for name, title in section.figures] if results.campaign is None else []
-    wanted += [(place, title) for name, text in section.own for place, title in _own(results, name, text)]
+    wanted += [found for own in section.own for found in _own(results, *own)]
     pictures = [one for one in (results.picture(*each) for each in wanted) if one]
     grids = [one for one in map(results.grid, section.tables) if one]
     if section.key == "calibration" and (judged := _trust(results)):
@@ -175,12 +178,15 @@ def _part(results, section):
     return Part(section.key, section.title, section.about, pictures, grids) if pictures or grids else None
 
 
-def _own(results, name, title):
-    """Places and titles of a figure that every campaign has."""
+def _own(results, name, title, needed):
+    """Places and titles of a figure of every campaign that has rows in the needed table, where one is."""
     folder = results.folder / "figures"
     found = [place.relative_to(folder).with_suffix("") for place in sorted(folder.rglob(f"{name}.svg"))]
     whose = [(str(place), place.parent.name or results.reproduced) for place in found]
     known = results.owners() if results.campaign is None else {results.campaign}
+    if needed:
+        frame = results.frame(needed)
+        known &= set() if frame is None else set(frame["campaign"])
     return [(place, f"{own}: {title}") for place, own in whose if own in known]
 
 

@@ -2,17 +2,18 @@
 
 import pandas as pd
 
-from rrru.gap.answer import rounded, with_error
+from rrru.estimation.intervals import QUANTILE_95
+from rrru.gap.answer import rounded, with_interval
 from rrru.report.cells import MINUS
 
-# a correlation that makes two numbers one, and standard errors that make a difference more than chance
-_TOGETHER, _CLEAR = 0.95, 2.0
+# a correlation that makes two numbers one, and standard errors to the end of a 95 % interval
+_TOGETHER, _CLEAR = 0.95, QUANTILE_95
 _NO_EFFECTS = ("none", "unexplained")
 COLUMNS = ["campaign", "parameter", "value", "judgement", "with_effects", "true_value", "calibration", "points"]
 
 
 def trust(parameters, correlations, calibrations, corrected, verdicts):
-    """A row per campaign and parameter of its calibration on most points, least squares: value, error and judgement.
+    """A row per campaign and parameter of its calibration on most points, least squares: value, interval and judgement.
 
     corrected: rows of `gap_parameters`, which say what becomes of the number once the effects are in the model;
     verdicts: rows of `gap_verdicts`.
@@ -23,13 +24,13 @@ def trust(parameters, correlations, calibrations, corrected, verdicts):
     rows = parameters.merge(widest[["campaign", "calibration", "method", "points"]], how="inner")
     # without effects it is the same calibration, but for the points that a diagnosis leaves out
     with_effects = corrected[~corrected["campaign"].map(answers).isin(_NO_EFFECTS)]
-    moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value"]]
+    moved = with_effects.query("effect == 'calibration'")[["campaign", "parameter", "value", "low_95", "high_95"]]
     rows = rows.merge(moved.rename(columns={"value": "moved"}), how="left", on=["campaign", "parameter"])
     rows = rows.assign(unexplained=rows["campaign"].map(answers).fillna("").str.contains("unexplained"))
     said = {
         "value": _value,
         "judgement": lambda row: _judged(row, _tied(row, correlations)),
-        "with_effects": lambda row: _plain(row["moved"], row["unit"]),
+        "with_effects": lambda row: _interval(row["moved"], row["low_95"], row["high_95"], row["unit"]),
         "true_value": lambda row: _plain(row["true_value"], row["unit"]),
     }
     return rows.assign(**{name: [say(row) for row in rows.to_dict("records")] for name, say in said.items()})[COLUMNS]
@@ -41,10 +42,16 @@ def _plain(value, unit):
 
 
 def _value(row):
-    """A number with its error and unit."""
-    if not row["standard_error"] > 0.0:
-        return _plain(row["value"], row["unit"])
-    return f"{with_error(row['value'], row['standard_error'])} {row['unit']}".replace("-", MINUS)
+    """A number with its unit and its 95 % interval."""
+    half = QUANTILE_95 * row["standard_error"]
+    return _interval(row["value"], row["value"] - half, row["value"] + half, row["unit"])
+
+
+def _interval(value, low, high, unit):
+    """A number with its unit and its 95 % interval, without one where there is none."""
+    if not high > low:
+        return _plain(value, unit)
+    return with_interval(value, low, high, unit).replace("-", MINUS)
 
 
 def _judged(row, tied):

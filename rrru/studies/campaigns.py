@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.estimation.intervals import QUANTILE_95
 from rrru.robots import workspace
 
 
@@ -49,7 +50,7 @@ def campaign_row(robot, section, measurements, singular, noise, notes, registrat
         "source": source,
         "points": len(measurements),
         "runs": measurements["run"].nunique(),
-        **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "near_singularity", "unsolved")},
+        **{status: int(counts.get(status, 0)) for status in ("ok", "outlier", "stale", "near_singularity", "unsolved")},
         "noise_mm": noise.mm,
         "noise_rad": noise.rad,
         "noise_from": noise.source,
@@ -60,6 +61,23 @@ def campaign_row(robot, section, measurements, singular, noise, notes, registrat
         "min_constraint_measure": singular["constraint_measure"].min(),
         "notes": "; ".join(notes),
     }
+
+
+def registration_table(registration):
+    """Rows of `registration`; none without one."""
+    columns = ["number", "unit", "value", "random_95", "points"]
+    if registration is None:
+        return pd.DataFrame(columns=columns)
+    names = [f"{kind}_{axis}" for kind in ("translation", "rotation") for axis in "xyz"]
+    return pd.DataFrame(
+        {
+            "number": names,
+            "unit": np.repeat(["mm", "rad"], 3),
+            "value": registration.numbers,
+            "random_95": QUANTILE_95 * np.sqrt(np.diag(registration.covariance)),
+            "points": registration.points,
+        }
+    )
 
 
 def unmatched_sets(sets, measurements):

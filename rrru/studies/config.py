@@ -63,6 +63,18 @@ def nominal(config, name):
     return robot(config, config["campaigns"][name]) | {"bounds": config["calibration"]["bounds"]}
 
 
+def sets(config, name):
+    """Sets of trajectories that a campaign is calibrated on; those of the reproduced study are for its robot alone."""
+    more = config["reproduce"]["sets"] if of_reproduced_study(config, name) else {}
+    return {**more, **config["calibration"]["sets"]}
+
+
+def of_reproduced_study(config, name):
+    """Whether a campaign's robot is that of the reproduced study, whose sets and objective it then shares."""
+    reproduced = config["reproduce"]["campaign"]
+    return config["campaigns"][name]["robot"] == config["campaigns"][reproduced]["robot"]
+
+
 def source(config, name):
     """A campaign's section without what only drives it."""
     return {key: value for key, value in config["campaigns"][name].items() if key not in _DRIVEN}

@@ -69,7 +69,10 @@ def gap_attribute(
     for name, probability, legs in likely:
         rows[name] |= {"probability": probability, "legs": legs}
     frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("effect").reset_index()
-    return check("gap_attribute", frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_se=1.5, note=""))
+    return check(
+        "gap_attribute",
+        frame.assign(campaign=campaign, heldout_gain=12.0, heldout_gain_low=9.0, heldout_gain_high=15.0, note=""),
+    )
 
 
 def gap_shrink(campaign, trajectories, steps=2, kinds=("held_out", "resimulated")):
@@ -132,7 +135,22 @@ def gap_tables(campaign, ground):
         "gap_attribute": gap_attribute(campaign),
         "gap_shrink": gap_shrink(campaign, ground["trajectory"].unique()),
         "gap_points": gap_points(ground),
+        "gap_drive_functions": gap_drive_functions(campaign),
     }
+
+
+def gap_drive_functions(campaign):
+    """`gap_drive_functions` of waves of three drives, one of which slides."""
+    frames = []
+    for drive, (name, unit, reach, size) in enumerate(
+        (("axis1", "rad", 1.5, 4e-4), ("axis2", "rad", 0.6, 2e-4), ("slide", "mm", 200.0, 0.02)), 1
+    ):
+        share = np.linspace(-1.0, 1.0, 201)
+        error = size * np.sin(7.0 * share)
+        ends = {"low_95": error - 0.2 * size, "high_95": error + 0.2 * size}
+        label = {"drive": drive, "name": name, "unit": unit, "worst": np.arange(201) == np.abs(error).argmax()}
+        frames.append(pd.DataFrame({"drive_value": reach * share, "error": error} | ends | label))
+    return check("gap_drive_functions", pd.concat(frames).assign(campaign=campaign, effect="transmission_error"))
 
 
 def withheld_scores(each=8):

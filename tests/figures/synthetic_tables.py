@@ -11,7 +11,8 @@ CAMPAIGN = "made_up"
 OPTIONS = {
     "campaign": CAMPAIGN,
     "z_down": True,
-    "drives": (),
+    "drives": ("leg 1", "leg 2", "leg 3"),
+    "drive_noun": "leg",
     "sweep_campaign": CAMPAIGN,
     "sweep_calibration": "lines",
     "sweep_operators": "matlab_gaussian",

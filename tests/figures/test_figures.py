@@ -61,7 +61,8 @@ WITHOUT_UNIT = (
     "azimuth of the first point (°)",
     *("model", "waves per turn", "row", "x (m)", "y (m)", "share of the gap's mean square (%)"),
     *(f"joint {number}\n(µrad)" for number in range(1, 7)),
-    "size of the weight in the unit direction (angles as arcs at the end of the drive arm)",
+    "size of the weight in the unit direction (angles as arcs at the robot's own length)",
+    *("value of axis1 (degrees)", "value of axis2 (degrees)", "error (mrad)", "error (µm)"),
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign

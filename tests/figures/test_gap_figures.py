@@ -96,14 +96,14 @@ def test_the_shrink_is_the_last_held_out_step_of_every_trajectory(frames):
     rows = frames["gap_shrink"].query("kind == 'held_out'")
     for line, step in zip(axes.lines[1:], (0, 2), strict=True):
         np.testing.assert_allclose(line.get_xdata(), rows.loc[rows["step"] == step, "gap_rms_mm"])
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "group 1", "group 2", "spiral"]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["all", "line 1", "line 2", "spiral"]
     closed = [label.get_text() for label in axes.child_axes[0].get_yticklabels()]
     assert closed[:2] == ["96 % (94 to 98)", "95 % (93 to 97)"]
 
 
 def test_the_headline_says_verdict_leg_probability_and_what_to_run_next(frames):
     bold, *rest = written(draw("gap", frames).axes[0])
-    assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % of it closed (94 to 98)"
+    assert bold == "link flexure + backlash, leg 2 (p = 0.97): 0.37 mm gap, 96 % of it closed (95 %: 94 to 98)"
     text = " ".join(rest)
     assert (
         "confusable with drive compliance" in text and "x \N{MINUS SIGN}512" in text and f"next: {made_up.NEXT}" in text
@@ -236,3 +236,20 @@ def test_parts_are_drawn_found_against_true():
 def test_tables_of_the_diagnosis_may_be_empty(name, tmp_path):
     tables.write(TABLES[name], pd.DataFrame(columns=TABLES[name].names), tmp_path / "t.parquet")
     assert tables.read(tmp_path / "t.parquet").empty
+
+
+def test_the_error_of_every_drive_is_drawn_with_its_band_and_its_worst_place(frames):
+    figure, rows = draw("drive_functions", frames), frames["gap_drive_functions"]
+    assert len(figure.axes) == 4
+    for axes, (_, part), factor in zip(figure.axes, rows.groupby("drive"), (180.0 / np.pi,) * 2 + (1.0,), strict=False):
+        _, error, worst = axes.lines
+        np.testing.assert_allclose(error.get_xdata(), factor * part["drive_value"])
+        np.testing.assert_allclose(error.get_ydata(), 1e3 * part["error"])
+        (band,) = axes.collections
+        assert band.get_paths()[0].vertices[:, 1].max() == pytest.approx(1e3 * part["high_95"].max())
+        assert abs(worst.get_ydata()[0]) == pytest.approx(1e3 * part["error"].abs().max())
+
+
+def test_without_an_error_over_a_drive_s_value_the_figure_says_so(frames):
+    figure = draw("drive_functions", frames | {"gap_drive_functions": frames["gap_drive_functions"].iloc[:0]})
+    assert figure.texts[0].get_text() == "no effect over a drive's value was found"

@@ -155,7 +155,11 @@ def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
 
 def test_what_the_columns_do_not_tell_is_not_tested():
     frame = measure()
-    for column, lost in (("time_s", {"thermal_growth", "servo_lag", "base_drift"}), ("payload_kg", set()), ("speed_mm_s", set())):
+    for column, lost in (
+        ("time_s", {"thermal_growth", "servo_lag", "base_drift"}),
+        ("payload_kg", set()),
+        ("speed_mm_s", set()),
+    ):
         case = case_of(frame.assign(**{column: np.nan}))
         assert set(case.untestable) & set(EFFECTS) == lost and set(case.library) & set(EFFECTS) == set(EFFECTS) - lost
         assert all(note.startswith("needs ") for note in case.untestable.values())

@@ -36,6 +36,8 @@ DETAILS = {
     "gap_sets",
     "gap_shrink",
     "gap_parameters",
+    "gap_drive_functions",
+    "gap_left_out",
     "gap_next_runs",
     "gap_next_poses",
     "gap_points",
@@ -77,7 +79,8 @@ def test_each_effect_is_named_and_its_numbers_are_recovered(name):
     assert (off.abs() < 4.0 * fitted["standard_error"][known]).all()
     attributed = found.tables["gap_attribute"].set_index("effect")
     assert attributed["probability"].idxmax() == name and set(attributed.index) == {*EFFECTS, "none", "unexplained"}
-    assert attributed.loc[name, "heldout_gain"] > attributed.loc[name, "heldout_gain_se"] > 0.0
+    low, gain, high = attributed.loc[name, ["heldout_gain_low", "heldout_gain", "heldout_gain_high"]]
+    assert 0.0 < gain == pytest.approx(0.5 * (low + high)) and low < high
 
 
 _FIRST_SITE = dict.fromkeys(("backlash", "servo_lag"), "drive") | {

@@ -16,7 +16,7 @@ from rrru.parameters import Parameter, ParameterSet
 from tests.gap.campaigns import EFFECTS, NOISE_MM, case_of, measure
 from tests.schemas import check
 
-FACTORS = {"trajectory", "region", "direction", "leg", "motion_direction", "speed", "payload", "time"}
+FACTORS = {"trajectory", "region", "direction", "drive", "motion_direction", "speed", "payload", "time"}
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +103,7 @@ def test_a_gap_along_one_axis_is_found_there(case, linear, axis):
 def test_a_gap_of_one_drive_is_found_on_its_leg(case, linear, leg):
     residual = _noise(case, 5) + 5e-4 * linear.drive[:, :, leg]
     found = _located(case, residual, linear)
-    found = found[found["factor"] == "leg"].set_index("level")
+    found = found[found["factor"] == "drive"].set_index("level")
     assert found.loc[f"leg {leg + 1}", "share"] > 0.95
     assert found.loc[f"leg {leg + 1}", "drive_rms_rad"] == pytest.approx(5e-4, rel=0.05)
 
@@ -114,7 +114,7 @@ def test_a_gap_with_payload_speed_or_time_is_found_there(case, linear):
         ("payload", "5 kg", frame["payload_kg"].to_numpy() == 5.0),
         ("speed", "300 mm/s", frame["speed_mm_s"].to_numpy() == 300.0),
         ("time", "quarter 1", frame["time_s"].to_numpy() < frame["time_s"].quantile(0.25)),
-        ("motion_direction", "leg 2 up", case.motion.drive_rate[case.used][:, 1] < -1e-6),
+        ("motion_direction", "leg 2 falling", case.motion.drive_rate[case.used][:, 1] < -1e-6),
     ):
         found = _located(case, _noise(case, 6) + 0.2 * here[:, None], linear).set_index(["factor", "level"])["share"]
         assert found[factor, level] > 0.95, factor

@@ -3,11 +3,12 @@
 import shutil
 
 import pytest
+from markupsafe import escape
 
 from rrru.figures import style
 from rrru.report import page
 from rrru.store import facts, tables
-from tests.figures import synthetic_gap
+from tests.figures import synthetic_gap, synthetic_tables
 from tests.gap.test_answer import CAMPAIGN, answered
 from tests.schemas import TABLES
 
@@ -103,6 +104,25 @@ def test_without_an_answer_that_is_the_headline_and_no_cause_is_on_the_card(fold
 
 def test_texts_of_files_are_texts_on_the_page(folder):
     assert "a &lt;b&gt; &amp; c" in written(folder)
+
+
+def test_each_cause_says_what_to_inspect_and_what_to_do_with_its_source(folder):
+    text = written(folder)
+    for cause in answered()["effects"]:
+        assert all(str(escape(cause[part])) in text for part in ("inspect", "remedy", "source"))
+    assert "<dt>Link flexure in leg 2</dt>" in text
+
+
+def test_the_genetic_algorithm_s_figure_is_shown_of_campaigns_that_it_has_searched_alone(folder):
+    figure = folder / f"figures/{CAMPAIGN}/convergence.svg"
+    shutil.copy(folder / f"figures/{CAMPAIGN}/gap.svg", figure)
+    genetic, _ = synthetic_tables.genetic()
+    shown = f'id="figure-{CAMPAIGN}-convergence"'
+    assert shown not in written(folder)
+    tables.write(TABLES["genetic"], genetic.assign(campaign="other"), folder / "tables/genetic.parquet")
+    assert shown not in written(folder)
+    tables.write(TABLES["genetic"], genetic.assign(campaign=CAMPAIGN), folder / "tables/genetic.parquet")
+    assert shown in written(folder)
 
 
 def test_a_folder_without_a_diagnosis_says_what_to_run(tmp_path):

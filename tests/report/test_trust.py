@@ -23,6 +23,7 @@ def tables(effects="backlash", moved=0.1):
     correlations.columns = ["parameter_a", "parameter_b", "correlation"]
     corrected = pd.DataFrame({"campaign": "a", "effect": "calibration", "parameter": NAMES, "value": values.values()})
     corrected.loc[0, "value"] = moved
+    corrected = corrected.assign(low_95=corrected["value"] - 0.02, high_95=corrected["value"] + 0.02)
     return (
         pd.concat([other, parameters], ignore_index=True),
         correlations.assign(campaign="a", calibration="both"),
@@ -48,6 +49,12 @@ def test_every_number_is_judged_by_the_calibration_on_most_points():
 @pytest.mark.parametrize(("moved", "word"), [(0.1, "use"), (0.119, "use"), (0.121, "biased"), (0.05, "biased")])
 def test_what_the_effects_change_by_more_than_twice_the_error_is_biased(moved, word):
     assert judgements(*tables(moved=moved))["sure"].startswith(word)
+
+
+def test_every_number_has_its_95_percent_interval():
+    said = trust(*tables()).set_index("parameter")
+    assert said.loc["sure", "value"] == "0.100 mm (95 %: 0.080 to 0.120)"
+    assert said.loc["sure", "with_effects"] == "0.100 mm (95 %: 0.080 to 0.120)"
 
 
 def test_without_effects_nothing_is_biased_and_beside_something_unexplained_all_is_doubtful():

@@ -99,7 +99,7 @@ def test_a_file_without_times_and_angles_is_diagnosed_and_says_what_it_could_not
 def _fitted(folder):
     """Parameters by least squares on all points, by name."""
     parameters = pd.read_parquet(folder / "parameters.parquet")
-    return parameters.query("calibration == 'both' and method == 'least_squares'").set_index("parameter")["value"]
+    return parameters.query("calibration == 'all' and method == 'least_squares'").set_index("parameter")["value"]
 
 
 def test_a_file_of_a_3_ptt_goes_the_whole_way(measured):
@@ -109,7 +109,7 @@ def test_a_file_of_a_3_ptt_goes_the_whole_way(measured):
     assert _fitted(folder)["db1"] == pytest.approx(0.3, abs=0.05)
     keys = ["calibration", "method", "mode", "trajectory"]
     summary = pd.read_parquet(folder / "error_summary.parquet").set_index(keys)["mean_mm"]
-    assert summary["both", "least_squares", "model", "curve"] < 0.3 * summary["none", "none", "before", "curve"]
+    assert summary["all", "least_squares", "model", "curve"] < 0.3 * summary["none", "none", "before", "curve"]
 
 
 def test_a_campaign_may_have_dimensions_of_its_own(measured):

@@ -38,6 +38,7 @@ def main(settings, inputs, outputs):
         "singularity": singular.assign(campaign=name),
         "workspace": campaigns.workspace_table(robot, measurements).assign(campaign=name),
         "campaigns": pd.DataFrame([row]).assign(campaign=name),
+        "registration": campaigns.registration_table(registration).assign(campaign=name),
     }
     table = measurement_table(robot, measurements.columns)
     tables.write_all((table,), {"measurements": measurements}, outputs)

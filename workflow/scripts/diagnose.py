@@ -4,10 +4,11 @@ import pandas as pd
 
 from rrru.campaign.noise import read_noise
 from rrru.figures.drawing import draw_all
-from rrru.gap.answer import answer, arm_drives
+from rrru.gap.answer import answer
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.schemas import TABLES, tables_of
 from rrru.gap.settings import GapSettings
+from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.store import facts, tables
 from rrru.store.job import run
@@ -30,8 +31,8 @@ def main(settings, inputs, outputs):
         result = write_corrected(
             result, settings["robot"]["dimensions"], masses, outputs["corrected"], settings["seed"]
         )
-    drives = arm_drives(nominal)
-    told = answer(settings["campaign"], result.verdict, result.tables, drives)
+    words = drive_words(nominal)
+    told = answer(settings["campaign"], result.verdict, result.tables, words)
     facts.write(told, outputs["verdict"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
@@ -40,7 +41,7 @@ def main(settings, inputs, outputs):
         for name, frame in frames.items()
     }
     tables.write_all(tables_of(nominal), frames, outputs)
-    options = settings["options"] | {"z_down": nominal.z_down, "drives": drives}
+    options = settings["options"] | {"z_down": nominal.z_down, "drives": words.all_names, "drive_noun": words.noun}
     draw_all(settings["figures"], {name: outputs[name] for name in frames}, options, outputs)
 
 

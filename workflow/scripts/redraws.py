@@ -11,7 +11,7 @@ from rrru.studies.rrru3.schemas import TABLES
 def main(settings, inputs, outputs):
     """Write the draws, the counts over them and the searched numbers; empty for a measured campaign."""
     reproduce, calibration, virtual = (settings[key] for key in ("reproduce", "calibration", "virtual"))
-    patterns = [calibration["sets"][reproduce[f"{kind}_calibration"]] for kind in ("line", "spiral")]
+    patterns = [settings["sets"][reproduce[f"{kind}_calibration"]] for kind in ("line", "spiral")]
     count, near = reproduce["redraws"] if virtual else 0, calibration["use_near_singularity"]
     campaign = setup.virtual_campaign(settings["nominal"], virtual) if virtual else None
     found = redraws(campaign, patterns, reproduce["method"], count, near)

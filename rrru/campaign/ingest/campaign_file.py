@@ -38,8 +38,8 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     """Measurement table of a file, for the robot that it was measured on.
 
     Positions are brought to mm and the robot frame, angles to rad; drive angles that the file lacks are those of the
-    commanded positions; points that a broken beam spoilt get the status "outlier" and stay. Raises IngestError with
-    every problem that the file has.
+    commanded positions; points that a broken beam spoilt get the status "outlier", stale readings "stale", and stay.
+    Raises IngestError with every problem that the file has.
     """
     sheet, notes = _read(spec, mechanism)
     digit_mm = MM[spec.unit] * resolution(measured(sheet.frame) / MM[spec.unit])
@@ -68,7 +68,7 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         ]
     table, more = _table(sheet, mounted, registration, digit_mm)
     if len(repeated):
-        table.loc[sheet.frame.index.isin(repeated.index), "status"] = "outlier"
+        table.loc[sheet.frame.index.isin(repeated.index), "status"] = "stale"
         listed = ", ".join(map(str, repeated.index[:10])) + (", ..." if len(repeated) > 10 else "")
         more = [
             *more,

@@ -13,13 +13,25 @@ _LEAST_WIDTH = 0.05
 
 @dataclass(frozen=True)
 class Registration:
-    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,); what it leaves at `points` points."""
+    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,); what it leaves at `points` points.
+
+    covariance (6, 6): of the translation in mm and the rotation vector in rad, if what is left were random and alike at
+    all points; NaN where three points leave no freedom.
+    """
 
     rotation: np.ndarray
     translation: np.ndarray
     rms_mm: float
     max_mm: float
     points: int
+    covariance: np.ndarray
+
+    @property
+    def numbers(self):
+        """Translation in mm, and rotation vector in rad, (6,)."""
+        from scipy.spatial.transform import Rotation
+
+        return np.concatenate([self.translation, Rotation.from_matrix(self.rotation).as_rotvec()])
 
     def apply(self, position_mm):
         """Positions (n, 3) in the robot's frame, mm, of positions (n, 3) in the instrument's frame."""
@@ -48,8 +60,33 @@ def register(measured_mm, command_mm):
     best, _ = Rotation.align_vectors(command - middle_command, measured - middle_measured)
     rotation = best.as_matrix()
     translation = middle_command - rotation @ middle_measured
-    off = np.linalg.norm(measured @ rotation.T + translation - command, axis=1)
-    return Registration(rotation, translation, float(np.sqrt((off**2).mean())), float(off.max()), len(command))
+    placed = measured @ rotation.T + translation
+    off = np.linalg.norm(placed - command, axis=1)
+    sizes = float(np.sqrt((off**2).mean())), float(off.max()), len(command)
+    return Registration(rotation, translation, *sizes, _covariance(placed, off, rotation, translation))
+
+
+def _covariance(placed, off, rotation, translation):
+    """Covariance (6, 6) of translation and rotation vector from points (n, 3) and what is left of them (n,), mm, rad.
+
+    A small motion (s, w) in the robot's frame moves a point p by s + w x p; least squares has the covariance
+    v (J^T J)^-1 of (s, w) with the variance v of what is left (3 n - 6 degrees of freedom).
+    """
+    from scipy.spatial.transform import Rotation
+
+    spare = 3 * len(placed) - 6
+    crossed = np.cross(np.eye(3)[None], placed[:, None]).transpose(0, 2, 1)
+    columns = np.concatenate([np.broadcast_to(np.eye(3), crossed.shape), crossed], axis=2).reshape(-1, 6)
+    variance = (off**2).sum() / spare if spare else np.nan
+    # of (s, w) to the translation t + s + w x t and the rotation vector of exp(w) R, by central differences
+    step, slope = 1e-6, np.eye(6)
+    slope[:3, 3:] = np.cross(np.eye(3), translation).T
+    around = [
+        [(Rotation.from_rotvec(sign * step * axis) * Rotation.from_matrix(rotation)).as_rotvec() for axis in np.eye(3)]
+        for sign in (1.0, -1.0)
+    ]
+    slope[3:, 3:] = (np.array(around[0]) - np.array(around[1])).T / (2.0 * step)
+    return variance * slope @ np.linalg.inv(columns.T @ columns) @ slope.T
 
 
 def _require_spread(name, position):

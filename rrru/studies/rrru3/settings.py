@@ -6,7 +6,7 @@ from rrru.errors import ConfigError
 def check(config):
     """Raise ConfigError where `reproduce` or `sweep` names what does not exist or says a thing twice."""
     reproduce, sweep = config["reproduce"], config["sweep"]
-    sets = config["calibration"]["sets"]
+    sets = reproduce["sets"] | config["calibration"]["sets"]
     named = {"campaign": config["campaigns"], "line_calibration": sets, "spiral_calibration": sets}
     for key, known in named.items():
         if reproduce[key] not in known:

@@ -74,3 +74,17 @@ def test_points_that_cannot_fix_six_numbers_are_refused_with_numbers(measured, c
 def test_wrong_shapes_are_refused():
     with pytest.raises(ValueError, match=r"got \(5, 3\) and \(4, 3\)"):
         register(POINTS, POINTS[:4])
+
+
+def test_numbers_of_a_motion_are_off_as_far_as_their_covariance_says():
+    """Over draws of noise the squared errors under the covariance are those of six normal numbers."""
+    rng, turn, shift = np.random.default_rng(3), np.array([0.4, -0.9, 1.3]), np.array([900.0, -400.0, 250.0])
+    points = rng.uniform(-500.0, 500.0, size=(60, 3))
+    seen = (points - shift) @ Rotation.from_rotvec(turn).as_matrix()
+    squares = []
+    for _ in range(300):
+        found = register(seen + rng.normal(scale=0.05, size=seen.shape), points)
+        off = found.numbers - np.concatenate([shift, turn])
+        squares.append(off @ np.linalg.solve(found.covariance, off))
+    # mean of 300 chi-squares of six degrees of freedom, a little more since the variance is estimated
+    assert np.mean(squares) == pytest.approx(6.0, abs=0.8)

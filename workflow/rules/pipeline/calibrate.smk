@@ -3,7 +3,15 @@ GENETIC_SETTINGS = [f"genetic.{key}" for key in config["genetic"] if key != "see
 CALIBRATION_TABLES = ["calibrations", "parameters", "gauge", "correlations", "observability"]
 GENETIC_TABLES = ["genetic", "genetic_history", "genetic_parameters", "genetic_against_least_squares"]
 # tables of the whole study that are the campaigns' parts, one below the other
-CAMPAIGN_TABLES = ["campaigns", "singularity", *CALIBRATION_TABLES, *GENETIC_TABLES, "errors", "error_summary"]
+CAMPAIGN_TABLES = [
+    "campaigns",
+    "registration",
+    "singularity",
+    *CALIBRATION_TABLES,
+    *GENETIC_TABLES,
+    "errors",
+    "error_summary",
+]
 TARGETS += named(CAMPAIGN_TABLES).values()
 
 
@@ -16,9 +24,7 @@ rule calibrate:
     log:
         f"{RESULTS}/logs/calibrate/{{campaign}}.log",
     params:
-        settings=calibrated(
-            *(f"calibration.{key}" for key in ("sets", "loss", "loss_scale_mm", "use_near_singularity"))
-        ),
+        settings=calibrated(*(f"calibration.{key}" for key in ("loss", "loss_scale_mm", "use_near_singularity"))),
         code=code("calibrate"),
     script:
         "../../scripts/calibrate.py"
@@ -33,7 +39,7 @@ rule genetic:
     log:
         f"{RESULTS}/logs/genetic/{{campaign}}.log",
     params:
-        settings=calibrated("seed", "genetic", "calibration.sets", "calibration.use_near_singularity"),
+        settings=calibrated("seed", "genetic", "calibration.use_near_singularity"),
         code=code("genetic"),
     script:
         "../../scripts/genetic.py"

@@ -94,7 +94,8 @@ def campaign_settings(wildcards):
         "section": parts.source(config, name),
         "nominal": parts.nominal(config, name),
         "virtual": parts.virtual(config, name),
-        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity", "sets")},
+        "sets": parts.sets(config, name),
+        **{key: calibration[key] for key in ("singularity_margin", "use_near_singularity")},
     }
 
 
@@ -106,7 +107,10 @@ def calibrated(*keys, driven=False):
     def settings(wildcards):
         name = wildcards.campaign
         real = {"virtual": parts.virtual(config, name)} if driven else {"truth": parts.truth(config, name)}
-        return {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
+        told = {"campaign": name, "nominal": parts.nominal(config, name), **real, **reads(*keys)}
+        if "calibration" in told:
+            told["calibration"]["sets"] = parts.sets(config, name)
+        return told
 
     return settings
 
@@ -140,7 +144,9 @@ def own_effects():
 
 def campaign_options(campaign):
     """What the figures that every campaign gets are told."""
-    return {"campaign": campaign, "method": config["reproduce"]["method"], "mode": "closed_loop"}
+    of_study = parts.of_reproduced_study(config, campaign)
+    method = config["reproduce"]["method"] if of_study else "least_squares"
+    return {"campaign": campaign, "method": method, "mode": "closed_loop"}
 
 
 def paper_options():

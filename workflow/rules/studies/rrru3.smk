@@ -27,7 +27,7 @@ PAPERS["A"] = {
         "virtual": paper_a_settings.design(parts.virtual(config, REPRODUCED)),
         **reads(
             *(f"genetic.{key}" for key in ("operators", "crossover_fraction", "migration_fraction", "populations")),
-            *(f"reproduce.{key}" for key in config["reproduce"] if key != "redraws"),
+            *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("redraws", "sets")),
         ),
     },
 }
@@ -56,7 +56,7 @@ rule sweep:
         settings=lambda wildcards: {
             **wildcards,
             "nominal": parts.nominal(config, REPRODUCED),
-            "patterns": config["calibration"]["sets"][config["reproduce"]["line_calibration"]],
+            "patterns": parts.sets(config, REPRODUCED)[config["reproduce"]["line_calibration"]],
             "populations": config["sweep"]["populations"][wildcards.population],
             "reading": paper_a_settings.reading(config["sweep"], wildcards.operators),
             **reads("seed", *GENETIC_SETTINGS, "sweep.stall_generations", "calibration.use_near_singularity"),
@@ -90,13 +90,13 @@ rule redraws:
         settings={
             "nominal": parts.nominal(config, REPRODUCED),
             "virtual": parts.virtual(config, REPRODUCED),
+            "sets": {
+                config["reproduce"][key]: parts.sets(config, REPRODUCED)[config["reproduce"][key]]
+                for key in ("line_calibration", "spiral_calibration")
+            },
             **reads(
-                *(
-                    f"calibration.sets.{config['reproduce'][key]}"
-                    for key in ("line_calibration", "spiral_calibration")
-                ),
                 "calibration.use_near_singularity",
-                *(f"reproduce.{key}" for key in config["reproduce"] if key != "campaign"),
+                *(f"reproduce.{key}" for key in config["reproduce"] if key not in ("campaign", "sets")),
             ),
         },
         code=code("redraws"),
