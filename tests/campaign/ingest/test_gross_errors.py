@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
-from rrru.campaign.ingest.gross_errors import Mistakes, find_gross_error
+from rrru.campaign.ingest.gross_errors import find_gross_error
+from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.errors import ConfigError, IngestError
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.test_lost_zeros import _arm, _hexapod
@@ -54,7 +55,7 @@ def test_every_mistake_is_named(kind, seed):
     named["measured columns that are not 1 row late"] = _shifted(frame, 1)
     named["measured columns that are not 2 rows early"] = _shifted(frame, -2)
     mirror = rows.measured(frame) * [1.0, -1.0, 1.0]
-    named["a right-handed frame: turn the sign of one measured axis"] = frame.assign(
+    named["a right-handed frame: columns: {measured_x_mm: measured_y_mm, measured_y_mm: measured_x_mm}"] = frame.assign(
         **rows.vector_columns("measured", mirror)
     )
     for advice, spoilt in named.items():
