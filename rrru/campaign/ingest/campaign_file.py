@@ -100,7 +100,7 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         notes += _refuse_gross_error(sheet, any(found[name] in cells.factors for name in MEASURED))
     if not set(COMMAND) <= set(frame):
         problems.refuse()
-        frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
+        frame = frame.assign(**vector_columns("command", sent_to(frame, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
     frame, more = number_runs(frame)
@@ -141,9 +141,9 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
     if gross.limit_mm is not None:
         value += f", and by {gross.rms_without_mm:.3g} mm rms at best{gross.advice}" * bool(gross.advice)
         allowed = (
-            f"at most {gross.limit_mm:.3g} mm rms: the file does not fit the robot {robot.name}; see that `robot`, its "
+            f"at most {gross.limit_mm:.3g} mm rms: the file does not fit the robot {robot.name}; see that `robot`, "
         )
-        allowed += "description and the columns of its drives (`columns`) belong to the file"
+        allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
     sheet.refuse_now(concerned, value, allowed)
 

@@ -17,7 +17,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.checks import resolution
 from rrru.campaign.ingest.gross_advice import of_drives
 from rrru.campaign.ingest.gross_file import GrossFile
-from rrru.campaign.ingest.mistakes import Mistakes, all_orders
+from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.registration import register
 from rrru.campaign.ingest.sheet import AXES, COMMAND, TARGET, TURNS, position_text
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
@@ -29,8 +29,8 @@ from rrru.robots.robot import Robot
 TOLERANCE_MM = 0.01
 # rows that tell, and share of them that has to agree
 _LEAST_ROWS, _AGREEING = 10, 0.9
-# all signs of so many drives are tried; hypotheses from whose best others start
-_MOST_SIGNED, _MOST_FOLLOWED = 7, 3
+# hypotheses from which two mistakes start
+_MOST_FOLLOWED = 3
 # steps to the zeros of the drives
 _MOST_STEPS = 20
 # a larger difference, as a share of the robot's size, is none of a controller's own calibration; assumed
@@ -110,7 +110,10 @@ class _Both:
         return len(off) >= _LEAST_ROWS and bool((off <= self.tolerance_mm).mean() >= _AGREEING)
 
     def mistakes(self, simple: bool) -> Mistakes | None:
-        """The simplest Mistakes in signs, order, unit and rows that make both agree, None for none; simple: a single one."""
+        """The simplest Mistakes in signs, order, unit and rows that make both agree, None for none.
+
+        simple: looks for single ones alone.
+        """
         file, tried = self.file, {}
 
         def first(every: Iterable[Mistakes]) -> Mistakes | None:
@@ -126,7 +129,7 @@ class _Both:
 
         if (found := first(further(file.given))) is not None or simple:
             return found
-        if (found := first([*map(file.given.reordered, all_orders(file.count)), *_signed(file.given)])) is not None:
+        if (found := first(all_orders_and_signs(file.count))) is not None:
             return found
         best = sorted(tried, key=lambda one: np.median(tried[one]))[:_MOST_FOLLOWED]
         return first(two for one in best for two in further(one))
@@ -189,13 +192,6 @@ class _Both:
             units, names = file.robot.parts.units, file.robot.parts.columns
             parts = [f"{zeros[k]:.6g} {units[k]} to {names[k]}" for k in np.flatnonzero(np.abs(zeros) > step)]
             yield f"drive values whose zeros are the robot's: adding {', '.join(parts)} makes both agree"
-
-
-def _signed(given: Mistakes) -> Iterator[Mistakes]:
-    """All signs of the drives, none where they are too many."""
-    count = len(given.signs)
-    if count <= _MOST_SIGNED:
-        yield from (replace(given, signs=signs) for signs in product((1, -1), repeat=count))
 
 
 def _points(nominal: TargetReadings) -> np.ndarray:

@@ -21,7 +21,7 @@ from scipy.special import logsumexp
 
 from rrru.campaign.ingest.gross_advice import advice
 from rrru.campaign.ingest.gross_file import EXPLAINED_SHARE, GrossFile, Hypothesis
-from rrru.campaign.ingest.mistakes import Mistakes, all_orders
+from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.robots.robot import Robot
 
@@ -39,7 +39,7 @@ _CERTAIN = 0.99
 # mistakes that may be in one file together, an order of the drives being some; hypotheses of each round that are looked
 # at, more where others may be as good, and from how many of the best the next round goes on
 _MOST_ROUNDS, _FIRST_LOOKED_AT, _MOST_LOOKED_AT, _MOST_FOLLOWED = 6, 8, 32, 3
-# round after which all orders of the drives are tried
+# round after which all orders and signs of the drives are tried
 _SIMPLE_ROUNDS = 2
 # difference of log evidence from which on a hypothesis does not matter
 _FAR_BEHIND = 10.0
@@ -68,24 +68,24 @@ def find_gross_error(
     robot: Robot,
     found: Mapping[str, str] | None = None,
     unit_stated: bool = False,
-    driven_right: bool = False,
+    agreed: bool = False,
 ) -> GrossError | None:
     """The GrossError that a file's columns show, under our names and in mm and rad; None where none is certain.
 
     found: {our name: the file's name} of the columns; unit_stated: whether the file's header states the unit of what
-    was measured; driven_right: whether the drive values are known to be right.
+    was measured; agreed: whether commanded positions and drive values say the same.
     """
     file = GrossFile.of(frame, spec, robot, found or {}, unit_stated)
     if file is None or len(file) < _LEAST_ROWS:
         return None
-    file = replace(file, driven_right=driven_right)
+    file = replace(file, agreed=agreed)
     search, ordinary_mm = _Search(file), _ORDINARY_SHARE * robot.size_mm
     as_is = search.best
     if as_is.rms_mm <= ordinary_mm:
         return None
     for number in range(_MOST_ROUNDS):
-        if number == _SIMPLE_ROUNDS and not (search.explained or file.driven_right):
-            search.look_at(map(file.given.reordered, all_orders(file.count)))
+        if number == _SIMPLE_ROUNDS and not search.explained:
+            search.look_at(all_orders_and_signs(file.count))
         before = search.best
         search.go_on()
         if search.best is before and number >= _SIMPLE_ROUNDS:
@@ -133,7 +133,7 @@ class _Search:
     def go_on(self) -> None:
         """Look at what is one mistake away from the best ones."""
         start = sorted(self.found.values(), key=lambda one: -one.log_evidence)[:_MOST_FOLLOWED]
-        self.look_at(one for hypothesis in start for one in self._file.further(hypothesis.mistakes))
+        self.look_at(one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units))
 
     @property
     def named(self) -> list[Hypothesis]:

@@ -3,7 +3,7 @@
 See `rrru.campaign.ingest.gross_errors`. Lengths in mm, angles in rad.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -40,6 +40,8 @@ _NO_RESIDUAL_SHARE = 1e-5
 # positions spread over more than the first share of the robot's size, and over less than the second, or the unit of
 # its drives is wrong
 _LEAST_SPREAD, _MOST_SPREAD = 2e-3, 3.0
+# distance of commanded positions that agree with drive values of few digits
+_AGREED_MM = 1.0
 # turns, or sizes of the robot, by which drives may be away from their home values: with more the unit is another
 _MOST_AWAY = 4.0
 
@@ -62,8 +64,8 @@ class GrossFile:
     command_mm (n, 3), command_turn (n, 3, 3): commanded positions of the tool and orientations, which pose the robot
     where K is 0; None where the file has none. names, place_mm (k, 3): of the targets, NaN where no place is stated;
     chosen: rows that decide; spec: what the configuration states, which the columns have already; found: {our name: the
-    file's name}; unit_stated: whether the file's header states the unit of what was measured; driven_right: whether
-    drive values are known to be right, as commanded positions say the same.
+    file's name}; unit_stated: whether the file's header states the unit of what was measured; agreed: whether
+    commanded positions and drive values say the same, which no mistake may change.
     """
 
     robot: Robot
@@ -79,7 +81,7 @@ class GrossFile:
     names: tuple[str, ...]
     place_mm: np.ndarray
     chosen: np.ndarray
-    driven_right: bool = False
+    agreed: bool = False
 
     def __len__(self) -> int:
         return len(self.chosen)
@@ -133,8 +135,6 @@ class GrossFile:
         """Units other than those stated that readings and drive values may have."""
         others = [unit for unit in MM if unit != self.spec.unit and not self.unit_stated]
         result = [{"unit": unit} for unit in others]
-        if self.driven_right:
-            return tuple(result)
         if self.has_lengths:
             drives = [unit for unit in MM if unit != self.spec.unit_of_drives]
             result += [{"drive_unit": unit} for unit in drives]
@@ -194,14 +194,10 @@ class GrossFile:
         """Which targets' (k,) places are stated."""
         return np.isfinite(self.place_mm).all(axis=1)
 
-    def further(self, mistakes: Mistakes) -> Iterator[Mistakes]:
-        """All Mistakes that are one more, in what was measured alone where drive values are known to be right."""
-        return (one for one in mistakes.further(self.units) if one.of_readings or not self.driven_right)
-
     @cached_property
     def _ways(self) -> int:
         """How many single mistakes there are."""
-        return len([*self.further(self.given)])
+        return len([*self.given.further(self.units)])
 
     def _spread(self, readings: TargetReadings) -> float:
         """Of what carries the targets, turns as far as they move a target at the robot's arm."""
@@ -225,6 +221,10 @@ class GrossFile:
         if len(at) < 3:
             return None
         body, turn = self._bodies(mistakes, at)
+        if self.agreed and not mistakes.of_readings:
+            off = np.linalg.norm(body + turn @ np.asarray(self.robot.tool_mm) - self.command_mm[at], axis=1)
+            if not np.median(off) <= _AGREED_MM:
+                return None
         posed = np.isfinite(body).all(axis=1)
         if posed.mean() < _LEAST_POSED:
             return None

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 from math import factorial
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 _PRIOR = 0.01
 # rows that a column may be shifted by
 _SHIFTS = (1, -1, 2, -2)
-# all orders of so many drives are tried together with other mistakes, all orders of more by themselves
+# all orders of so many drives are tried together with other mistakes, all orders and signs of more by themselves
 _MOST_ORDERED, _MOST_PERMUTED = 4, 6
 
 
@@ -118,6 +118,10 @@ def usual_orders(count: int) -> tuple[tuple[int, ...], ...]:
 
 
 @cache
-def all_orders(count: int) -> tuple[tuple[int, ...], ...]:
-    """All orders of so many drives but their own, none where they are too many."""
-    return tuple(permutations(range(count)))[1:] if count <= _MOST_PERMUTED else ()
+def all_orders_and_signs(count: int) -> tuple[Mistakes, ...]:
+    """All orders and all signs of so many drives, but the right ones; none where they are too many."""
+    if count > _MOST_PERMUTED:
+        return ()
+    given = Mistakes.none(count)
+    signed = (replace(given, signs=signs) for signs in product((1, -1), repeat=count))
+    return tuple(one for one in (*map(given.reordered, permutations(range(count))), *signed) if one.count)
