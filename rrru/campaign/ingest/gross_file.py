@@ -208,7 +208,7 @@ class GrossFile:
         """Of an rms in shares of the positions' spread, from so many rows."""
         independent = min(max(len(self.robot.parameters), _LEAST_INDEPENDENT), 3 * len(self) // 2)
         fitted = 3 * np.isin(np.flatnonzero(self._stated), self.target[self.chosen]).sum() * mistakes.free
-        cost = 0.5 * fitted * np.log(3.0 * count)
+        cost = 0.5 * fitted * np.log(3.0 * max(count, 1))
         share = min(max(share, _NO_RESIDUAL_SHARE), 1.0)
         return float(mistakes.log_prior(self._ways) - independent * np.log(share) - cost)
 
@@ -254,9 +254,7 @@ class GrossFile:
         factor = np.where(lengths, length, _factor(RAD, mistakes.angle_unit, self.spec.angle_unit))
         values = mistakes.applied(self.drive[at]) * factor
         away = np.abs(values - self.robot.legs.home_drives) / np.where(lengths, self.robot.size_mm, 2.0 * np.pi)
-        if np.median(away.max(axis=1)) > _MOST_AWAY or not (
-            mistakes == self.given or self._share_in_range(values) > 0.5
-        ):
+        if np.median(away.max(axis=1)) > _MOST_AWAY or not (mistakes == self.given or self._in_range(values)):
             return np.full((len(at), 3), np.nan), np.zeros((len(at), 3, 3))
         # poses that do not exist are an answer here
         with np.errstate(all="ignore"):
@@ -268,12 +266,14 @@ class GrossFile:
         return body, turn
 
     def share_in_range(self) -> float:
-        """Share of the rows whose drive values are within their ranges."""
-        return self._share_in_range(self.drive[self.chosen]) if self.count else 1.0
+        """Share of the rows whose drive values are all within their ranges."""
+        if not self.count:
+            return 1.0
+        return float(np.isfinite(self.robot.in_range(self.drive[self.chosen])).all(axis=1).mean())
 
-    def _share_in_range(self, values: np.ndarray) -> float:
-        """Share of drive values (m, K) that are within their ranges."""
-        return float(np.isfinite(self.robot.in_range(values)).all(axis=1).mean())
+    def _in_range(self, values: np.ndarray) -> bool:
+        """Whether each drive's values (m, K) are within its range in most rows."""
+        return bool(np.isfinite(self.robot.in_range(values)).mean(axis=0).min() > 0.5)
 
     def _guess(self, values: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Positions (m, 3) near which the poses of drive values (m, K) of some rows are."""
