@@ -14,8 +14,9 @@ class ConfigError(RrruError):
 class IngestError(RrruError):
     """A measurement file is refused.
 
-    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number of the
-    data row, counted from 1 below the header, or None where the whole file or column is meant.
+    `problems` is a tuple of dicts with the keys `file`, `row`, `column`, `value`, `allowed`; `row` is the number that
+    an editor shows, of the line of a text or the row of a sheet; of parquet files, which have no header line, it is
+    counted from 1. It is None where the whole file or column is meant.
     """
 
     def __init__(self, problems: Iterable[dict]) -> None:

@@ -119,6 +119,16 @@ def register_targets(readings: TargetReadings, mirrored: bool = False, robust: b
     return found
 
 
+def affine_rms(readings: TargetReadings) -> float:
+    """Root mean square distance in mm that the best 3 x 3 matrix in place of the rotation leaves.
+
+    No registration leaves less, whatever the unit of the readings, and mirrored or not.
+    """
+    linear = _eliminated(readings, np.ones(len(readings.measured_mm)))
+    entries = np.linalg.lstsq(linear.rest, linear.left, rcond=1e-9)[0]
+    return float(np.linalg.norm(linear.rest @ entries - linear.left) / np.sqrt(len(readings.measured_mm)))
+
+
 @dataclass(frozen=True)
 class _Eliminated:
     """Least squares |upper z + cross q - aim|^2 + |rest q - left|^2 of everything linear z and entries q (9,) of Q.

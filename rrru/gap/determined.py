@@ -41,6 +41,13 @@ def require_determined(case, whose=""):
     return replace(case, library=library, untestable=case.untestable | reasons, known=known)
 
 
+def poses_needed(case):
+    """Rank of the calibration at a Case's poses, poses that a diagnosis needs at least and poses that were read."""
+    rank = _rank(observations_of(case).jacobian(case.mechanism.parameters.nominal))
+    poses = len(np.unique(case.stop))
+    return rank, int(np.ceil((rank + OPTIONS.min_spare_numbers) * poses / (3 * len(case)))), poses
+
+
 def few_readings(case):
     """A sentence on how little a diagnosis of few readings finds, None where they are many."""
     numbers, count = 3 * len(case), len(case.mechanism.parameters)

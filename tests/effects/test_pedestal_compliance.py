@@ -99,7 +99,7 @@ def test_reflectors_beside_the_robot_are_found_and_one_taken_for_another_is_name
     table = found.measurements
     assert (table["target_on"] == np.where(table["target"].isin([*_TABLE]), "world", "platform")).all()
     assert table.loc[table["status"] == "outlier", "point"].tolist() == [185]
-    assert "run 1 point 185: t2 lies 608 mm away, where t1 is" in found.notes
+    assert "row 186: t2 lies 608 mm away, where t1 is" in found.notes
     places = table.groupby("target")[["target_x_mm", "target_y_mm", "target_z_mm"]].first()
     off = [places.loc[name] - places.loc["t1"] - np.subtract(_TABLE[name], _TABLE["t1"]) for name in _TABLE]
     assert np.abs(off).max() < 0.1

@@ -9,9 +9,10 @@ import pandas as pd
 from rrru.campaign.ingest.checks import check_runs, check_speed, number_runs, resolution, stale
 from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resolve
 from rrru.campaign.ingest.commands import with_commands
+from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
-from rrru.campaign.ingest.gross_errors import find_gross_error
+from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error
 from rrru.campaign.ingest.guess import guess_columns
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
@@ -95,10 +96,11 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     if not set(REQUIRED) - set(COMMAND) <= set(frame) or len(set(cells.names)) < len(cells.names):
         problems.refuse()
     if not problems:
-        _refuse_gross_error(frame, spec, mechanism, found, problems)
+        sheet = Sheet(spec, mechanism, problems, found, frame)
+        notes += _refuse_gross_error(sheet, any(found[name] in cells.factors for name in MEASURED))
     if not set(COMMAND) <= set(frame):
         problems.refuse()
-        frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
+        frame = frame.assign(**vector_columns("command", sent_to(frame, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
     frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)
@@ -106,24 +108,44 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     return sheet, notes + more + _notes_on_columns(sheet)
 
 
-def _refuse_gross_error(
-    frame: pd.DataFrame, spec: IngestSpec, mechanism: Robot, found: dict[str, str], problems: Problems
-) -> None:
-    """Raise IngestError where a mistake in the file explains why it is far from the robot."""
-    gross, what = find_gross_error(frame, spec, mechanism), "the instrument stands"
-    if gross is None and mechanism.orients and set(COMMAND) <= set(frame):
-        sent = frame.drop(columns=["target", *TARGET], errors="ignore").assign(
-            **vector_columns("measured", command(frame))
-        )
-        gross, what = find_gross_error(sent, spec, mechanism), "the frame of the commanded positions lies"
-    if gross is None:
-        return
-    value = f"a nominal robot that is off by {gross.rms_mm:.3g} mm rms however {what}"
+def _refuse_gross_error(sheet: Sheet, unit_stated: bool) -> list[str]:
+    """Raise IngestError where a mistake in the file explains why it is far from the robot, or it is of another one.
+
+    unit_stated: whether the file's header states the unit of what was measured. A note where commanded positions and
+    drive values do not agree, whatever is changed.
+    """
+    robot, driven = sheet.mechanism, set(sheet.drives) <= set(sheet.frame)
+    contradiction = find_contradiction(sheet.frame, sheet.spec, robot, sheet.found)
+    agree = driven and set(COMMAND) <= set(sheet.frame) and contradiction is None
+    gross = find_gross_error(sheet.frame, sheet.spec, robot, sheet.found, unit_stated, agree)
+    if gross is not None:
+        _refuse(sheet, gross, driven)
+    if contradiction is None:
+        return []
+    off = f"commanded positions {contradiction.off_mm:.3g} mm in the median from those of the nominal robot at the "
+    off += sheet.drive_name
+    if contradiction.refused:
+        sheet.refuse_now(COMMAND, off, f"at most {contradiction.tolerance_mm:.3g} mm; {contradiction.advice}")
+    return [f"{off}, which are used{'; they would agree with: ' * bool(contradiction.advice)}{contradiction.advice}"]
+
+
+def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
+    """Raise IngestError for a GrossError; driven: whether the file has drive values."""
+    robot = sheet.mechanism
+    model = "a nominal robot that is" if driven else "measured positions that are"
+    where = "" if driven else " the commanded ones"
+    value = f"{model} off{' from' * bool(where)}{where} by {gross.rms_mm:.3g} mm rms however the instrument stands"
     if not np.isfinite(gross.rms_mm):
         value = "values at which the nominal robot has no pose in more than a tenth of the rows"
     allowed = f"{gross.advice}, which leaves {gross.rms_without_mm:.3g} mm rms (probability above 0.99)"
-    concerned = MEASURED if gross.of_readings else mechanism.parts.columns
-    problems.refuse_now(column=", ".join(found.get(name, name) for name in concerned), value=value, allowed=allowed)
+    if gross.limit_mm is not None:
+        value += f", and by {gross.rms_without_mm:.3g} mm rms at best{gross.advice}" * bool(gross.advice)
+        allowed = (
+            f"at most {gross.limit_mm:.3g} mm rms: the file does not fit the robot {robot.name}; see that `robot`, "
+        )
+        allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
+    concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
+    sheet.refuse_now(concerned, value, allowed)
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:
@@ -166,10 +188,9 @@ def _table(
         told |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**told, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
-        places = frame.loc[outlier, ["run", "point"]].to_numpy()
-        where = ", ".join(f"run {run:g} point {point:g}" for run, point in places[:10])
-        more = ", ..." if len(places) > 10 else ""
-        notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
+        where = ", ".join(f"row {row}" for row in frame.index[outlier][:10])
+        more = ", ..." if outlier.sum() > 10 else ""
+        notes.append(f"{outlier.sum()} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
     optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
     extra = [name for name in (*optional, "motion", "motion_between") if name in frame]

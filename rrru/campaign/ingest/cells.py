@@ -27,7 +27,7 @@ _TWO_FIELDS = "; a decimal comma makes two fields of one number"
 
 @dataclass(frozen=True)
 class Cells:
-    """Cells of a file: names of its columns, numbers of its n rows, {name: cells (n,)}.
+    """Cells of a file: names of its columns, numbers of its n rows as an editor shows them, {name: cells (n,)}.
 
     means: our names of columns that the format knows, to the file's; factors: what brings columns to mm whose unit the
     file states; spreads: what makes a standard deviation of expanded uncertainties; commas: columns with decimal
@@ -69,33 +69,41 @@ def text_cells(data, problems, separator=None, decimal="."):
     Rows with another number of fields than the header are noted and left out, as are empty lines at the end. Raises
     IngestError for anything but UTF-8 text with the separator, a header line and at least one row.
     """
-    names, *rows = fields(decode(data, problems), separator or ",", problems)
+    (names, *rows), (_, *lines) = fields(decode(data, problems), separator or ",", problems)
     _require_header(names, rows, separator or ",", problems)
-    return table(names, rows, problems, frozenset(names if decimal == "," else ()))
+    return table(names, rows, lines, problems, frozenset(names if decimal == "," else ()))
 
 
 def fields(text, separator, problems):
-    """Stripped fields of each line of a text."""
-    reader = csv.reader(io.StringIO(text.lstrip("\r\n"), newline=""), strict=True, delimiter=separator)
+    """Stripped fields of each row of a text, and the number of the line in which each begins."""
+    body = text.lstrip("\r\n")
+    reader = csv.reader(io.StringIO(body, newline=""), strict=True, delimiter=separator)
+    above = len(text[: len(text) - len(body)].splitlines())
+    rows, lines, line = [], [], above + 1
     try:
-        return [[cell.strip() for cell in row] for row in reader]
+        for row in reader:
+            rows.append([cell.strip() for cell in row])
+            lines.append(line)
+            line = above + reader.line_num + 1
     except csv.Error as error:
         allowed = 'fields without quotes, or each quote closed: "line 1"'
-        problems.refuse_now(value=f"line {reader.line_num}: {error}", allowed=allowed)
+        problems.refuse_now(value=f"line {above + reader.line_num}: {error}", allowed=allowed)
+    return rows, lines
 
 
-def table(names, rows, problems, commas=frozenset()):
-    """Cells of rows of fields below the names of the columns."""
+def table(names, rows, numbers, problems, commas=frozenset()):
+    """Cells of rows of fields below the names of the columns; numbers: of the rows, as an editor shows them."""
     while rows and not any(map(_filled, rows[-1])):
         rows = rows[:-1]
     if not rows:
         value = f"a header ({', '.join(names)}) and no row"
         problems.refuse_now(value=value, allowed="one row per measured point below the header")
-    whole = [number for number, row in enumerate(rows, start=1) if _is_whole(number, row, len(names), problems)]
+    numbered = zip(numbers, rows, strict=False)
+    whole = [(number, row) for number, row in numbered if _is_whole(number, row, len(names), problems)]
     if not whole:
         problems.refuse()
-    columns = zip(*(rows[number - 1] for number in whole), strict=True)
-    return Cells(names, whole, dict(zip(names, columns, strict=True)), commas=commas)
+    columns = zip(*(row for _, row in whole), strict=True)
+    return Cells(names, [number for number, _ in whole], dict(zip(names, columns, strict=True)), commas=commas)
 
 
 def decode(data, problems, allowed=_TEXT, others=()):

@@ -117,7 +117,7 @@ def convert(spec, mechanism, found, told, problems):
     drives = {drive.column: drive.unit for drive in mechanism.parts.drives}
     filled |= set(drives) if filled & set(drives) else set()
     factor = dict.fromkeys((*COMMAND, *MEASURED, *NOISE), MM[spec.unit])
-    factor |= {name: MM[spec.unit] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
+    factor |= {name: MM[spec.unit_of_drives] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
     factor |= {ours: told.factors[theirs] for ours, theirs in found.items() if theirs in told.factors}
     frame = pd.DataFrame(index=pd.Index(rows))
     blank = _blank_groups(found, cells, len(rows))

@@ -49,7 +49,7 @@ def _check_poses(known, command, sheet):
     off, limit = np.linalg.norm(back - command, axis=1), frame_limit(sheet.mechanism)
     if not np.median(off) <= limit:
         value = f"{sheet.drive_name} that bring the nominal robot {np.median(off):.6g} mm from there in the median"
-        advice = "see that unit, angle_unit, the robot's zero positions, its frame and its tool belong to the file"
+        advice = "see that `robot`, its zero positions, its frame and its tool, unit and angle_unit belong to the file"
         sheet.note("angles", COMMAND, value, f"at most {limit:.4g} mm; {advice}")
     return True
 
@@ -180,9 +180,8 @@ def _check_drives(known, drive, sheet):
     bad = off > limits
     unit, limit = units[0], limits[0]
     allowed = f"within {limit:g} {unit} of the {'angle' if unit == 'rad' else 'one'} that the commanded position needs"
-    if bad.any() and bad.any(axis=1).mean() > _MANY and (advice := _drive_advice(given, drive, command, sheet)):
-        read = f" when read in {sheet.spec.angle_unit}" if unit == "rad" else ""
-        value = f"{sheet.drive_name} up to {np.nanmax(np.abs(given)):.6g} {unit}{read}"
+    if bad.any() and bad.any(axis=1).mean() > _MANY and (advice := _elbow_advice(given, command, sheet)):
+        value = f"{sheet.drive_name} up to {np.nanmax(np.abs(given)):.6g} {unit}"
         value += f", up to {np.nanmax(off):.6g} {unit} from those that the commanded positions need"
         sheet.note("angles", sheet.drives, value, f"{allowed}; {advice}")
         return
@@ -196,21 +195,12 @@ def _tolerances(mechanism):
     return np.array([DRIVE_TOLERANCE[unit] for unit in mechanism.parts.units])
 
 
-def _drive_advice(given, drive, command, sheet):
-    """Which setting makes the drive angles or slider positions fit the commanded positions, or None."""
-    mechanism, spec = sheet.mechanism, sheet.spec
-    other, factor = {"rad": ("deg", np.pi / 180.0), "deg": ("rad", 180.0 / np.pi)}[spec.angle_unit]
-    elbow = {"out": "in", "in": "out"}[spec.elbow]
-    candidates = [
-        (given, mechanism.inverse(command, elbow=elbow), f"elbow: {elbow} makes them fit"),
-        (given[:, ::-1], drive, "the legs seem to be numbered the other way round"),
-    ]
-    if "rad" in mechanism.parts.units:
-        candidates.insert(0, (given * factor, drive, f"angle_unit: {other} makes them fit"))
-    for candidate, wanted, advice in candidates:
-        if (np.abs(candidate - wanted) < _tolerances(mechanism)).all(axis=1).mean() > _MOST:
-            return advice
-    return None
+def _elbow_advice(given, command, sheet):
+    """Whether the drive values fit the commanded positions with the other elbow, in words, or None."""
+    elbow = {"out": "in", "in": "out"}[sheet.spec.elbow]
+    off = np.abs(given - sheet.mechanism.inverse(command, elbow=elbow))
+    fits = (off < _tolerances(sheet.mechanism)).all(axis=1).mean() > _MOST
+    return f"elbow: {elbow} makes them fit" if fits else None
 
 
 def _axes_advice(measured, command, limit):

@@ -104,8 +104,7 @@ def _frames(sheet, named):
     if "target" in frame:
         wrong, texts = strays(seen, stops(frame), names, on_world)
         right = ~wrong
-        at = frame[["run", "point"]].to_numpy()
-        notes = tuple(f"run {at[k, 0]:g} point {at[k, 1]:g}: {text}" for k, text in texts.items())
+        notes = tuple(f"row {frame.index[k]}: {text}" for k, text in texts.items())
     stated = (
         _known(sheet, names) if named else np.tile(np.asarray(sheet.mechanism.tool_mm, dtype=float), (len(frame), 1))
     )

@@ -20,7 +20,9 @@ class Problems:
         return bool(self._by_kind)
 
     def add(self, kind, *, value, allowed, row=None, column=None):
-        """Note a problem: data row from 1 or None, the file's column or None, its value there, what is allowed."""
+        """Note a problem: the row's number as an editor shows it or None, the file's column or None, its value there,
+        what is allowed.
+        """
         texts = {
             "column": None if column is None else _short(column),
             "value": _short(value),

@@ -17,6 +17,7 @@ _AS_IT_ENDS = Format()
 _CHOICES = {
     "unit": tuple(MM),
     "angle_unit": tuple(RAD),
+    "drive_unit": (None, *MM),
     "frame": ("robot", "register"),
     "extra_columns": ("refuse", "ignore"),
     "elbow": ("out", "in"),
@@ -28,8 +29,9 @@ class IngestSpec:
     """How to read a measurement file; raises ConfigError for a setting that does not exist.
 
     columns: our name -> the file's column name, absent = the same name. unit: of the file's positions ("mm", "m",
-    "inch"; speeds are mm/s, payloads kg). angle_unit: "rad" or "deg". frame: of the measured positions; "register"
-    solves the six numbers between it and the robot frame from `registration_points`, pairs (run, point), none for all.
+    "inch"; speeds are mm/s, payloads kg). drive_unit: of drive values that are lengths, None as `unit`. angle_unit:
+    "rad" or "deg". frame: of the measured positions; "register" solves the six numbers between it and the robot frame
+    from `registration_points`, pairs (run, point), none for all.
     extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
     places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
     that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
@@ -43,6 +45,7 @@ class IngestSpec:
     columns: Mapping[str, str] = field(default_factory=dict)
     unit: str = "mm"
     angle_unit: str = "rad"
+    drive_unit: str | None = None
     frame: str = "robot"
     registration_points: tuple = ()
     extra_columns: str = "refuse"
@@ -60,7 +63,7 @@ class IngestSpec:
     def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
         given = {key: getattr(self, key) for key in _CHOICES}
-        wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(_CHOICES[key])}" for key in _CHOICES]
+        wrong = [f"{key} is {given[key]!r}; allowed: {', '.join(filter(None, _CHOICES[key]))}" for key in _CHOICES]
         wrong = [text for text, key in zip(wrong, _CHOICES, strict=True) if given[key] not in _CHOICES[key]]
         doubled = [name for name in theirs if theirs.count(name) > 1]
         wrong += [f"columns gives {name!r} two meanings; allowed: one of our names per column" for name in doubled]
@@ -70,6 +73,11 @@ class IngestSpec:
             wrong.append(f"registration_points {points!r}; allowed: pairs (run, point)")
         if wrong:
             raise ConfigError(f"ingest of {self.path}: {wrong[0]}")
+
+    @property
+    def unit_of_drives(self) -> str:
+        """Unit of drive values that are lengths."""
+        return self.drive_unit or self.unit
 
     def check_drives(self, drives: Sequence[str]) -> None:
         """Raise ConfigError where signs or order are not of these drives."""

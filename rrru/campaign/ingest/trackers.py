@@ -44,7 +44,7 @@ HEADER_LINES = 50
 def leica_cells(data, problems, separator=None, decimal="."):
     """Cells of a Leica-style CSV's bytes: from the line that names X, Y and Z on; see the module."""
     text = decode(data, problems, "comma-separated text with columns X [mm], Y [mm], Z [mm]", ("utf-16", "cp1252"))
-    rows = fields(text, separator or ",", problems)
+    rows, lines = fields(text, separator or ",", problems)
     at = next((i for i, row in enumerate(rows[:HEADER_LINES]) if names_axes(row)), None)
     if at is None:
         first = ", ".join(rows[0][:8])
@@ -53,7 +53,7 @@ def leica_cells(data, problems, separator=None, decimal="."):
         allowed = f"a header X [mm], Y [mm], Z [mm]{advice}"
         problems.refuse_now(value=f"no line with X, Y and Z ({first}, ...)", allowed=allowed)
     names, below = _one_clock(rows[at], rows[at + 1 :])
-    cells = table(names, below, problems, frozenset(names if decimal == "," else ()))
+    cells = table(names, below, lines[at + 1 :], problems, frozenset(names if decimal == "," else ()))
     notes = (f"left out: {at} lines above the header",) if at else ()
     return _known(cells, problems, {}, notes)
 
@@ -61,17 +61,17 @@ def leica_cells(data, problems, separator=None, decimal="."):
 def spatial_analyzer_cells(data, problems, separator=None, decimal="."):
     """Cells of a SpatialAnalyzer point list's bytes; see the module."""
     text = decode(data, problems, _LIST, ("utf-16", "cp1252"))
-    lines = [line.strip() for line in text.splitlines()]
-    comments = [line.lstrip("/").strip() for line in lines if line.startswith("//")]
-    body = [line for line in lines if line and not line.startswith("//")]
+    lines = {number: line.strip() for number, line in enumerate(text.splitlines(), start=1)}
+    comments = [line.lstrip("/").strip() for line in lines.values() if line.startswith("//")]
+    body = {number: line for number, line in lines.items() if line and not line.startswith("//")}
     if not body:
         problems.refuse_now(value=f"{len(comments)} comment lines and no point", allowed=_LIST)
     if other := next((line for line in comments if _OTHER_AXES.search(line)), None):
         problems.refuse_now(value=f"the comment {other!r}", allowed="Cartesian coordinates: export X, Y, Z")
-    between = separator or separator_of(body, decimal)
-    rows = [_split(line, between) for line in body]
+    between = separator or separator_of([*body.values()], decimal)
+    rows = [_split(line, between) for line in body.values()]
     names, rows, notes = _named(comments, rows, between, problems)
-    cells = table(names, rows, problems, frozenset(names if decimal == "," else ()))
+    cells = table(names, rows, [*body][-len(rows) :], problems, frozenset(names if decimal == "," else ()))
     return _known(cells, problems, _stated_unit(comments, problems), notes)
 
 

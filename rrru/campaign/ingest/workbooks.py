@@ -61,7 +61,9 @@ def xlsx_cells(data, problems, sheet=None):
     if not filled[sheet]:
         problems.refuse_now(value=f"the sheet {sheet!r}, which is empty", allowed="a header and one row per point")
     names, *rows = filled[sheet]
-    return table(["" if name is None else str(name).strip() for name in names], rows, problems)
+    first = 2 + next(i for i, row in enumerate(book[sheet].iter_rows(values_only=True)) if any(map(_filled, row)))
+    names = ["" if name is None else str(name).strip() for name in names]
+    return table(names, rows, range(first, first + len(rows)), problems)
 
 
 def _rows(sheet):

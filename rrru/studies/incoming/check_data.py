@@ -12,6 +12,7 @@ import yaml
 
 from rrru.campaign.ingest.columns import REQUIRED, resolve
 from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.sheet import COMMAND, position_text
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import ConfigError, IngestError, RrruError
@@ -115,9 +116,20 @@ def _used(section, cells, mechanism):
     if any(name.startswith("command") for name in missing):
         other = f"the drives' values ({', '.join(mechanism.parts.columns)})"
         yield f"where the robot was sent stands in no column: give a second file with --commands, or {other}"
+    yield from _meant(found, mechanism)
     optional = [ours for ours in _OPTIONAL if ours not in found]
     if optional:
         yield f"missing: {', '.join(optional)}"
+
+
+def _meant(found, mechanism):
+    """What commanded positions and payloads are of."""
+    tool = f"the tool, {position_text(mechanism.tool_mm)} on the platform"
+    if set(COMMAND) <= set(found):
+        others = ", whatever target a row is of" if "target" in found else ""
+        yield f"meant: commanded positions are of {tool}{others}"
+    if "payload_kg" in found:
+        yield f"meant: payload_kg hangs at {tool}"
 
 
 def read_config(overlays, base="config.yaml"):

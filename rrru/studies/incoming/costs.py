@@ -5,9 +5,10 @@ import numpy as np
 from rrru.campaign import measurements as rows
 from rrru.campaign.noise import ENOUGH_REPEATS, read_noise, repeat_noise
 from rrru.errors import FitError, RrruError
-from rrru.gap.determined import require_determined
+from rrru.gap.determined import poses_needed, require_determined
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
+from rrru.gap.options import OPTIONS
 from rrru.gap.settings import GapSettings
 from rrru.robots.dynamics import Masses
 from rrru.studies import config as parts
@@ -42,7 +43,14 @@ def costs(measurements, config, section):
         case = require_determined(case)
     except FitError as error:
         said.insert(0, f"no diagnosis: {error}")
-    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case)]
+    return [*_numbers(nominal, robot), *said, *_untested(case), *_one_way(case), _poses(case)]
+
+
+def _poses(case):
+    """How many poses the calibration needs."""
+    rank, needed, read = poses_needed(case)
+    spare = f"{OPTIONS.min_spare_numbers} numbers to spare"
+    return f"{read} poses are read; {rank} parameters that these tell apart need at least {needed}, with {spare}"
 
 
 def without_times(config, mechanism):

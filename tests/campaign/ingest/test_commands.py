@@ -71,7 +71,7 @@ def test_another_number_of_rows_without_names_is_refused(tmp_path):
 
 def test_a_name_that_nobody_commanded_is_refused_with_its_row(tmp_path):
     problems = problems_of(tmp_path, NAMED[["name", "trajectory", *MEASURED]], NAMED[["name", *COMMAND]].drop(index=7))
-    assert [(p["row"], p["value"]) for p in problems] == [(8, "'P7'")]
+    assert [(p["row"], p["value"]) for p in problems] == [(9, "'P7'")]
 
 
 def test_a_name_commanded_twice_is_refused(tmp_path):
@@ -90,4 +90,4 @@ def test_what_is_wrong_in_the_commands_is_told_of_their_file_and_row(tmp_path):
     commands.loc[5, "command_y_mm"] = "left"
     commands = commands.iloc[::-1]
     problems = problems_of(tmp_path, NAMED[["name", "trajectory", *MEASURED]], commands)
-    assert [(p["file"], p["row"], p["value"]) for p in problems] == [(str(tmp_path / "c.csv"), 47, "'left'")]
+    assert [(p["file"], p["row"], p["value"]) for p in problems] == [(str(tmp_path / "c.csv"), 48, "'left'")]

@@ -130,8 +130,8 @@ def test_a_sheet_of_several_has_to_be_named(tmp_path):
     assert len(kept.measurements) == 118
 
 
-# the first row after ten o'clock
-LATE = next(k for k, line in enumerate((FILES / "leica.csv").read_text("cp1252").splitlines()) if " 10:" in line)
+# the first line after ten o'clock
+LATE = next(k + 1 for k, line in enumerate((FILES / "leica.csv").read_text("cp1252").splitlines()) if " 10:" in line)
 BROKEN = {
     "an unknown unit": ("leica", lambda text: text.replace("Y  [mm]", "Y  [ft]"), None, "the unit ft", "mm, m, in"),
     "no axes": ("leica", lambda text: text.replace("Z  [mm]", "W"), None, "no line with X, Y and Z", "a header X [mm]"),

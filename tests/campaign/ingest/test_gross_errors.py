@@ -1,5 +1,6 @@
 """Gross mistakes put into files of random robots: each is named, and files without one are not suspected."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,14 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
-from rrru.campaign.ingest.gross_errors import Mistakes, find_gross_error
+from rrru.campaign.ingest.gross_errors import find_gross_error
+from rrru.campaign.ingest.mistakes import Mistakes
+from rrru.campaign.ingest.spec import MM
 from rrru.errors import ConfigError, IngestError
+from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.test_lost_zeros import _arm, _hexapod
+from tests.robots import two_arms
 
 _PLACE_MM = (40.0, -25.0, 60.0)
 _NOISE_MM, _ERROR_SD = 0.02, {"mm": 0.5, "rad": 1e-3}
@@ -54,7 +59,7 @@ def test_every_mistake_is_named(kind, seed):
     named["measured columns that are not 1 row late"] = _shifted(frame, 1)
     named["measured columns that are not 2 rows early"] = _shifted(frame, -2)
     mirror = rows.measured(frame) * [1.0, -1.0, 1.0]
-    named["a right-handed frame: turn the sign of one measured axis"] = frame.assign(
+    named["a right-handed frame: columns: {measured_x_mm: measured_y_mm, measured_y_mm: measured_x_mm}"] = frame.assign(
         **rows.vector_columns("measured", mirror)
     )
     for advice, spoilt in named.items():
@@ -95,9 +100,108 @@ def test_lost_zeros_are_no_gross_mistake():
         assert find_gross_error(off, _SPEC, robot) is None
 
 
-def test_files_without_drive_values_have_none():
-    robot, frame = _made(1)
-    assert find_gross_error(frame.drop(columns=[*robot.parts.columns]), _SPEC, robot) is None
+def _commanded(seed):
+    """An arm, and its file of commanded poses without drive values."""
+    robot, frame = _made(seed)
+    driven = frame[[*robot.parts.columns]].to_numpy()
+    poses = robot.solve(driven, robot.guess(driven))
+    sent = poses.point(np.asarray(robot.tool_mm))
+    told = rows.vector_columns("command", sent) | rows.turn_columns("command", poses.turn)
+    return robot, frame.drop(columns=[*robot.parts.columns]).assign(**told)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_mistakes_in_files_of_commanded_poses_are_named(seed):
+    robot, frame = _commanded(seed)
+    measured = rows.measured(frame)
+    assert find_gross_error(frame, _SPEC, robot) is None
+    named = {
+        "measured columns that are not 1 row late": _shifted(frame, 1),
+        "a right-handed frame": frame.assign(**rows.vector_columns("measured", measured[:, [2, 1, 0]])),
+        "measured columns in mm, as the commanded ones: they are in m": frame.assign(
+            **rows.vector_columns("measured", measured / 1000.0)
+        ),
+    }
+    for advice, spoilt in named.items():
+        assert find_gross_error(spoilt, _SPEC, robot).advice.startswith(advice)
+    wrong = replace(_SPEC, targets={"ball": tuple(np.add(_PLACE_MM, [50.0, 0.0, -10.0]))})
+    assert find_gross_error(frame, wrong, robot).advice.startswith("targets: {ball: [")
+
+
+@pytest.mark.parametrize(("kind", "unit"), [(_arm, "m"), (_arm, "inch"), (_hexapod, "m"), (_hexapod, "inch")])
+def test_units_of_readings_and_of_drive_values_are_named(kind, unit):
+    robot, frame = _made(11, kind)
+    factor, lengths = MM[unit], "mm" in robot.parts.units
+    drives = [*robot.parts.columns]
+    read = frame.assign(**rows.vector_columns("measured", rows.measured(frame) / factor))
+    both = read.assign(**{name: read[name] / factor for name in drives if lengths})
+    assert find_gross_error(both, _SPEC, robot).advice == f"unit: {unit}"
+    if lengths:
+        assert find_gross_error(read, _SPEC, robot).advice == f"unit: {unit} and drive_unit: mm"
+        driven = frame.assign(**{name: frame[name] / factor for name in drives})
+        assert find_gross_error(driven, _SPEC, robot).advice == f"drive_unit: {unit}"
+    else:
+        degrees = frame.assign(**{name: np.degrees(frame[name]) for name in drives})
+        assert find_gross_error(degrees, _SPEC, robot).advice == "angle_unit: deg"
+        radians = frame.assign(**{name: np.radians(frame[name]) for name in drives})
+        assert find_gross_error(radians, replace(_SPEC, angle_unit="deg"), robot).advice == "angle_unit: rad"
+
+
+@pytest.mark.parametrize("kind", [_arm, _hexapod])
+def test_any_order_of_the_drives_is_found(kind):
+    for seed in range(3):
+        robot, frame = _made(60 + seed, kind)
+        drives = [*robot.parts.columns]
+        order = np.random.default_rng(seed).permutation(len(drives)).tolist()
+        mixed = frame.assign(**{name: frame[drives[k]] for name, k in zip(drives, order, strict=True)})
+        wanted = f"order: [{', '.join(drives[k] for k in order)}]"
+        assert wanted in find_gross_error(mixed, _SPEC, robot).advice.split(" or ")
+
+
+def test_the_file_of_another_robot_does_not_fit(tmp_path):
+    (_, frame), (other, _) = _made(70), _made(71)
+    found = find_gross_error(frame, _SPEC, other)
+    assert found.limit_mm is not None and min(found.rms_mm, found.rms_without_mm) > found.limit_mm
+    path = tmp_path / "file.csv"
+    frame.to_csv(path, index=False)
+    with pytest.raises(IngestError, match="the file does not fit the robot"):
+        ingest(replace(_SPEC, path=str(path)), other)
+
+
+def _two_arms(seed):
+    """The robot of two arms, and its file of both hands' markers whose places are stated."""
+    generator = np.random.default_rng(seed)
+    robot = make_mechanism("two_arms", two_arms.section())
+    driven = robot.legs.home_drives + generator.uniform(-0.5, 0.5, (40, len(two_arms.DRIVES)))
+    every, hands = np.repeat(driven, 2, axis=0), np.tile(["right", "left"], len(driven))
+    seen = np.array([two_arms.seen(q, hand, two_arms.MARKERS[hand]) for q, hand in zip(every, hands, strict=True)])
+    seen = Rotation.random(random_state=generator).apply(seen) + generator.normal(size=seen.shape)
+    frame = pd.DataFrame(every, columns=robot.parts.columns).assign(trajectory="poses", target=hands)
+    spec = IngestSpec("file.csv", frame="register", targets=two_arms.MARKERS)
+    return robot, frame.assign(**rows.vector_columns("measured", seen)), spec
+
+
+def test_mistakes_of_robots_with_two_hands_are_named():
+    robot, frame, spec = _two_arms(3)
+    drives = [*robot.parts.columns]
+    assert find_gross_error(frame, spec, robot) is None
+    turned = frame.assign(**{drives[4]: -frame[drives[4]]})
+    assert find_gross_error(turned, spec, robot).advice == f"signs: {{{drives[4]}: -1}}"
+    swapped = frame.assign(**{drives[3]: frame[drives[7]], drives[7]: frame[drives[3]]})
+    order = [*drives[:3], drives[7], *drives[4:7], drives[3], *drives[8:]]
+    assert find_gross_error(swapped, spec, robot).advice == f"order: [{', '.join(order)}]"
+    assert find_gross_error(frame.drop(columns="target"), spec, robot) is None
+
+
+def test_what_the_message_says_of_a_left_handed_frame_mends_it(tmp_path):
+    robot, frame = _made(4)
+    path = tmp_path / "file.csv"
+    frame.assign(measured_x_mm=frame["measured_z_mm"], measured_z_mm=frame["measured_x_mm"]).to_csv(path, index=False)
+    with pytest.raises(IngestError) as refused:
+        ingest(replace(_SPEC, path=str(path)), robot)
+    text = re.search(r"columns: \{(.*?)\}", str(refused.value))[1]
+    exchanged = dict(pair.split(": ") for pair in text.split(", "))
+    ingest(replace(_SPEC, path=str(path), columns=exchanged), robot)
 
 
 def test_a_mistake_is_undone_by_what_is_applied():

@@ -178,7 +178,7 @@ def test_a_broken_beam_is_kept_and_marked(field, tmp_path):
     frame.loc[[40, 200], "measured_z_mm"] += [12.0, -30.0]
     result = ingest(IngestSpec(written(frame, tmp_path / "f.csv")), ROBOT)
     assert np.flatnonzero(result.measurements["status"] == "outlier").tolist() == [40, 200]
-    assert result.notes == ("2 points marked as outliers, kept and left out of fits: run 2 point 15, run 8 point 19",)
+    assert result.notes == ("2 points marked as outliers, kept and left out of fits: row 42, row 202",)
     assert result.measurements["measured_z_mm"].to_list() == frame["measured_z_mm"].to_list()
 
 
@@ -188,7 +188,7 @@ def test_stale_readings_are_left_out_and_named(field, expected, tmp_path):
         spoilt.loc[row, MEASURED] = field.loc[row - 1, MEASURED].to_numpy()
     result = ingest(IngestSpec(written(spoilt, tmp_path / "file.csv")), ROBOT)
     assert np.flatnonzero(result.measurements["status"] == "stale").tolist() == [8, 100]
-    text = "2 stale readings, equal to an earlier one in every digit, left out: rows 9, 101"
+    text = "2 stale readings, equal to an earlier one in every digit, left out: rows 10, 102"
     assert text in result.notes
 
 

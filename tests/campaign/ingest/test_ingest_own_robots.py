@@ -85,7 +85,7 @@ def test_degrees_of_an_arm_are_converted_when_declared_and_refused_when_not(tmp_
     degrees = frame.assign(**{name: np.degrees(frame[name]) for name in ARM.parts.columns})
     found = _ingested(degrees, tmp_path, angle_unit="deg").measurements
     assert np.abs(rows.actuators(found, ARM) - frame[ARM.parts.columns].to_numpy()).max() < 1e-9
-    with pytest.raises(IngestError, match=r"bring the nominal robot .* mm from there"):
+    with pytest.raises(IngestError, match="angle_unit: deg"):
         _ingested(degrees, tmp_path)
 
 
@@ -96,10 +96,11 @@ def test_angles_alone_in_another_unit_than_stated_are_one_problem(factor, stated
     frame = _file().drop(columns=[f"command_{axis}_mm" for axis in "xyz"])
     frame[ARM.parts.columns] *= factor
     frame[MEASURED] *= length
-    with pytest.raises(IngestError, match=f"angle_unit: {right} does") as refused:
+    both = f"unit: m and angle_unit: {right}" if length < 1.0 else f"angle_unit: {right}"
+    with pytest.raises(IngestError, match=f"allowed: {both}, which leaves") as refused:
         _ingested(frame, tmp_path, angle_unit=stated)
     assert len(refused.value.problems) == 1
-    with pytest.raises(IngestError, match="unit: m fits") if length < 1.0 else nullcontext():
+    with pytest.raises(IngestError, match="allowed: unit: m, which leaves") if length < 1.0 else nullcontext():
         _ingested(frame, tmp_path, angle_unit=right)
 
 

@@ -224,7 +224,7 @@ def test_joints_that_no_robot_can_take_are_refused(tmp_path):
     joints = dict(zip(robot.parts.columns, robot.inverse(point).T, strict=True))
     joints["theta1_rad"][7] += 1.6
     table = pd.DataFrame({"trajectory": "a", **joints, **rows.vector_columns("measured", point)})
-    with pytest.raises(IngestError, match=r"row 8.*closes near its home pose"):
+    with pytest.raises(IngestError, match=r"row 9.*closes near its home pose"):
         _taken(tmp_path, table, robot)
 
 

@@ -25,7 +25,7 @@ CSV, REGISTER = "comma-separated text in UTF-8", {"frame": "register"}
 
 
 def cells(*changes):
-    """The campaign with some cells changed: (row from 1, column, value)."""
+    """The campaign with some cells changed: (row from 1 below the header, column, value)."""
     frame = FIELD.astype(object)
     for row, column, value in changes:
         frame.loc[row - 1, column] = value
@@ -73,9 +73,10 @@ def problems_of(content, tmp_path, name="f.csv", **settings):
 
 
 def assert_problem(problems, row, column, value, allowed):
-    """One of the problems is at this row and column, and says these things."""
+    """One of the problems is at this row below the header, in the line after it, and column, and says these things."""
+    line = None if row is None else row + 1
     assert any(
-        (p["row"], p["column"]) == (row, column) and value in p["value"] and allowed in p["allowed"] for p in problems
+        (p["row"], p["column"]) == (line, column) and value in p["value"] and allowed in p["allowed"] for p in problems
     ), problems[:3]
 
 
@@ -260,7 +261,7 @@ ROWS = {
         {},
         4,
         "run, point",
-        "run 1, point 3, as in row 3",
+        "run 1, point 3, as in row 4",
         "each point of a run once",
     ),
     "many copied measurements": (
@@ -268,7 +269,7 @@ ROWS = {
         {},
         9,
         XYZ,
-        "as in row 8",
+        "as in row 9",
         "repeat every digit",
     ),
     "a copied row": (
@@ -276,7 +277,7 @@ ROWS = {
         {},
         6,
         "run, point",
-        "run 1, point 5, as in row 5",
+        "run 1, point 5, as in row 6",
         "once",
     ),
     "points that go back": (
@@ -357,50 +358,57 @@ ROWS = {
         columns(COMMAND + MEASURED, 1e-3),
         {},
         None,
-        AT_COMMAND,
-        "0.5602 to 0.9494 mm",
-        "unit: m brings them there",
+        XYZ,
+        "a nominal robot that is off by",
+        "unit: m, which leaves",
     ),
-    "millimetres as metres": (TEXT, {"unit": "m"}, None, AT_COMMAND, "when read in m", "unit: mm brings them there"),
+    "millimetres as metres": (
+        TEXT,
+        {"unit": "m"},
+        None,
+        XYZ,
+        "a nominal robot that is off by",
+        "unit: mm, which leaves",
+    ),
     "inches as millimetres": (
         columns(COMMAND + MEASURED, 1 / 25.4),
         {},
         None,
-        AT_COMMAND,
-        "22.06 to 37.38 mm",
-        "unit: inch brings them",
+        XYZ,
+        "a nominal robot that is off by",
+        "unit: inch, which leaves",
     ),
     "measured in metres only": (
         columns(MEASURED, 1e-3),
         {},
         None,
         XYZ,
-        "(ratio 0.0009972)",
-        "not the measured ones in m and",
+        "a nominal robot that is off by",
+        "measured columns in mm, as the commanded ones: they are in m, which",
     ),
     "measured in inches only": (
         columns(MEASURED, 1 / 25.4),
         REGISTER,
         None,
         XYZ,
-        "(ratio 0.03926)",
-        "not the measured ones in inch",
+        "a nominal robot that is off by",
+        "measured columns in mm, as the commanded ones: they are in inch, which",
     ),
     "degrees as radians": (
         columns(THETA, 180 / np.pi),
         {},
         None,
         THETAS,
-        "up to 69.1959 rad when read in rad",
-        "angle_unit: deg makes",
+        "values at which the nominal robot has no pose",
+        "angle_unit: deg, which leaves",
     ),
     "radians as degrees": (
         TEXT,
         {"angle_unit": "deg"},
         None,
         THETAS,
-        "when read in deg",
-        "angle_unit: rad makes them fit",
+        "a nominal robot that is off by",
+        "angle_unit: rad, which leaves",
     ),
     "the other elbow": (
         TEXT,
@@ -415,8 +423,8 @@ ROWS = {
         {},
         None,
         THETAS,
-        "rad from those",
-        "numbered the other way round",
+        "a nominal robot that is off by",
+        "order: [theta3_rad, theta2_rad, theta1_rad]",
     ),
     "an angle that contradicts": (
         cells((4, "theta2_rad", -0.1525)),
@@ -474,8 +482,8 @@ ROWS = {
         REGISTER,
         None,
         XYZ,
-        "rms after registration",
-        "105.2 mm rms",
+        "a nominal robot that is off by",
+        "does not fit the robot",
     ),
     "two registration points": (
         TEXT,
@@ -531,17 +539,17 @@ def test_all_problems_are_reported_at_once_under_the_file_s_names(tmp_path):
     problems = problems_of(frame, tmp_path, columns={"measured_x_mm": "X"})
     assert [(p["row"], p["column"]) for p in problems] == [
         (None, "wind"),
-        (3, "X"),
-        (60, "run"),
-        (9, "time_s"),
-        (40, AT_COMMAND),
-        (12, "theta1_rad"),
+        (4, "X"),
+        (61, "run"),
+        (10, "time_s"),
+        (41, AT_COMMAND),
+        (13, "theta1_rad"),
     ]
 
 
 def test_a_kind_of_problem_lists_twenty_and_counts_the_rest(tmp_path):
     problems = problems_of(FIELD.assign(time_s="late"), tmp_path)
-    assert [p["row"] for p in problems] == [*range(1, 21), None]
+    assert [p["row"] for p in problems] == [*range(2, 22), None]
     assert problems[-1]["value"] == "222 problems of this kind, of which the first 20 are listed"
 
 

@@ -66,7 +66,7 @@ def test_values_that_are_not_those_of_the_commands_are_refused(measured, tmp_pat
     name, robot, table = measured
     wrong = table.copy()
     wrong.loc[7, DRIVES[name][1]] += 0.02
-    with pytest.raises(IngestError, match=rf"(?s)row 8.*{DRIVES[name][1]}.*that the commanded position needs"):
+    with pytest.raises(IngestError, match=rf"(?s)row 9.*{DRIVES[name][1]}.*that the commanded position needs"):
         _taken(wrong, robot, tmp_path)
 
 

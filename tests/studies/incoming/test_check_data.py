@@ -86,7 +86,7 @@ def test_units_in_the_header_stay_whatever_else_is_wrong(tmp_path):
     found = checked(frame, tmp_path)
     chosen = proposed(found)
     assert (chosen["unit"], chosen["angle_unit"], "frame" in chosen) == ("inch", "deg", False)
-    assert chosen["columns"] == names and [problem["row"] for problem in found.refused] == [6]
+    assert chosen["columns"] == names and [problem["row"] for problem in found.refused] == [7]
 
 
 def test_a_tracker_s_list_below_lines_of_other_things_is_known(tmp_path):

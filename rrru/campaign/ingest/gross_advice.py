@@ -1,0 +1,96 @@
+"""What to write into the configuration, or to mend in a file, against gross mistakes, in words."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from rrru.campaign.ingest.gross_file import GrossFile, Hypothesis
+from rrru.campaign.ingest.mistakes import Mistakes
+from rrru.campaign.ingest.sheet import MEASURED, position_text
+
+# an axis of the instrument is one of the robot's where its component along that is more than this
+_ALONG_AN_AXIS = 0.95
+# commanded positions are in a right unit where they spread like the nominal robot's, by a factor of at most this
+_ALIKE = 2.0
+
+
+def advice(file: GrossFile, found: Hypothesis) -> str:
+    """What to write into the configuration or to mend in the file."""
+    mistakes = found.mistakes
+    texts = [*of_drives(file, mistakes), *_of_units(file, mistakes)]
+    if mistakes.shift:
+        side, count = ("late", mistakes.shift) if mistakes.shift > 0 else ("early", -mistakes.shift)
+        texts.append(f"measured columns that are not {count} row{'s' * (count > 1)} {side}")
+    if mistakes.free:
+        texts.append(_of_targets(file, found))
+    if mistakes.mirrored:
+        texts.append(f"a right-handed frame: {_of_axes(file, found.rotation)}")
+    return " and ".join(texts)
+
+
+def of_drives(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
+    """Keys `order` and `signs`, which replace those that are configured."""
+    drives = file.robot.parts.columns[: file.count]
+    order = tuple([*drives].index(name) for name in file.spec.order) if file.spec.order and drives else file.given.order
+    configured = Mistakes(tuple(file.spec.signs.get(name, 1) for name in drives), order)
+    whole = mistakes.after(configured)
+    if whole.order != configured.order:
+        named = f"order: [{', '.join(drives[k] for k in whole.order)}]"
+        yield named if whole.order != file.given.order else "no `order`"
+    if whole.signs != configured.signs:
+        turned = [f"{drives[k]}: -1" for k, sign in enumerate(whole.signs) if sign < 0]
+        yield f"signs: {{{', '.join(turned)}}}" if turned else "no `signs`"
+
+
+def _of_units(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
+    """Keys `unit`, `drive_unit` and `angle_unit`; where commands are in the stated unit, what to mend in the file."""
+    spec = file.spec
+    unit, drive_unit = spec.unit, mistakes.drive_unit or spec.unit_of_drives
+    if mistakes.unit and _commands_are_right(file, mistakes):
+        yield f"measured columns in {spec.unit}, as the commanded ones: they are in {mistakes.unit}"
+    elif mistakes.unit:
+        unit = mistakes.unit
+        yield f"unit: {unit}"
+    if file.has_lengths and (spec.drive_unit or unit) != drive_unit:
+        yield f"drive_unit: {drive_unit}"
+    if mistakes.angle_unit:
+        yield f"angle_unit: {mistakes.angle_unit}"
+
+
+def _commands_are_right(file: GrossFile, mistakes: Mistakes) -> bool:
+    """Whether a file has commanded positions that spread as the nominal robot's do."""
+    if file.command_mm is None:
+        return False
+    command, nominal = (np.linalg.norm(np.nanstd(one, axis=0)) for one in (file.command_mm, file.bodies(mistakes)))
+    return bool(1.0 / _ALIKE < command / nominal < _ALIKE)
+
+
+def _of_targets(file: GrossFile, found: Hypothesis) -> str:
+    """The key `targets` with the places that were found of those that are stated, or where the tool is."""
+    if not any(file.names):
+        return f"a tool at {position_text(found.place_mm[0])}"
+    stated = np.isfinite(file.place_mm).all(axis=1)
+    places = ", ".join(
+        f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]"
+        for name, place, known in zip(file.names, found.place_mm, stated, strict=True)
+        if known
+    )
+    return f"targets: {{{places}}}"
+
+
+def _of_axes(file: GrossFile, rotation: np.ndarray) -> str:
+    """Which measured axes to exchange, or which one to turn round, for an improper rotation (3, 3) to be a proper one.
+
+    Any will do, unless the axes of the instrument are those of the robot, of which two are exchanged or one is turned.
+    """
+    along = np.where(np.abs(rotation) > _ALONG_AN_AXIS, np.sign(rotation), 0.0)
+    turned = np.flatnonzero(np.diag(along) < 0.0)
+    if np.abs(along).sum() == 3.0 and (along >= 0.0).all():
+        one, other = np.flatnonzero(np.diag(along) == 0.0)
+    elif np.abs(np.diag(along)).sum() == 3.0 and len(turned) == 1:
+        return f"turn the sign of {file.found.get(MEASURED[turned[0]], MEASURED[turned[0]])}"
+    else:
+        one, other = 0, 1
+    pairs = (MEASURED[one], MEASURED[other]), (MEASURED[other], MEASURED[one])
+    exchanged = ", ".join(f"{ours}: {file.found.get(theirs, theirs)}" for ours, theirs in pairs)
+    return f"columns: {{{exchanged}}}"
