@@ -41,6 +41,8 @@ _CERTAIN = 0.99
 _MOST_ROUNDS, _FIRST_LOOKED_AT, _MOST_LOOKED_AT, _MOST_FOLLOWED = 6, 8, 32, 3
 # round after which all orders and signs of the drives are tried
 _SIMPLE_ROUNDS = 2
+# hypotheses that are looked at in the end, as none may be left that is as good as the best one
+_MOST_SETTLED = 150
 # difference of log evidence from which on a hypothesis does not matter
 _FAR_BEHIND = 10.0
 # hypotheses that a message names where several explain a file alike, as the legs of a symmetric robot
@@ -84,7 +86,7 @@ def find_gross_error(
     if as_is.rms_mm <= ordinary_mm:
         return None
     for number in range(_MOST_ROUNDS):
-        if number == _SIMPLE_ROUNDS and not search.explained:
+        if number == _SIMPLE_ROUNDS:
             search.look_at(all_orders_and_signs(file.count))
         before = search.best
         search.go_on()
@@ -93,6 +95,7 @@ def find_gross_error(
         if search.best.rms_mm <= ordinary_mm:
             # the remainder is no mistake
             break
+    search.settle()
     if named := search.named:
         words = " or ".join(advice(file, one) for one in named)
         return GrossError(named[0].mistakes, as_is.rms_mm, named[0].rms_mm, words)
@@ -112,11 +115,6 @@ class _Search:
         """The most probable one so far."""
         return max(self.found.values(), key=lambda one: one.log_evidence)
 
-    @property
-    def explained(self) -> bool:
-        """Whether the best one explains the file."""
-        return self.best.rms_mm <= EXPLAINED_SHARE * self._file.robot.size_mm
-
     def look_at(self, every) -> None:
         """Look at the most promising of some Mistakes."""
         fresh = [
@@ -126,6 +124,14 @@ class _Search:
         promising = sorted(fresh, key=self._at_most.__getitem__, reverse=True)[:_MOST_LOOKED_AT]
         for number, one in enumerate(promising):
             if number >= _FIRST_LOOKED_AT and self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
+                break
+            self.found[one] = self._file.hypothesis(one)
+            del self._at_most[one]
+
+    def settle(self) -> None:
+        """Look at all that may be as good as the best one, up to a limit."""
+        for one in sorted(self._at_most, key=self._at_most.__getitem__, reverse=True)[:_MOST_SETTLED]:
+            if self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
                 break
             self.found[one] = self._file.hypothesis(one)
             del self._at_most[one]

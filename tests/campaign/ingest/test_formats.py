@@ -135,12 +135,12 @@ LATE = next(k + 1 for k, line in enumerate((FILES / "leica.csv").read_text("cp12
 BROKEN = {
     "an unknown unit": ("leica", lambda text: text.replace("Y  [mm]", "Y  [ft]"), None, "the unit ft", "mm, m, in"),
     "no axes": ("leica", lambda text: text.replace("Z  [mm]", "W"), None, "no line with X, Y and Z", "a header X [mm]"),
-    "a spread of nothing": ("leica", lambda text: text.replace("0.0489", "0"), 1, "0", "above 0 and up to 100 mm"),
+    "a spread of nothing": ("leica", lambda text: text.replace("0.0489", "0"), 2, "0", "above 0 and up to 100 mm"),
     "a clock that is put back": ("leica", lambda text: text.replace(" 10:", " 09:"), LATE, "s after", "never run"),
     "a day and month that nobody states": (
         "leica",
         lambda text: text.replace("2026-03-04", "03/04/2026"),
-        1,
+        2,
         "'03/04/2026 09:58:12.250'",
         "time_format",
     ),
@@ -166,11 +166,11 @@ BROKEN = {
         "rows of 7 fields",
         "3 to 6 fields",
     ),
-    "a point without z": ("spatial_analyzer", lambda text: text.replace(",  244.865280", ""), 1, "blank", "a number"),
+    "a point without z": ("spatial_analyzer", lambda text: text.replace(",  244.865280", ""), 6, "blank", "a number"),
     "a decimal point among commas": (
         "decimal_comma",
         lambda text: text.replace("-702,76483", "-702.76483"),
-        1,
+        2,
         "'-702.76483'",
         "comma",
     ),
