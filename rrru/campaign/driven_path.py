@@ -6,6 +6,7 @@ import numpy as np
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import connect
+from rrru.campaign.stated_motion import rests, stated_motion
 
 # points of the path from one commanded point to the next, and of a transfer between runs with its ends
 STEPS, _TRANSFER_STEPS = 8, 30
@@ -19,6 +20,9 @@ _MOST_TURNS = 0.5
 _CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
+# ASSUME a robot that rests at each reading and moves by less than this, in mm and rad, has not moved: its drive values
+# are read back at each reading, with some noise
+_STILL_MM, _STILL_RAD = 0.05, 5e-4
 
 
 def driven_path(measurements, degree=DEGREE):
@@ -43,7 +47,7 @@ def smooth_drives(measurements, path, path_index, degree=DEGREE):
 
     # ASSUME where the tool passes smoothly through a run's points its drives do so, too.
     """
-    if not follows_path(rows.command(measurements), measurements["run"].to_numpy()):
+    if not passes_points(measurements):
         return path
     first = np.diff(stops(measurements), prepend=-1) > 0
     index, run, result = path_index[first], measurements["run"].to_numpy()[first], path.copy()
@@ -59,11 +63,18 @@ def smooth_drives(measurements, path, path_index, degree=DEGREE):
 
 
 def stops(measurements):
-    """Number (n,) from 0 on of the stop at which each row was measured: several reflectors may be seen at one."""
-    if "target" not in measurements:
+    """Number (n,) from 0 on of the stop at which each row was measured: several reflectors may be seen at one.
+
+    Rows at one command are one stop, too, where the campaign states that the robot rests at each reading.
+    """
+    at_rest = rests(measurements)
+    if "target" not in measurements and not at_rest:
         return np.arange(len(measurements))
-    told = measurements[["run", *(name for name in measurements if name.startswith("command_"))]].to_numpy(dtype=float)
-    return np.cumsum(np.concatenate([[False], (np.nan_to_num(told[1:]) != np.nan_to_num(told[:-1])).any(axis=1)]))
+    names = [name for name in measurements if name.startswith("command_")]
+    still = np.array([_STILL_MM if name.endswith("_mm") else _STILL_RAD for name in names]) if at_rest else 0.0
+    told, run = np.nan_to_num(measurements[names].to_numpy(dtype=float)), measurements["run"].to_numpy()
+    moved = (np.abs(np.diff(told, axis=0)) > still).any(axis=1) | (np.diff(run) != 0)
+    return np.cumsum(np.concatenate([[False], moved]))
 
 
 def _path_through(measurements, degree):
@@ -92,14 +103,25 @@ def _path_through(measurements, degree):
 def rates(measurements, values):
     """First and second derivative (n, k) by the time of values (n, k) at the rows of a measurement table, run by run.
 
-    NaN where a run has no increasing times or its points follow no path.
+    Zero where the campaign states that the robot rests at each reading; NaN where a run has no increasing times or it
+    is not known to pass its points.
     """
     run, time = measurements["run"].to_numpy(), measurements["time_s"].to_numpy(dtype=float)
     position = rows.command(measurements)
-    if not follows_path(position, run):
+    if rests(measurements):
+        return np.zeros_like(values), np.zeros_like(values)
+    if not passes_points(measurements):
         return np.full_like(values, np.nan), np.full_like(values, np.nan)
     derivatives = [_run_rates(values[piece], time[piece], _corners(position[piece])) for piece in _runs(run)]
     return tuple(np.concatenate(parts) for parts in zip(*derivatives, strict=True))
+
+
+def passes_points(measurements):
+    """Whether the robot passes the rows of a measurement table without a stop: stated, else if they `follows_path`."""
+    stated = stated_motion(measurements)
+    if stated is not None:
+        return not stated.stops
+    return follows_path(rows.command(measurements), measurements["run"].to_numpy())
 
 
 def follows_path(position_mm, run):

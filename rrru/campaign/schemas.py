@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from rrru.campaign.measurements import ON_PLATFORM, ON_WORLD
+from rrru.campaign.stated_motion import BETWEEN, KINDS
 from rrru.store.schema import Column, read_tables
 
 TABLES = read_tables("""
@@ -24,7 +25,8 @@ One row per commanded point: what was commanded and what the instrument saw. Aft
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
 target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
-world. Where the file has them there are noise_x_mm, the reading's standard deviation, and temperature_c.
+world. Where the file has them there are noise_x_mm, the reading's standard deviation, and temperature_c. Where the
+configuration states how the robot moved there are motion and motion_between.
 --
 run trajectory point time_s command_{xyz}_mm
 theta1_rad             float  commanded drive angle of leg 1; 3-PTT: slider1_mm
@@ -136,6 +138,10 @@ def measurement_table(robot, names=()):
     more["measured_z_mm"].append(Column("target", "str", "name of the reflector that was measured"))
     fixed_to = Column("target_on", "str", "what the reflector is fixed to", False, (ON_PLATFORM, ON_WORLD))
     more["measured_z_mm"].append(fixed_to)
+    kinds = "how the robot moved between the rows", False, KINDS
+    more["measured_z_mm"].append(Column("motion", "str", *kinds))
+    straight = "what is straight from stop to stop", False, BETWEEN
+    more["measured_z_mm"].append(Column("motion_between", "str", *straight))
     for after, added in more.items():
         at = [column.name for column in columns].index(after) + 1
         columns[at:at] = [column for column in added if column.name in names]

@@ -20,9 +20,6 @@ from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.legs import WORLD
 
-# a law of a campaign's circumstances: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _KINDS = (("speed", "mm/s", 0.01), ("rate", "rad/s", 1e-5))
 _TYPICAL = np.repeat([1e-5, 1e-8], 3)
 

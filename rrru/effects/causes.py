@@ -170,11 +170,21 @@ CAUSES = {
         _GEARS,
     ),
     "drive_error_function": Cause(
-        "every turning drive errs by a rough periodic function of its own angle",
-        "Inspect the drive at the angle of the largest error: encoder's scale for dirt, scratches and run-out, gear's "
-        "teeth, bearing; cables that pull.",
-        "Clean or recentre the scale, repair the worn stretch of the gear, or put the function found into the axis' "
-        "correction table.",
+        {
+            TURNING: "every turning drive errs by a rough periodic function of its own angle",
+            SLIDING: "every slide errs by a rough function of its own position",
+            LENGTH: "every leg errs by a rough function of its own length",
+        },
+        {
+            TURNING: "Inspect the drive at the angle of the largest error: encoder's scale for dirt, scratches and "
+            "run-out, gear's teeth, bearing; cables that pull.",
+            SLIDING: "Inspect the slide at the place of the largest error: scale or encoder for dirt and scratches, "
+            "screw's pitch, rack's teeth, belt; guides and cables that pull.",
+            LENGTH: "Inspect the leg at the length of the largest error: scale or encoder for dirt and scratches, "
+            "screw's pitch; cables that pull.",
+        },
+        "Clean or recentre the scale, repair what is worn there, or put the function found into the "
+        "axis' correction table.",
         f"{_FRADEN}; {_GEARS}",
     ),
     "friction_windup": Cause(

@@ -1,20 +1,24 @@
-"""Drive error function: every turning drive errs by a rough periodic function of its own angle.
+"""Drive error function: every drive errs by a rough function of its own value.
 
-An encoder's scale, its mounting, teeth and bearings together make an error that repeats with every turn of the joint
-but follows no single wave:
+An encoder's scale, its mounting, teeth, pitch and bearings together make an error that repeats at every value of the
+drive but follows no single wave:
 
-    dtheta_i = sum over n of s_in sin(n theta_i) + c_in cos(n theta_i),   n = 1, 2, .. 64
+    dq_i = sum over n of s_in sin(n u_i) + c_in cos(n u_i),   n = 1, 2, .. 64
 
-It enters at the drive angle. The coefficients of order n are independent and normal with a standard deviation in
-proportion to 1 / sqrt(1 + (n / b)^4): a Gaussian process on the circle, of waves up to about b per turn, rougher ones
-ever weaker. Of some b the likelihood chooses. The spectrum of what is found is the finding. A gear's sharp orders are
-`transmission_error` and `transmission_orders`: where few waves do, these need fewer numbers and win.
+u_i is the angle of a drive that turns, and pi q_i / L_i of one that slides: L_i is its stroke, of which the waves make
+any function, 1 m where none is stated. It enters at the drive's value. The coefficients of order n are independent and
+normal with a standard deviation in proportion to 1 / sqrt(1 + (n / b)^4): a Gaussian process on the circle, of waves up
+to about b per turn, rougher ones ever weaker. Of some b the likelihood chooses. The spectrum of what is found is the
+finding. A gear's sharp orders are `transmission_error` and `transmission_orders`: where few waves do, these need fewer
+numbers and win. A campaign of few readings has the lower orders only.
 
-Assumptions: it depends on the angle only, not on load or sense of motion; one size for all drives.
+Assumptions: it depends on the drive's value only, not on load or sense of motion; one size for all drives of a kind.
 
-Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The size is assumed: 20 arc seconds are
-1e-4 rad.
+Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The sizes are assumed: 20 arc seconds are
+1e-4 rad, and a slide of ordinary precision is within 0.02 mm.
 """
+
+from functools import partial
 
 import numpy as np
 
@@ -22,41 +26,56 @@ from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
-# a law of campaigns of many poses: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 ORDERS = np.arange(1, 65)
-_BENDS, _STEEPNESS, _TYPICAL, _MOST = (3.0, 6.0, 12.0, 24.0, 48.0), 4, 1e-4, 0.01
+_BENDS, _STEEPNESS, _FEWEST = (3.0, 6.0, 12.0, 24.0, 48.0), 4, 4
+_TYPICAL, _MOST = {"rad": 1e-4, "mm": 0.02}, {"rad": 0.01, "mm": 2.0}
+_STROKE_MM = 1000.0
 
 
 def for_robot(robot):
-    """The law for robots whose drives all turn, None for others."""
-    if set(robot.parts.units) != {"rad"}:
-        return None
-    count = len(robot.parts.drives)
+    """The law for all drives."""
+    return _of_orders(robot, ORDERS)
+
+
+def _of_orders(robot, orders):
+    """The law with waves of orders (k,)."""
+    units = robot.parts.units
     parameters = ParameterSet(
         tuple(
-            Parameter(f"{part}{drive}_{order}", "rad", 0.0, -_MOST, _MOST, "assumed", drive)
-            for drive in range(1, count + 1)
-            for order in ORDERS
+            Parameter(f"{part}{drive}_{order}", unit, 0.0, -_MOST[unit], _MOST[unit], "assumed", drive)
+            for drive, unit in enumerate(units, 1)
+            for order in orders
             for part in ("sine", "cosine")
         )
     )
-    spectra = [
-        _TYPICAL * np.tile(np.repeat((1.0 + (ORDERS / bend) ** _STEEPNESS) ** -0.5, 2), count) for bend in _BENDS
-    ]
+    typical = np.repeat([_TYPICAL[unit] for unit in units], 2 * len(orders))
+    spectra = tuple(
+        typical * np.tile(np.repeat((1.0 + (orders / bend) ** _STEEPNESS) ** -0.5, 2), len(units)) for bend in _BENDS
+    )
+    per_unit = _per_unit(robot)
     none = np.zeros(len(parameters), dtype=int)
-    coordinates = Coordinates(spectra[0], none, none > 0, lambda values, _: values, spectra=tuple(spectra), broad=True)
-    return Effect("drive_error_function", parameters, coordinates, _err, along_drives=_functions, of_drive_value=True)
+    coordinates = Coordinates(spectra[0], none, none > 0, lambda values, _: values, spectra=spectra, broad=True)
+
+    def functions(motion):
+        """By drive the functions (n, 2 orders) of its value that a unit of each of its coordinates adds."""
+        return [waves(angle, orders) for angle in (motion.drive * per_unit).T]
+
+    def err(motion, values):
+        """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
+        own = np.reshape(values, (len(units), -1))
+        return motion.at_drives(np.stack([f @ one for f, one in zip(functions(motion), own, strict=True)], axis=1))
+
+    laws = {"along_drives": functions, "coarser": partial(_coarser, robot), "of_drive_value": True}
+    return Effect("drive_error_function", parameters, coordinates, err, **laws)
 
 
-def _functions(motion):
-    """By drive the functions (n, 2 orders) of its angle that a unit of each of its coordinates adds."""
-    return [waves(angle, ORDERS) for angle in motion.drive.T]
+def _per_unit(robot):
+    """Angle (K,) of the lowest wave per drive value: 1 for drives that turn, in rad per mm for those that slide."""
+    strokes = np.where(np.isfinite(robot.strokes), robot.strokes, _STROKE_MM)
+    return np.where(np.array(robot.parts.units) == "rad", 1.0, np.pi / strokes)
 
 
-def _err(motion, values):
-    """Changes of the drive angles under coefficients (K times 2 orders,) in rad."""
-    own = np.reshape(values, (motion.drive.shape[1], -1))
-    changes = [waves(angle, ORDERS) @ one for angle, one in zip(motion.drive.T, own, strict=True)]
-    return motion.at_drives(np.stack(changes, axis=1))
+def _coarser(robot, most):
+    """The law with no more coefficients than that, None where too few orders are left."""
+    count = int(most) // (2 * len(robot.parts.units))
+    return _of_orders(robot, ORDERS[:count]) if count >= _FEWEST else None

@@ -23,9 +23,6 @@ encoders, CIRP Annals 59, 2010, on harmonics of encoders. The size is assumed: a
 
 from rrru.effects.harmonic import of_encoders
 
-# over half a turn or less it is taken for an eccentric encoder and that for it: tested where a configuration names it
-BY_NAME_ONLY = True
-
 _SOURCE = "difference of diameters over four of them, or tilt squared over four, assumed"
 
 

@@ -33,9 +33,6 @@ import numpy as np
 from rrru.effects.protocol import PATH, Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-# in every diagnosis it takes a robot with several causes and scatter for "unexplained": tested where it is named
-BY_NAME_ONLY = True
-
 _SOURCE = dict.fromkeys(("rad", "mm"), "Coulomb friction over stiffness, size assumed")
 _HIGHEST = {"rad": ("rad", 0.0, 0.01), "mm": ("mm", 0.0, 0.5)}
 _TYPICAL = {"rad": 2.5e-4, "mm": 0.01}

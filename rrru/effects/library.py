@@ -1,7 +1,6 @@
 """The library of effects by name, read from the files of this folder, and effects of one's own by `module:object`.
 
-A file of the library has a function `for_robot`, from a robot to its Effect, None where it has no site for it. One that
-says BY_NAME_ONLY is a law of some campaigns alone, and acts or is tested only where a configuration names it.
+A file of the library has a function `for_robot`, from a robot to its Effect, None where it has no site for it.
 """
 
 import importlib
@@ -27,12 +26,10 @@ _TYPICAL_SHARE = 0.1
 
 
 def _names():
-    """Names of the folder's effects: in their order those of every diagnosis, and those that have to be named."""
+    """Names of the folder's effects in their order."""
     files = {info.name for info in pkgutil.iter_modules([str(Path(__file__).parent)])}
     names = {name for name in files - {Path(__file__).stem} if hasattr(_module(name), "for_robot")}
-    special = {name for name in names if getattr(_module(name), "BY_NAME_ONLY", False)}
-    usual = names - special
-    return (*(name for name in _ORDER if name in usual), *sorted(usual.difference(_ORDER))), tuple(sorted(special))
+    return *(name for name in _ORDER if name in names), *sorted(names.difference(_ORDER))
 
 
 def _module(name):
@@ -40,16 +37,18 @@ def _module(name):
     return importlib.import_module(f"rrru.effects.{name}")
 
 
-NAMES, BY_NAME_ONLY = _names()
+NAMES = _names()
 # effects that hold others as special cases: what they are told apart by is how few numbers do
 HOLDS = {
     "joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement"),
     "friction_windup": ("backlash",),
+    "drive_error_function": ("encoder_eccentricity", "encoder_ovality", "transmission_error", "transmission_orders"),
+    "transmission_orders": ("encoder_eccentricity", "encoder_ovality", "transmission_error"),
 }
 
 
 def library(robot):
-    """The library's effects of every diagnosis that a robot may have, by name."""
+    """The library's effects that a robot may have, by name."""
     made = {name: _module(name).for_robot(robot) for name in NAMES}
     return {name: effect for name, effect in made.items() if effect is not None}
 
@@ -63,12 +62,11 @@ def find(name, robot):
     of their bounds' width as typical size, without `needs` nothing is needed. Raises ConfigError where there is none or
     where it is incomplete.
     """
-    if name in NAMES or name in BY_NAME_ONLY:
+    if name in NAMES:
         return _module(name).for_robot(robot)
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name and all(part.isidentifier() for part in module_name.split("."))):
-        known = ", ".join((*NAMES, *BY_NAME_ONLY))
-        raise ConfigError(f"unknown effect {name!r}; known: {known}, or module:object for one of your own")
+        raise ConfigError(f"unknown effect {name!r}; known: {', '.join(NAMES)}, or module:object for one of your own")
     return _complete(name, _load(name))
 
 
@@ -110,7 +108,7 @@ def _complete(name, own):
         raise ConfigError(f"effect {name!r} lacks {', '.join(missing)}; needed: name, parameters, contribute")
     if not isinstance(own.parameters, ParameterSet) or not callable(own.contribute):
         raise ConfigError(f"effect {name!r}: parameters is no rrru.parameters.ParameterSet or contribute no function")
-    if own.name in NAMES or own.name in BY_NAME_ONLY:
+    if own.name in NAMES:
         raise ConfigError(f"effect {name!r}: its name {own.name!r} belongs to the library; allowed: another one")
     coordinates = getattr(own, "coordinates", None)
     if coordinates is None:

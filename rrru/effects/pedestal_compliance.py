@@ -25,9 +25,6 @@ from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.dynamics import level_axes
 from rrru.robots.legs import WORLD
 
-# a law of a campaign's circumstances: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _SOURCE = "bending of what the robot stands on, size assumed"
 _KINDS = (("tilt", "rad/(N mm)", 0.0, 1e-7), ("shift", "mm/(N mm)", -1e-4, 1e-4))
 _TYPICAL = np.repeat([1e-9, 3e-7], 2)

@@ -250,7 +250,9 @@ class Effect:
     of_drive_value: whether the law changes actuator values alone, each by a function of itself;
     with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
     law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
-    calibration that leaves it out is wrong; switches: whether the law knows no more of a load than its sign.
+    calibration that leaves it out is wrong; switches: whether the law knows no more of a load than its sign; coarser:
+    of a law of so many coefficients that few readings do not tell them, from the most that they may be to the law that
+    has no more, or None.
     """
 
     name: str
@@ -264,6 +266,7 @@ class Effect:
     with_waves: Callable[..., "Effect"] | None = None
     waves: tuple[tuple[int, float], ...] = ()
     switches: bool = False
+    coarser: Callable[[float], "Effect | None"] | None = None
 
     def doubted(self, name: str, value: float) -> float:
         """A value of a shape's parameter as far off as it may be, 1 sigma."""

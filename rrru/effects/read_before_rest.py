@@ -28,9 +28,6 @@ import numpy as np
 from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 
-# a law of a campaign's circumstances: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _SHARE = ("1", -0.05, 0.05)
 _SOURCE = "share of a move that is left, size assumed"
 _EXPONENT = Parameter("exponent", "1", 0.0, 0.0, 1.0, "how a move comes to rest: 0 settling, 1 limited speed")

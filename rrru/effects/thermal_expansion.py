@@ -20,9 +20,6 @@ from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.effects.thermal_growth import lengths
 from rrru.parameters import Parameter, ParameterSet
 
-# a law of campaigns that state a temperature: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _PARAMETERS = ParameterSet((Parameter("expansion", "1/K", 0.0, 0.0, 1e-4, "aluminium 2.3e-5, steel 1.2e-5"),))
 _TYPICAL, _DRAWN_C = 2e-5, 20.0
 

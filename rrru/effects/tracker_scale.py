@@ -26,9 +26,6 @@ from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.legs import WORLD
 
-# a law of a campaign's circumstances: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _PARAMETERS = ParameterSet((Parameter("scale", "1", 0.0, -1e-3, 1e-3, "refraction or temperature, size assumed"),))
 _COORDINATES = plain_coordinates(_PARAMETERS, 5e-5)
 

@@ -19,9 +19,6 @@ from rrru.effects.harmonic import waves
 from rrru.effects.protocol import Coordinates, Effect
 from rrru.parameters import Parameter, ParameterSet
 
-# a law of campaigns of many poses: it is tested where a configuration names it
-BY_NAME_ONLY = True
-
 _TYPICAL, _MOST = 3e-4, 0.01
 
 

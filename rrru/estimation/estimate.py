@@ -111,6 +111,21 @@ class Estimate:
         return np.where(self.at_bound, np.nan, np.sqrt(np.diag(self.covariance)))
 
     @cached_property
+    def prior_shares(self) -> FloatArray:
+        """Shares (p,) of the variances that the priors leave and not the noise: diag(C P C) over diag(C).
+
+        P: precisions of the priors. Next to 1 for a parameter whose unit vector the readings do not determine; NaN
+        where there is no variance.
+        """
+        precision = self.parameters.prior_precision(self.values)
+        variance = np.diag(self.covariance)
+        known = (variance > 0.0) & np.isfinite(variance)
+        own = self.covariance[np.ix_(known, known)]
+        result = np.where(np.isinf(variance), 1.0, np.nan)
+        result[known] = (own**2 @ precision[known]) / variance[known]
+        return result
+
+    @cached_property
     def intervals(self) -> FloatArray:
         """Credible intervals (p, 2) of 95 %: the shortest ones of the linearised posterior between the bounds.
 

@@ -116,6 +116,8 @@ def _page(lines, causes, trajectories, used):
 def _headline(verdict, words):
     """Lines of the verdict itself, and of what is to be known and done about it."""
     name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else "")
+    if verdict["no_answer"]:
+        return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
     sure = _probability(verdict["probability"], "= ", " ")
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"

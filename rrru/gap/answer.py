@@ -19,6 +19,12 @@ _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", 
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+_CHECK = (
+    "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
+    "robot: make check-data FILE=... names what reconciles them."
+)
+# first words of what no file holds where none was written
+NOT_CORRECTED = "not corrected: "
 _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
 _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
@@ -51,13 +57,32 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         **_row(verdict, ("points", "dropped_points")),
         "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
         "notes": [note for note in verdict["notes"].split("; ") if note],
+        "no_answer": verdict["no_answer"],
+        "corrected_file": _corrected_file(verdict),
     }
     return facts | {"sentences": sentences(facts)}
 
 
+def _corrected_file(verdict):
+    """What the robot's corrected file is worth; None where the robot has no file."""
+    known = np.isfinite(verdict["file_error_mm"])
+    if not (known or verdict["not_in_model"]):
+        return None
+    return {
+        **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
+        "remainder": verdict["file_remainder"],
+        "headline": verdict["file_headline"],
+        "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
+    }
+
+
 def sentences(facts):
-    """What the facts say, in sentences for somebody who knows the robot and no statistics."""
-    said = [_missed(facts), *_causes(facts), *_scatter(facts)]
+    """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
+    if facts["no_answer"]:
+        return [_no_answer(facts), _CHECK]
+    file = facts["corrected_file"] or {"headline": ""}
+    said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
+    said += [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
     return [*said, *_open(facts), _next(facts)]
 
@@ -130,6 +155,11 @@ def _effect(name, tables, budget, drives):
         "parameters": [_row(number, _NUMBER) for number in numbers],
         "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
     }
+
+
+def _no_answer(facts):
+    """Why nothing is said of causes."""
+    return f"No cause is named: {facts['no_answer']}."
 
 
 def _missed(facts):

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.driven_path import follows_path, stops
+from rrru.campaign.driven_path import follows_path, passes_points, stops
 from rrru.campaign.noise import reading_series
 from rrru.effects.motion import standing
 from rrru.effects.protocol import Contribution, Motion
@@ -90,7 +90,8 @@ class Case:
     @cached_property
     def along_paths(self):
         """Whether the points lie along paths, not in any order."""
-        return follows_path(rows.command(self.measurements), self.measurements["run"].to_numpy())
+        command, run = rows.command(self.measurements), self.measurements["run"].to_numpy()
+        return passes_points(self.measurements) or follows_path(command, run)
 
     @cached_property
     def beside(self):

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.gap.attribute import with_effects
 from rrru.gap.calibrate import calibrate
 from rrru.gap.details import parameter_rows
 from rrru.gap.model_fit import fit_model
@@ -30,14 +31,16 @@ _COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
 class Corrected:
     """A corrected file.
 
-    text; not_in_model: what it cannot hold, in words; found: what there is to hold; in_file: values by parameter of the
-    effects that it holds beside geometry.
+    text; not_in_model: what it cannot hold, in words; lacking: the effects among these; found: what there is to hold;
+    in_file: values by parameter of the effects that it holds beside geometry; mjcf: whether it is one, not a URDF.
     """
 
     text: str
     not_in_model: tuple
+    lacking: tuple
     found: Found
     in_file: dict = field(default_factory=dict)
+    mjcf: bool = False
 
 
 def found_of(attribution, stated_reflectors=False):
@@ -115,20 +118,28 @@ def _places(case, stated):
 def corrected(attribution, section, folder):
     """The Corrected file of an attribution for a folder; section: the robot's entry in the configuration.
 
-    Its numbers are fitted anew where the format cannot hold all that were. Raises ConfigError for a file whose bodies
-    do not all stand in it as such.
+    Its numbers are fitted anew where the format cannot hold all effects and numbers that were. Raises ConfigError for a
+    file whose bodies do not all stand in it as such.
     """
-    attribution = fitted_in_file(attribution, section)
     # more links at the end of a URDF's chain would leave its tip open
-    found, others = found_of(attribution, stated_reflectors="mjcf" in section)
+    reflectors = "mjcf" in section
+    diagnosed, lacking = found_of(attribution, reflectors)
+    others, effects = [*lacking], [name for name, _ in attribution.state.effects]
+    if "urdf" in section:
+        lacking += [name for name in effects if name in (_COMPLIANCE[0], _PLAY[0])]
+    held = tuple(name for name in effects if name not in lacking)
+    found, _ = found_of(
+        fitted_in_file(with_effects(attribution, held) if lacking else attribution, section), reflectors
+    )
     if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
     others += weight_notes(attribution)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
+        found = replace(found, compliance=diagnosed.compliance, play=diagnosed.play)
         text, lost = to_urdf(section["urdf"], found, folder, **chain)
-        return Corrected(text, (*others, *lost), found)
+        return Corrected(text, (*others, *lost), tuple(lacking), found)
     text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
     drives = ((*_COMPLIANCE, found.compliance), (*_PLAY, found.play))
-    held = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
-    return Corrected(text, (*others, *lost), found, held)
+    in_file = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
+    return Corrected(text, (*others, *lost), tuple(lacking), found, in_file, mjcf=True)

@@ -30,14 +30,13 @@ def corrected_drives(attribution, masses):
     nominal = drives_at(robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False)
     reached = np.isfinite(nominal).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
-    payload = float(np.nan_to_num(case.motion.payload_kg[known]).max(initial=0.0))
-    end_s = float(np.nanmax(case.motion.time_s, initial=0.0))
+    payload, end_s = at_end(case)
     found = {}
     for approach in (-1, 1):
         told = nominal
         for _ in range(OPTIONS.correction_iterations):
             motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
-            twists = robot.twists(attribution.state.deviations) + _change(attribution, motion)
+            twists = robot.twists(attribution.state.deviations) + effect_twists(attribution, motion)
             told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
         found[approach] = told
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
@@ -74,10 +73,17 @@ def _grid(commands):
     return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
 
 
+def at_end(case):
+    """The largest payload in kg and the time in s of the end of a Case's campaign."""
+    payload_kg = float(np.nan_to_num(case.motion.payload_kg[case.used]).max(initial=0.0))
+    return payload_kg, float(np.nanmax(case.motion.time_s, initial=0.0))
+
+
 def at_rest(robot, masses, state, approach, nominal):
     """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side.
 
-    nominal (n, K): drive values that bring the nominal robot there, which is where it stands.
+    approach: 1 from smaller values, -1 from larger ones, one number or (n, 1); nominal (n, K): drive values that bring
+    the nominal robot there, which is where it stands.
     """
     position, drive, payload, end_s = state
     count, nothing = len(position), np.zeros_like(position)
@@ -97,7 +103,7 @@ def at_rest(robot, masses, state, approach, nominal):
     return make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
 
 
-def _change(attribution, motion):
+def effect_twists(attribution, motion):
     """Twists of the effects of an attribution's state that a robot at rest has."""
     state, library = attribution.state, attribution.case.library
     change = Contribution(motion.robot.twists())

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.effects.library import active_effects
-from rrru.effects.protocol import together
 from rrru.errors import ConfigError, SimulationError, UnreachableError
+from rrru.gap.answer import NOT_CORRECTED, readable
 from rrru.gap.corrected import corrected
 from rrru.gap.corrected_drives import corrected_drives
+from rrru.gap.file_error import FileModel, file_error
 from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import model_row
 from rrru.plant.mujoco_robot import MujocoRobot
@@ -19,34 +19,45 @@ from rrru.robots.catalogue import make_mechanism
 from rrru.robots.file_changes import placement_of
 from rrru.robots.legs import TOOL, WORLD
 from rrru.robots.walk import Poses
+from rrru.seeds import stream
 from rrru.store.whole import write_text
 
 # what of a Motion has no row for each point
 _WHOLE = ("robot", "path_drive", "load_slopes")
 
 
-def write_corrected(diagnosis, section, masses, file):
+def write_corrected(diagnosis, section, masses, file, seed=0):
     """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
 
     A file that cannot be corrected, or that is no robot once it is, as where a loop of bodies closes no more, becomes
     an empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
-    robot's.
+    robot's; seed: of the fresh poses at which file and diagnosis are compared.
     """
     file, attribution = Path(file), diagnosis.attribution
-    shrink, why = diagnosis.tables["gap_shrink"], ""
+    shrink, why, worth = diagnosis.tables["gap_shrink"], "", {}
     try:
+        if why_not := diagnosis.verdict["no_answer"]:
+            raise ConfigError(why_not)
         written = corrected(attribution, section, file.resolve().parent)
         write_text(written.text, file)
         more, why = gap_rows(attribution, written, section, file, shrink)
         _refuse_worse(more)
-        why = "; ".join(filter(None, (why, _remainder(shrink, more))))
+        error = file_error(
+            attribution, _model(attribution, written, section, file), masses, stream(seed, "fresh poses")
+        )
+        worth = {
+            "file_error_mm": error.measured_mm,
+            "file_error_fresh_mm": error.fresh_mm,
+            "file_remainder": _remainder(shrink, more, written, error),
+            "file_headline": _headline(written, error),
+        }
         shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
     except ConfigError as error:
         tag, said = ("mujoco" if "mjcf" in section else "robot"), " ".join(str(error).replace("--", "-").split())
         write_text(f"<{tag}><!-- not corrected: {said} --></{tag}>\n", file)
-        lost = (f"not corrected: {said}",)
+        lost = (f"{NOT_CORRECTED}{said}",)
     notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
-    verdict = diagnosis.verdict | {"notes": notes, "not_in_model": "; ".join(lost)}
+    verdict = diagnosis.verdict | worth | {"notes": notes, "not_in_model": "; ".join(lost)}
     tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
 
@@ -64,13 +75,40 @@ def _refuse_worse(more):
         raise ConfigError(f"it would miss by {written:.3g} mm rms, the file as it came misses by {given:.3g} mm")
 
 
-def _remainder(shrink, more):
-    """What a corrected file leaves beyond what the diagnosis does, in words, empty where it is next to nothing."""
-    written, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
-    if not written > OPTIONS.max_file_remainder_ratio * whole:
+def _remainder(shrink, more, written, error):
+    """What a corrected file leaves beyond what the diagnosis does, in words, empty where it is next to nothing.
+
+    written: the Corrected file; error: its FileError.
+    """
+    left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
+    if written.lacking:
+        names = ", ".join(map(readable, written.lacking))
+        return f"this {_holds(written)} and not {names}: {error.fresh_mm:.2g} mm rms remain; use corrected_drives"
+    if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
-    left = f"the corrected file leaves {written:.3g} mm rms at the readings, the diagnosis {whole:.3g} mm"
-    return f"{left}; corrected_drives holds all that was found, a file of this format does not"
+    return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
+
+
+def _holds(written):
+    """What a Corrected file's format holds."""
+    return "MJCF holds geometry, compliance and play of the drives" if written.mjcf else "URDF holds the geometry only"
+
+
+def _headline(written, error):
+    """That a corrected file is worse than the calibration, and why, in words; empty where it is not."""
+    if not error.readings_mm > OPTIONS.max_file_remainder_ratio * error.calibrated_mm:
+        return ""
+    lost, most = written.not_in_model, OPTIONS.max_listed_numbers
+    more = f" and {len(lost) - most} more" if len(lost) > most else ""
+    lacking = f"; it cannot hold: {', '.join(lost[:most])}{more}" if lost else ""
+    sizes = f"{error.readings_mm:.2g} mm rms, the calibration by {error.calibrated_mm:.2g} mm"
+    return f"the corrected file misses the readings by {sizes}{lacking}"
+
+
+def _model(attribution, written, section, file):
+    """The FileModel of a Corrected file, loaded anew."""
+    robot = _robot(attribution.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
+    return FileModel(robot, written.in_file, _instrument(attribution.case, robot, written.found, True))
 
 
 def gap_rows(attribution, corrected, section, file, shrink):
@@ -144,9 +182,7 @@ def _nowhere(robot, count):
 
 def _closed(case, robot, effects):
     """Poses (n) of a robot closed at the drive values of the campaign and what effects add, and its twists."""
-    acting = active_effects(effects, robot)
-    change = together(acting, replace(case.motion, robot=robot)) if acting else None
-    twists = robot.twists() + (change.twists if acting else 0.0)
+    twists = FileModel(robot, effects, robot.twists()).twists(case.motion)
     actuators, command = rows.actuators(case.measurements, robot), rows.command(case.measurements)
     return robot.solve(actuators, command, twists), twists
 

@@ -121,9 +121,14 @@ def parameter_rows(attribution):
     parameters, errors = attribution.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
-        ("calibration", parameter.name, parameter.unit, value, error, *interval, False)
-        for parameter, value, error, interval in zip(
-            parameters, fit.state.deviations, errors, intervals[places[GEOMETRY]], strict=True
+        ("calibration", parameter.name, parameter.unit, value, error, *interval, held)
+        for parameter, value, error, interval, held in zip(
+            parameters,
+            fit.state.deviations,
+            errors,
+            intervals[places[GEOMETRY]],
+            fit.estimate.at_bound[places[GEOMETRY]].tolist(),
+            strict=True,
         )
     ]
     for term in fit.terms:

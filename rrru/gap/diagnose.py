@@ -9,7 +9,6 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
-from rrru.fit.mastering import mastering_notes
 from rrru.gap.advise import advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
 from rrru.gap.bias import bias_notes
@@ -22,12 +21,13 @@ from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
 from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.result_notes import fit_notes, noise_notes, weight_notes
+from rrru.gap.result_notes import fit_notes, noise_notes, weight_doubts, weight_notes, zero_notes
 from rrru.gap.search import search
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
-from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide
+from rrru.gap.validity import why_no_answer
+from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide, without_answer
 from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
@@ -90,6 +90,8 @@ def diagnose(
     case = with_beside(case)
     generator = stream(settings.seed, "gap", robot.campaign)
     verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated), settings.prior)
+    if why := why_no_answer(attribution, robot.noise_mm):
+        verdict, attribution, ordered = without_answer(why), _without_effects(attribution, settings.prior), ()
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
     case = attribution.case
     residual = case.residual(attribution.calibrated)
@@ -108,15 +110,17 @@ def diagnose(
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
-def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
-    """What the data lack for a better answer, what they contradict, and what a user has to know of the robot.
-
-    excluded: the rows of `gap_left_out`.
-    """
-    case = attribution.case
-    yield from mastering_notes(attribution.state, case.mechanism, attribution.fit.geometry_errors)
+def _found(attribution: Attribution) -> Iterator[str]:
+    """What a user has to know of the robot beside its effects."""
+    yield from zero_notes(attribution.fit.estimate, attribution.case.mechanism)
     yield from bias_notes(attribution)
     yield from weight_notes(attribution)
+    yield from weight_doubts(attribution)
+
+
+def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
+    """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
+    case = attribution.case
     yield from fit_notes(attribution)
     if case.count < OPTIONS.min_used_share * len(case.used):
         yield left_out_note(excluded, case.count, len(case.used))
@@ -141,6 +145,7 @@ def _row(
 ) -> dict:
     """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
     stated_mm, excluded = told
+    found = [] if verdict.no_answer else _found(attribution)
     case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
     return {
         "effects": verdict.label,
@@ -160,8 +165,13 @@ def _row(
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join(_notes(attribution, stated_mm, excluded)),
+        "notes": "; ".join([*found, *_notes(attribution, stated_mm, excluded)]),
         "not_in_model": "",
+        "no_answer": verdict.no_answer,
+        "file_error_mm": np.nan,
+        "file_error_fresh_mm": np.nan,
+        "file_remainder": "",
+        "file_headline": "",
     }
 
 
@@ -199,6 +209,12 @@ def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], pri
         return rest
     evidence = attribution.evidence.on_library()
     return posterior(evidence, search(evidence, without=ruled_out), prior)
+
+
+def _without_effects(attribution: Attribution, prior: Prior) -> Attribution:
+    """The attribution of the calibration alone, with a posterior that has no effect of the library."""
+    names = set(attribution.case.effects)
+    return with_effects(attribution.believing(_without(attribution, names, names, prior)), ())
 
 
 def _likely(attribution: Attribution) -> tuple[Attribution, tuple]:

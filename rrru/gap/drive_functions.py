@@ -36,7 +36,7 @@ def drive_functions(attribution, names):
 
 def _of_drive(case, fit, term, drive):
     """Rows of one drive under one term, none where it is not moved or not changed."""
-    effect, key = case.library[term.effect], (term.effect, term.shape)
+    effect = case.library[term.effect]
     measured = case.motion.drive[case.used]
     low, high = np.nanmin(measured[:, drive]), np.nanmax(measured[:, drive])
     if not high > low:
@@ -44,7 +44,35 @@ def _of_drive(case, fit, term, drive):
     value = np.linspace(low, high, _PLACES)
     others = np.repeat(np.nanmean(measured, axis=0)[None], _PLACES, axis=0)
     others[:, drive] = value
-    motion, part = replace(case.motion, drive=others), case.mechanism.parts.drives[drive]
+    motion = replace(case.motion, drive=others)
+    error, slopes = (_linear if effect.along_drives else _by_steps)(case, fit, term, (motion, drive))
+    if not error.any():
+        return pd.DataFrame()
+    variance = np.einsum("nk,kl,nl->n", slopes, fit.effect_covariance(term)[1], slopes)
+    half = QUANTILE_95 * np.sqrt(np.maximum(variance, 0.0))
+    worst = np.arange(_PLACES) == int(np.abs(error).argmax())
+    columns = {"drive_value": value, "error": error, "low_95": error - half, "high_95": error + half, "worst": worst}
+    return pd.DataFrame(columns)
+
+
+def _linear(case, fit, term, at):
+    """Error (n,) of a drive minus its mean, and its slopes (n, c), of a law that is linear in its c coefficients.
+
+    at: the Motion at n places of the drive's range, and the drive's number.
+    """
+    motion, drive = at
+    made = case.library[term.effect].along_drives(motion)
+    ends = np.cumsum([0, *(own.shape[1] for own in made)])
+    slopes = np.zeros((len(motion), ends[-1]))
+    own = slice(ends[drive], ends[drive + 1])
+    slopes[:, own] = made[drive] - made[drive].mean(axis=0)
+    return slopes @ fit.state.effects[term.effect, term.shape], slopes
+
+
+def _by_steps(case, fit, term, at):
+    """Error (n,) of a drive minus its mean, and its slopes (n, k) by the numbers of the effect's covariance."""
+    (motion, drive), effect, key = at, case.library[term.effect], (term.effect, term.shape)
+    part = case.mechanism.parts.drives[drive]
 
     def error_of(values):
         """Error (n,) of the drive under parameter values, minus its mean."""
@@ -54,13 +82,5 @@ def _of_drive(case, fit, term, drive):
         return change - change.mean()
 
     fitted = effect.coordinates.to_values(fit.state.effects[key], fit.state.shape(case.library, key))
-    error = error_of(fitted)
-    if not error.any():
-        return pd.DataFrame()
     steps = value_steps(fit, case.library, term)
-    slopes = np.stack([(error_of(up) - error_of(down)) / size for up, down, size in steps], axis=1)
-    variance = np.einsum("nk,kl,nl->n", slopes, fit.effect_covariance(term)[1], slopes)
-    half = QUANTILE_95 * np.sqrt(np.maximum(variance, 0.0))
-    worst = np.arange(_PLACES) == int(np.abs(error).argmax())
-    columns = {"drive_value": value, "error": error, "low_95": error - half, "high_95": error + half, "worst": worst}
-    return pd.DataFrame(columns)
+    return error_of(fitted), np.stack([(error_of(up) - error_of(down)) / size for up, down, size in steps], axis=1)

@@ -13,11 +13,12 @@ from rrru.campaign.driven_path import (
     DEGREE,
     drive_rates,
     driven_path,
-    follows_path,
+    passes_points,
     smooth_drives,
     starts_of_runs,
     stops,
 )
+from rrru.campaign.stated_motion import stated_motion
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import PATH, complete_rows, known_values
 from rrru.errors import FitError
@@ -25,6 +26,7 @@ from rrru.estimation.starts import register_measurements
 from rrru.gap.approach_direction import at_reversals, rest_widths
 from rrru.gap.case import Case
 from rrru.gap.options import OPTIONS
+from rrru.gap.stop_paths import paths_between_stops, undetermined_senses
 from rrru.gap.unknown import unknown_functions
 from rrru.gap.weight import doubts_of
 
@@ -40,8 +42,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
         raise FitError("the campaign has no points")
     measurements = register_measurements(measurements, mechanism)
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
-    stop, course = stops(measurements), _course(measurements, mechanism, actuators)
-    unknown = _unknown_approach(measurements, mechanism, course)
+    stop, (course, unknown) = stops(measurements), _course(measurements, mechanism, actuators)
     motion_at = partial(make_motion, mechanism, masses, replace(course, approach=np.where(unknown, 0.0, np.nan)))
     motion = motion_at()
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
@@ -72,8 +73,11 @@ def _tested(library, motion, used, told):
             untestable[name] = "the calibration's own parameters take it up"
             continue
         if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
-            untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
-            continue
+            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * told) if effect.coarser else None
+            if coarser is None:
+                untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
+                continue
+            effect = coarser
         lacking = _lacking(effect, motion, used)
         if lacking:
             untestable[name] = lacking
@@ -90,6 +94,8 @@ def _lacking(effect, motion, used):
     if none:
         return f"needs {', '.join(none)}, which the columns do not give"
     alike = [name for name, value in known.items() if not np.ptp(value, axis=0).any()]
+    if "drive_rate" in alike and not known["drive_rate"].any():
+        return "needs drive_rate, which is zero: the robot rests at every point"
     if alike:
         return f"needs {', '.join(alike)} of more than one value"
     return "" if complete_rows(effect, motion)[used].any() else no_approach(used)
@@ -133,13 +139,31 @@ def _unknown_approach(measurements, mechanism, course):
 
 
 def _course(measurements, mechanism, actuators):
-    """What the robot was told to do; at the measured points with the table's own actuator values."""
+    """What the robot was told to do, and where (n, K) it is not determined from which side a drive comes.
+
+    At the measured points with the table's own actuator values.
+    """
     path, told = driven_path(measurements)
     if mechanism.orients:
         told["drive_motion"] = drive_rates(measurements, actuators)
-    at_rest = not follows_path(told["position_mm"], measurements["run"].to_numpy())
+    stated = stated_motion(measurements)
+    if stated is not None and stated.stops:
+        return _stopping(measurements, mechanism, Course(drive=actuators, path_drive=actuators, stops=True, **told))
+    at_rest = not passes_points(measurements)
     path_drive = _path_drive(measurements, path, (mechanism, actuators, told["path_index"]))
-    return Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+    return course, _unknown_approach(measurements, mechanism, course)
+
+
+def _stopping(measurements, mechanism, course):
+    """`_course` of a campaign that states that the robot rests at each reading: all rows of a stop have its senses."""
+    stop, run = stops(measurements), measurements["run"].to_numpy()
+    first = np.diff(stop, prepend=-1) > 0
+    drive, run = course.drive[first], run[first]
+    between = stated_motion(measurements).between
+    paths, index = paths_between_stops(mechanism, drive, course.position_mm[first], between)
+    unknown = undetermined_senses(paths, index, run, rest_widths(drive, run, mechanism.parts.units))
+    return replace(course, path_drive=paths[0], path_index=index[stop]), unknown[stop]
 
 
 def _path_drive(measurements, path, drives, degree=DEGREE):

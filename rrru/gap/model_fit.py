@@ -208,11 +208,6 @@ class ModelFit:
         """The effect terms."""
         return self.model.terms
 
-    @property
-    def geometry_errors(self):
-        """Standard errors (p,) of the geometric errors, zero at a bound."""
-        return np.nan_to_num(self.estimate.block_errors(GEOMETRY))
-
     def effect_covariance(self, term):
         """Names of the fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
 

@@ -131,6 +131,9 @@ class DiagnosisOptions:
     min_share_with_unexplained: float = 0.5
     # something unexplained is more probable than not
     min_unexplained_probability: float = 0.5
+    # a best answer that leaves so many times the noise is not of the robot that was measured: an arm without an effect
+    # for its worst cause leaves ten or twenty times, exchanged drives or a wrong tool thousands of times; assumed
+    max_left_per_noise: float = 100.0
     # a verdict of this probability needs no further run; one of less has rivals even where none is named; assumed
     min_sure_probability: float = 0.9
 
@@ -184,6 +187,13 @@ class DiagnosisOptions:
     # --- notes and text of the answer ---
     # standard errors from which on a note says that payload or tilt differ from the stated ones; the usual 3 sigma
     min_nuisance_z: float = 3.0
+    # the same of a drive's zero; assumed, a false note has somebody master a robot that needs it not
+    min_zero_z: float = 4.0
+    # a number most of whose variance comes from the priors is not determined by the readings
+    max_prior_variance_share: float = 0.5
+    # how far the instrument's frame, a tool or a target may be off its stated place; assumed
+    outside_error_mm: float = 10.0
+    outside_error_rad: float = 0.03
     # rows of the table of sets; assumed
     max_listed_sets: int = 20
     # a function of the discrepancy is named where it is more probable than not
@@ -262,6 +272,8 @@ class DiagnosisOptions:
     # --- corrected files ---
     # a corrected file that leaves more than so many times what the diagnosis leaves gets a note
     max_file_remainder_ratio: float = 1.1
+    # poses at which a corrected file is compared with the diagnosis beside the measured ones: their rms is good to 5 %
+    fresh_poses: int = 200
     # lines of the grid along each axis; assumed
     drive_table_grid_lines: int = 7
     # a grid point has a measured point within so many steps of the grid: no extrapolation

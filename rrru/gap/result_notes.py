@@ -1,18 +1,97 @@
 """Sentences on what a fit found of the robot apart from its effects."""
 
+import numpy as np
+
+from rrru.campaign.ingest.mastering import LARGE
 from rrru.campaign.noise import repeat_noise
+from rrru.gap.case import GEOMETRY
 from rrru.gap.options import OPTIONS
+from rrru.gap.weight import WEIGHT
+from rrru.robots.legs import WORLD
 
 # said where a part of the gap looks like random error and no pose was measured under the same conditions again
 REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
 
 
+def zero_notes(estimate, robot):
+    """Sentences on drives whose zeros are far off, such as "joint 4: zero is off by 2 degrees (95 %: 1.98 to 2.02)".
+
+    estimate: of the robot's geometric errors. A zero that is one number with a frame, or with the place of what is
+    read, is off together with that, and one whose variance comes from the priors is not determined.
+    """
+    block, names = estimate.parameters.places[GEOMETRY], robot.parameters.names
+    known = dict(zip(names, range(block.start, block.stop), strict=True))
+    for drive in robot.parts.drives:
+        name = f"d{drive.column.rpartition('_')[0]}"
+        number = known.get(name)
+        if number is None:
+            continue
+        value, error = estimate.values[number], np.nan_to_num(estimate.standard_errors[number])
+        if abs(value) <= max(LARGE[drive.unit], OPTIONS.min_zero_z * error):
+            continue
+        unit, scale = ("degrees", np.degrees(1.0)) if drive.unit == "rad" else ("mm", 1.0)
+        size = _sized(scale * value, scale * estimate.intervals[number], unit)
+        if others := _one_with(robot, name, LARGE[drive.unit]):
+            yield f"{drive.site}: zero and {others} cannot be told apart, together they are a zero off by {size}"
+        elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
+            yield f"{drive.site}: zero is not determined beside other numbers of the robot, most probable is {size}"
+        else:
+            yield f"{drive.site}: zero is off by {size}"
+
+
+def _sized(value, ends, unit):
+    """A number with its 95 % interval (2,), to two digits of its half width."""
+    places = max(1 - int(np.floor(np.log10(max(0.5 * float(np.ptp(ends)), 1e-12)))), 0)
+    value, low, high = (f"{one:.{places}f}" for one in (value, *ends))
+    return f"{value} {unit} (95 %: {low} to {high})"
+
+
+def _one_with(robot, zero, least):
+    """What a zero cannot be told apart from, in words: what makes `least` of it where it is off as far as it may be."""
+    usual = {"mm": OPTIONS.outside_error_mm, "rad": OPTIONS.outside_error_rad}
+    on_platform = "the place of the target" if robot.legs.reflectors else "the place of the tool"
+    others = (
+        "the frame of the measurements" if WORLD in candidate.twists else on_platform
+        for candidate, size in robot.imitated_outside(zero)
+        if abs(size) * usual[candidate.unit] > least
+    )
+    return " and ".join(dict.fromkeys(others))
+
+
 def weight_notes(attribution):
-    """Sentences on what the weight is surely off by."""
-    for name, unit, value, error in attribution.fit.weight:
-        if abs(value) > OPTIONS.min_nuisance_z * error:
+    """Sentences on what the weight is surely off by, as far as the readings determine it."""
+    for name, unit, value, interval, determined in _weight_off(attribution):
+        if determined:
             what = "more at the platform" if unit == "kg" else f"that the base leans about {name[-1]}"
-            yield f"weight not as told: {value:.3g} +- {error:.2g} {unit} {what}"
+            yield f"weight not as told: {_sized(value, interval, unit)} {what}"
+
+
+def weight_doubts(attribution):
+    """Sentences on what the weight seems to be off by where something else may be the reason."""
+    for name, unit, *_, determined in _weight_off(attribution):
+        if not determined:
+            what = "a mass at the platform" if unit == "kg" else f"a lean of the base about {name[-1]}"
+            do = "measure with two loads" if unit == "kg" else "level the base"
+            yield f"{what} and what gives way cannot be told apart by these readings: {do}"
+
+
+def _weight_off(attribution):
+    """Name, unit, value, 95 % interval and whether it is determined of each number of the weight that is surely off.
+
+    With one load all that gives way is in proportion to it: the mass is then measured against masses of the links that
+    nobody has weighed.
+    """
+    fit, case = attribution.fit, attribution.case
+    estimate, weight = fit.estimate, fit.weight
+    if not weight:
+        return
+    block = estimate.parameters.places[WEIGHT]
+    shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
+    several_loads = len(np.unique(np.nan_to_num(case.motion.payload_kg[case.used]))) > 1
+    for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
+        if abs(value) > OPTIONS.min_nuisance_z * error:
+            determined = share <= OPTIONS.max_prior_variance_share and (unit != "kg" or several_loads)
+            yield name, unit, value, interval, determined
 
 
 def measured_again(case):

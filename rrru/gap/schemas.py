@@ -19,7 +19,7 @@ values are of 3-D distances.
 campaign
 effects                str    names joined by + in the order of their share; none; unexplained where the library does
     not hold it
-probability            float  of this whole verdict, 0 to 1
+probability            float  of this whole verdict, 0 to 1; 1 where there is no answer
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
 where                  str    where the effects act, in words: a site, or the first and last of several; empty where
     nothing acts
@@ -47,6 +47,13 @@ dropped_points         int    outliers that the diagnosis left out
 notes                  str    what the data lack for a better answer; empty where nothing
 not_in_model           str    what was found and the robot's corrected file cannot hold; empty where nothing, or where
     the robot has no file
+no_answer              str    why no cause is named and no corrected file is written: numbers of the calibration at
+    their bounds, or an rms of many times the noise; empty where the answer holds, else effects is unexplained
+file_error_mm          float? rms distance of the corrected file's robot from the diagnosed one at the measured poses;
+    null where no file was corrected
+file_error_fresh_mm    float? the same at 200 fresh poses between the measured ones
+file_remainder         str    what the corrected file leaves beyond the diagnosis and what to use; empty where nothing
+file_headline          str    that the corrected file is worse than the calibration, and why; empty where it is not
 
 ## gap_left_out | tables/gap_left_out.parquet | campaign reason
 How many points the diagnosis did not use, by reason; a point has the first reason that fits. None where all are used.

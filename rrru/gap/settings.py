@@ -9,6 +9,9 @@ from rrru.errors import ConfigError
 from rrru.gap.weight import WEIGHT
 from rrru.robots.catalogue import MECHANISMS
 
+# in a configuration in place of the library's names
+ALL = "all"
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -46,7 +49,8 @@ class GapSettings:
     def from_config(cls, section, seed=0, use_near_singularity=True):
         """Settings of the configuration's `gap` section."""
         prior = Prior(tuple(section["prior_counts"]), section["prior_unexplained"], section["tolerance"])
-        effects = *section["effects"], *section["own_effects"]
+        named = NAMES if section["effects"] == ALL else section["effects"]
+        effects = *named, *section["own_effects"]
         return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
 
     def without(self, name):

@@ -12,7 +12,7 @@ _NONE = (frozenset(), False)
 class Verdict:
     """effects: names in order of share, () for none; unexplained: something is left that no effect explains;
     probability of both together; leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the
-    data leave open, each (names, unexplained, probability).
+    data leave open, each (names, unexplained, probability); no_answer: why the fit allows none, else empty.
     """
 
     effects: tuple
@@ -20,6 +20,7 @@ class Verdict:
     probability: float
     leg: int
     rivals: tuple
+    no_answer: str = ""
 
     @property
     def label(self):
@@ -40,6 +41,11 @@ class Verdict:
         return tuple(names)
 
 
+def without_answer(why):
+    """The Verdict on a fit that describes its readings too badly for any answer, see `rrru.gap.validity`."""
+    return Verdict((), True, 1.0, 0, (), why)
+
+
 def label(effects, unexplained):
     """Names joined by +, with "unexplained" last; "none" for nothing."""
     return "+".join((*effects, *(("unexplained",) if unexplained else ()))) or "none"
@@ -50,7 +56,8 @@ def decide(attribution, shares):
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
     matter. Beside something unexplained effects are named only where they act with a probability of 0.9 each and
-    explain half of the gap together; else they are what could be mistaken for a part of it.
+    explain half of the gap together, a law of many coefficients by itself; else they are what could be mistaken for a
+    part of it.
     """
     beliefs = attribution.posterior
     unknown, sets = beliefs.probability_unexplained, beliefs.sets()
@@ -60,7 +67,9 @@ def decide(attribution, shares):
         best = _NONE
     unexplained = known.get(_NONE, 0.0) <= OPTIONS.max_none_probability and unknown > known.get(best, 0.0)
     if unexplained:
-        effects, probability, rivals = _beside_unexplained(sets, unknown, shares)
+        library = attribution.case.library
+        broad = {name for name in shares if name in library and library[name].coordinates.broad}
+        effects, probability, rivals = _beside_unexplained(sets, unknown, shares, broad)
     else:
         effects, probability = best[0], known[best]
         rivals = {key: p for key, p in known.items() if key != best} | {(frozenset(), True): unknown}
@@ -74,10 +83,18 @@ def decide(attribution, shares):
     )
 
 
-def _beside_unexplained(sets, unknown, shares):
-    """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained)."""
+def _beside_unexplained(sets, unknown, shares, broad):
+    """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained).
+
+    broad: names of laws of many coefficients.
+    """
     within = {effects: p for (effects, flag), p in sets.items() if flag}
-    named = _certain(within, unknown)
+    # a law of many coefficients takes a part of whatever acts: it has to explain that much by itself
+    named = frozenset(
+        name
+        for name in _certain(within, unknown)
+        if name not in broad or shares.get(name, 0.0) >= OPTIONS.min_share_with_unexplained
+    )
     if sum(shares.get(name, 0.0) for name in named) < OPTIONS.min_share_with_unexplained:
         named = frozenset()
     # what imitates a part of the unknown, and what would do without it

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import percent, probability, readable, rounded, share_with_interval
+from rrru.gap.answer import NOT_CORRECTED, percent, probability, readable, rounded, share_with_interval
 from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect
@@ -14,6 +14,8 @@ _WORDS = {
     "unexplained": "nothing in the library explains it",
 }
 _LEAST_SHARE = 0.005
+# no instrument resolves less
+_LEAST_MM = 0.001
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class Advice:
 @dataclass(frozen=True)
 class Card:
     """One campaign's answer: what it is of, the answer in a line, sizes in mm as text, the lead sentence, the others,
-    Advice on each cause, what is next, notes, links to corrected files of the robot, and parts and steps of the bars.
+    Advice on each cause, what is next, notes, links to corrected files of the robot, what they are worth, and parts and
+    steps of the bars.
     """
 
     campaign: str
@@ -64,6 +67,7 @@ class Card:
     next: str
     notes: list
     models: list
+    worth: list
     parts: list
     steps: list
 
@@ -87,8 +91,9 @@ def card(facts, source="", found=None, models=()):
         _advice(facts["effects"]),
         following,
         facts["notes"],
-        list(models),
-        _parts(facts["budget"]),
+        [] if _not_corrected(facts) else list(models),
+        _file_worth(facts),
+        [] if facts["no_answer"] else _parts(facts["budget"]),
         _steps(facts),
     )
 
@@ -96,6 +101,8 @@ def card(facts, source="", found=None, models=()):
 def _short(facts):
     """The answer in a line: causes with their shares, how sure, and what is next."""
     named = [(readable(effect["name"]), effect["share"]) for effect in facts["effects"]]
+    if facts["no_answer"]:
+        return f"No cause is named: {facts['no_answer']}."
     if facts["unexplained"]:
         share = next(part["share"] for part in facts["budget"] if part["kind"] == "unexplained")
         named.append(("something unexplained", share))
@@ -113,6 +120,27 @@ def _advice(effects):
         for one in effects
         if one["inspect"]
     ]
+
+
+def _not_corrected(facts):
+    """Why there is no corrected file where there could be one, empty where there is."""
+    file = facts.get("corrected_file")
+    lacking = "; ".join(file["not_in_model"]) if file else ""
+    return lacking if lacking.startswith(NOT_CORRECTED) else ""
+
+
+def _file_worth(facts):
+    """Sentences on how good the corrected file is, which stand beside its link."""
+    if why := _not_corrected(facts):
+        return [f"Your robot's file was {why}."]
+    if not (file := facts.get("corrected_file")):
+        return []
+    if file["error_mm"] is None:
+        return []
+    sizes = (file[key] for key in ("error_mm", "error_fresh_mm"))
+    at_measured, at_fresh = (rounded(size) if size >= _LEAST_MM else f"less than {_LEAST_MM}" for size in sizes)
+    said = f"It is {at_measured} mm rms off the diagnosed robot at the measured poses, {at_fresh} mm at 200 fresh ones."
+    return [said, *([f"{file['remainder'][0].upper()}{file['remainder'][1:]}."] if file["remainder"] else [])]
 
 
 def _parts(budget):

@@ -110,9 +110,12 @@ def _gap(one, other, gap):
     for side in (one, other):
         facts = side.verdict
         names = [effect["name"] for effect in facts["effects"]] + ["unexplained"] * facts["unexplained"]
+        gap_mm = rounded(facts["gap_rms_mm"])
+        if why := facts.get("no_answer"):
+            yield f"{side.name} misses by {gap_mm} mm after calibration, and no cause is named: {why}."
+            continue
         causes = readable("+".join(names)) or "nothing to add"
         sure = probability(facts["probability"])
-        gap_mm = rounded(facts["gap_rms_mm"])
         yield f"{side.name} misses by {gap_mm} mm after calibration: {causes} (probability {sure})."
     differs = list(gap.rows.loc[gap.rows["differs"], "part"])
     said = "differ" if gap.chance < _LEVEL else "do not differ beyond chance"

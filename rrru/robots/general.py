@@ -122,10 +122,22 @@ class GeneralRobot(Robot):
         """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
         return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
 
+    def imitated_outside(self, name):
+        """Candidates of frame, tool and reflectors that a parameter imitates, and its size for a unit of each."""
+        names, (_, gauge) = self.parameters.names, self._chosen
+        known = {one.name: one for one in self.candidates if self._outside.issuperset(one.twists)}
+        sizes = {left: dict(zip(names, of.tolist(), strict=False)).get(name, 0.0) for left, of in gauge.items()}
+        return tuple((known[left], size) for left, size in sizes.items() if left in known and size)
+
+    @property
+    def _outside(self):
+        """Sites that are no part of the robot."""
+        return {WORLD, TOOL, *self.legs.reflectors}
+
     @property
     def stages(self):
         """Frame, tool and reflectors, and then with them the drives."""
-        return geometric_numbers.stages(self._chosen[0], {WORLD, TOOL, *self.legs.reflectors})
+        return geometric_numbers.stages(self._chosen[0], self._outside)
 
     @cached_property
     def directions(self):
@@ -202,6 +214,12 @@ class GeneralRobot(Robot):
             place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
             return bar_lengths(self.legs, self.drive_range, place, twists)
         return drives_from_home(self, (position, wanted), twists, deviations is not None)
+
+    @property
+    def strokes(self):
+        """Widths (K,) of the drives' ranges, NaN where none is stated."""
+        stated = [column not in self.assumed for column in self.parts.columns]
+        return np.where(stated, np.ptp(np.asarray(self.drive_range, dtype=float), axis=1), np.nan)
 
     def in_range(self, actuators):
         """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""

@@ -55,6 +55,11 @@ class Robot(ABC):
     def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
         """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
 
+    @property
+    def strokes(self):
+        """Widths (K,) of the drives' stated ranges, NaN where none is stated, as of most robots."""
+        return np.full(len(self.parts.drives), np.nan)
+
     def in_range(self, actuators):
         """Actuator values (n, K), NaN outside of the drives' stated ranges; of most robots none are stated."""
         return actuators
@@ -101,6 +106,13 @@ class Robot(ABC):
     def gauge(self):
         """By number that is no parameter in words what stands for it; none of a fixed set."""
         return {}
+
+    def imitated_outside(self, name):
+        """Candidates outside the robot that are no parameters since a parameter imitates them, and its size for a unit.
+
+        None of a fixed set.
+        """
+        return ()
 
     @property
     def offered(self):

@@ -10,8 +10,10 @@ from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
 
 ROBOT = Rrru3()
-EFFECTS = library(ROBOT)
-SLIDER_EFFECTS = library(Ptt3())
+# a robot along lines does not stop, and has no thermometer; laws of many waves have tests of their own
+ELSEWHERE = ("drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion")
+EFFECTS = {name: effect for name, effect in library(ROBOT).items() if name not in ELSEWHERE}
+SLIDER_EFFECTS = {name: effect for name, effect in library(Ptt3()).items() if name not in ELSEWHERE}
 LINE = Line("line", (-450.0, -100.0, 600.0), (350.0, 150.0, 700.0), 60)
 SPIRAL = Spiral("spiral", (0.0, 0.0), (50.0, 300.0), (560.0, 760.0), 4.0, 60)
 FORWARD = {"reverse": False, "payload_kg": 0.0}

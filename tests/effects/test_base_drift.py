@@ -74,9 +74,9 @@ def test_a_campaign_without_times_cannot_test_it():
 
 
 @pytest.mark.parametrize("robot", [Rrru3(), Delta(), arms.ARM], ids=["rrru3", "delta", "arm"])
-def test_laws_that_have_to_be_named_join_no_library_but_are_found(robot):
-    by_name = {"base_drift", "drive_error_function", "transmission_orders"}
-    assert by_name <= set(effects.BY_NAME_ONLY)
-    assert not by_name & {*effects.NAMES, *effects.library(robot), *GapSettings().effects}
-    assert all(effects.find(name, robot).name == name for name in by_name)
-    assert set(GapSettings(tuple(sorted(by_name))).library(robot)) == by_name
+def test_every_diagnosis_tests_the_laws_of_all_kinds_of_campaigns(robot):
+    usual = {"base_drift", "drive_error_function", "transmission_orders", "friction_windup", "encoder_ovality"}
+    usual |= {"read_before_rest", "thermal_expansion", "pedestal_compliance", "tracker_scale"}
+    assert usual <= {*effects.library(robot)} <= {*GapSettings().effects}
+    assert all(effects.find(name, robot).name == name for name in usual)
+    assert set(GapSettings(tuple(sorted(usual))).library(robot)) == usual

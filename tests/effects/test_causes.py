@@ -3,10 +3,10 @@
 import pytest
 
 from rrru.effects.causes import CAUSES, cause_texts
-from rrru.effects.library import BY_NAME_ONLY, NAMES
+from rrru.effects.library import NAMES
 from rrru.robots.drive_words import KINDS, LENGTH, SLIDING, TURNING, DriveWords
 
-EFFECTS = (*NAMES, *BY_NAME_ONLY)
+EFFECTS = NAMES
 
 
 def test_the_table_has_every_effect_of_the_library_and_no_other():

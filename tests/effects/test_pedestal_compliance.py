@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
-from rrru.effects.library import BY_NAME_ONLY, NAMES, find, library
+from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
@@ -67,12 +67,6 @@ def test_it_turns_the_world_about_level_axes_and_shifts_it_as_a_turn_further_dow
     np.testing.assert_allclose(twists[:, ARM.legs.site_numbers[WORLD]], expected, rtol=1e-9, atol=1e-15)
     on_wall = replace(ARM, up=(1.0, 0.0, 0.0))
     assert find("pedestal_compliance", on_wall).parameters.names == ("tilt_y", "tilt_z", "shift_y", "shift_z")
-
-
-def test_laws_of_a_campaigns_circumstances_have_to_be_named():
-    assert {"pedestal_compliance", "read_before_rest"} <= {*BY_NAME_ONLY}
-    assert not {*BY_NAME_ONLY} & {*NAMES, *library(ARM), *GapSettings().effects}
-    assert all(find(name, ARM).name == name for name in BY_NAME_ONLY)
 
 
 @pytest.fixture(scope="module")

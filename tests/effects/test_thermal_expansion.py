@@ -7,7 +7,6 @@ from rrru.campaign import measurements as rows
 from rrru.effects import library as effects
 from rrru.gap.calibrate import calibrate
 from rrru.gap.model_fit import fit_named_effects
-from rrru.gap.settings import GapSettings
 from tests.gap import arms
 
 _EXPANSION = 2.3e-5
@@ -51,8 +50,3 @@ def test_the_coefficient_is_found_from_an_arm_measured_warm_and_cold():
     found, error = fit.state.effects["thermal_expansion", 0][0], fit.estimate.block_errors("thermal_expansion")[0]
     assert error < 0.05 * _EXPANSION
     assert found == pytest.approx(_EXPANSION, abs=4.0 * error)
-
-
-def test_it_has_to_be_named():
-    assert "thermal_expansion" not in GapSettings().effects
-    assert "thermal_expansion" in effects.BY_NAME_ONLY

@@ -132,6 +132,20 @@ def test_a_direction_that_no_reading_sees_stays_at_its_prior_mean_and_is_named()
     np.testing.assert_allclose(np.abs(direction) / np.abs(direction).max(), np.eye(6)[4], atol=1e-9)
 
 
+def test_priors_leave_the_variance_of_what_the_readings_see_in_a_sum_only():
+    """Columns 1 and 4 are the same: the priors share out their sum, the readings tell the others."""
+    problem, _ = _problem(3, bend=0.0, sd=0.5)
+    problem.observations.matrix[:, 4] = problem.observations.matrix[:, 1]
+    shares = solve(problem, [np.zeros(6)]).prior_shares
+    # by drawing the priors' means: how far the estimate follows them, over its variance
+    stacked = np.concatenate([problem.observations.matrix / NOISE, np.eye(6) / 0.5])
+    means = 0.5 * np.random.default_rng(0).standard_normal((6, 4000))
+    followed = np.linalg.lstsq(stacked, np.concatenate([np.zeros((80, 4000)), means / 0.5]), rcond=None)[0]
+    variance = np.diag(np.linalg.inv(stacked.T @ stacked))
+    np.testing.assert_allclose(shares, followed.var(axis=1) / variance, rtol=0.1)
+    assert shares[1] > 0.95 and shares[4] > 0.95 and (shares < 1e-3).sum() == 3
+
+
 def test_without_a_prior_it_has_no_finite_error():
     problem, _ = _problem(2)
     blind = problem.observations.matrix.copy()

@@ -32,9 +32,10 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
     texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats"}
-    texts |= {"notes": "", "not_in_model": ""}
+    texts |= {"notes": "", "not_in_model": "", "no_answer": "", "file_remainder": "", "file_headline": ""}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
+    numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan}
     numbers |= {"noise_stated_mm": 0.02, "noise_correlation": 0.1, "noise_runs_mm": 0.005}
     numbers |= {"worst_x_mm": -512.3, "worst_y_mm": 37.5, "worst_z_mm": 600.0, "points": 144, "dropped_points": 2}
     return check(

@@ -22,7 +22,10 @@ from rrru.robots.rrru3 import Rrru3
 ROBOT = Rrru3()
 SIM = sim(ROBOT)
 MASSES = Masses()
-EFFECTS = GapSettings().library(ROBOT)
+# laws of many waves have tests of their own, and these campaigns do not show the others: their robot does not stop,
+# has no thermometer, and all its lengths are calibrated
+_ELSEWHERE = ("drive_error_function", "transmission_orders", "read_before_rest", "thermal_expansion", "tracker_scale")
+EFFECTS = {name: effect for name, effect in GapSettings().library(ROBOT).items() if name not in _ELSEWHERE}
 NOISE_MM = 0.02
 NOISE_RMS_MM = NOISE_MM * np.sqrt(3.0)
 ERRORS = {"dtheta1": 2e-3, "dtheta2": -1e-3, "dtheta3": 1.5e-3, "dL1": 0.4, "dL2": -0.3, "dL3": 0.5, "dr": 0.2}
@@ -94,6 +97,6 @@ def case_of(measurements, library=EFFECTS, noise_mm=NOISE_MM):
 
 
 def diagnosed(measurements, noise_mm=NOISE_MM, details=False, settings=None):
-    """Diagnosis of a measurement table with the whole library."""
+    """Diagnosis of a measurement table with all effects that these campaigns show."""
     robot = MeasuredRobot(ROBOT, MASSES, noise_mm)
-    return diagnose(measurements, robot, settings or GapSettings(draws=50), details)
+    return diagnose(measurements, robot, settings or GapSettings(tuple(EFFECTS), draws=50), details)

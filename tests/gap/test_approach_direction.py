@@ -14,6 +14,7 @@ from rrru.effects.protocol import together
 from rrru.errors import FitError
 from rrru.gap.approach_direction import at_reversals, read_back_jitter, rest_widths
 from rrru.gap.attribute import attribute
+from rrru.gap.case import GEOMETRY
 from rrru.gap.determined import require_determined
 from rrru.gap.diagnose import sim
 from rrru.gap.make_case import make_case
@@ -198,7 +199,7 @@ def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
     assert plain.case.used[1:].all() and jittered.case.used[1:].all()
     assert jittered.case.known["backlash"].mean() > 0.8 * plain.case.known["backlash"].mean() > 0.5
     assert plain.hypothesis.effects == jittered.hypothesis.effects == {"backlash"}
-    first, second = (found.fit.geometry_errors for found in along_lines)
+    first, second = (np.nan_to_num(found.fit.estimate.block_errors(GEOMETRY)) for found in along_lines)
     off = (plain.state.deviations - jittered.state.deviations) / np.hypot(first, second)
     assert np.sqrt((off**2).mean()) < 1.5
 

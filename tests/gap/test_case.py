@@ -30,7 +30,7 @@ def case():
 
 def test_points_that_are_known_are_used_and_no_run_begins_with_a_known_approach(case):
     starts = starts_of_runs(case.measurements["run"].to_numpy())
-    assert case.used.all() and set(case.known) == {"backlash"}
+    assert case.used.all() and set(case.known) == {"backlash", "friction_windup"}
     assert not case.known["backlash"][starts].any() and 0.7 < case.known["backlash"].mean() < 1.0
     np.testing.assert_array_equal(case.known["backlash"], np.isnan(case.motion.approach).all(axis=1))
     assert len(case) == case.used.sum() == len(case.points) == len(case.run) == case.count
@@ -155,7 +155,11 @@ def test_stepping_a_shape_parameter_is_what_the_last_column_says(case):
 
 def test_what_the_columns_do_not_tell_is_not_tested():
     frame = measure()
-    for column, lost in (("time_s", {"thermal_growth", "servo_lag"}), ("payload_kg", set()), ("speed_mm_s", set())):
+    for column, lost in (
+        ("time_s", {"thermal_growth", "servo_lag", "base_drift"}),
+        ("payload_kg", set()),
+        ("speed_mm_s", set()),
+    ):
         case = case_of(frame.assign(**{column: np.nan}))
         assert set(case.untestable) & set(EFFECTS) == lost and set(case.library) & set(EFFECTS) == set(EFFECTS) - lost
         assert all(note.startswith("needs ") for note in case.untestable.values())
@@ -163,7 +167,7 @@ def test_what_the_columns_do_not_tell_is_not_tested():
 
 def test_times_that_are_all_alike_tell_nothing():
     case = case_of(measure().assign(time_s=5.0))
-    assert {"thermal_growth", "servo_lag"} == set(case.untestable) & set(EFFECTS)
+    assert {"thermal_growth", "servo_lag", "base_drift"} == set(case.untestable) & set(EFFECTS)
     assert case.untestable["thermal_growth"] == "needs time_s of more than one value"
 
 

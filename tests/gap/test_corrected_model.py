@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.effects.library import active_effects
 from rrru.effects.protocol import together
+from rrru.gap import corrected as corrected_file
 from rrru.gap import corrected_model
 from rrru.gap.corrected import corrected
 from rrru.gap.corrected_drives import at_rest
@@ -260,9 +261,55 @@ def test_a_file_that_is_no_better_than_the_one_that_came_is_not_offered(attached
     assert ElementTree.parse(tmp_path / "corrected.xml").getroot().find("worldbody") is None
 
 
-def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod):
-    assert "the corrected file leaves" in arm.found.verdict["notes"]
-    assert "the corrected file leaves" not in hexapod.found.verdict["notes"]
+def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod, attached):
+    verdict = arm.found.verdict
+    left = float(re.search(r": (\S+) mm rms remain; use corrected_drives$", verdict["file_remainder"])[1])
+    assert verdict["file_remainder"].startswith(
+        "this URDF holds the geometry only and not encoder eccentricity, backlash:"
+    )
+    assert left == pytest.approx(verdict["file_error_fresh_mm"], rel=0.05)
+    for found in (hexapod.found, attached[0]):
+        assert found.verdict["file_remainder"] == found.verdict["file_headline"] == ""
+        assert max(found.verdict["file_error_mm"], found.verdict["file_error_fresh_mm"]) < 0.5 * _NOISE_MM
+
+
+def test_a_file_that_is_worse_than_the_calibration_says_so_in_the_headline(attached, tmp_path, monkeypatch):
+    """As where shifts between the axes of balls are fitted, which no file holds, and written without them."""
+    found, *_, section = attached
+    monkeypatch.setattr(corrected_file, "fitted_in_file", lambda attribution, _: attribution)
+    again = write_corrected(found, section, _MASSES, tmp_path / "corrected.xml").verdict
+    assert again["file_error_mm"] > 0.2 < again["file_error_fresh_mm"]
+    first, cannot = again["file_headline"].split("; it cannot hold: ")
+    assert re.fullmatch(
+        r"the corrected file misses the readings by 0\.\d+ mm rms, the calibration by 0\.00\d mm", first
+    )
+    assert cannot.startswith("ball1 y: the axes of a ball joint meet in a point, ") and cannot.endswith(" more")
+    assert again["file_remainder"].startswith("this file leaves 0.") and again["notes"] == ""
+
+
+@pytest.mark.parametrize("name", ["arm", "hexapod"])
+def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, request):
+    """At fresh poses within the measured range, to which the drives come from either side, with its true effects."""
+    campaign = request.getfixturevalue(name)
+    robot, section, generator = campaign.robot, _SECTIONS[name], np.random.default_rng(11)
+    measured, command = rows.actuators(campaign.frame, robot), rows.command(campaign.frame)
+    picks, share = generator.integers(len(measured), size=(200, 2)), generator.random((200, 1))
+    drive, near = (share * one[picks[:, 0]] + (1.0 - share) * one[picks[:, 1]] for one in (measured, command))
+    place = robot.forward(drive, guess_mm=near)
+    motion = at_rest(robot, _MASSES, (place, drive, 0.0, 0.0), generator.choice([-1.0, 1.0], (200, 1)), drive)
+    twists = robot.twists_of(campaign.errors) + together(active_effects(campaign.effects, robot), motion).twists
+    true = robot.measured(robot.solve(drive, place, twists), twists)
+    key = "mjcf" if "mjcf" in section else "urdf"
+    written = make_mechanism(name, section | {key: str(campaign.file)}, parameter_set="frame")
+    held = {effect: values for effect, values in campaign.effects.items() if key == "mjcf" and effect == "backlash"}
+    own = written.twists()
+    if held:
+        own = own + together(active_effects(held, written), replace(motion, robot=written)).twists
+    off = true - written.measured(written.solve(drive, place, own), own)
+    off = np.sqrt((off**2).sum(axis=1).mean())
+    stated = campaign.found.verdict["file_error_fresh_mm"]
+    # the estimate itself is off by as much as its noise, which the file cannot know
+    assert off == pytest.approx(stated, rel=0.1, abs=_NOISE_MM)
 
 
 def _left(found, kind):

@@ -1,5 +1,6 @@
 """Errors of drives over their values: the true function lies in the band, and the worst place is the true one."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -55,3 +56,15 @@ def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():
     case = arms.case_of(arms.measure(count=60), "drive_compliance")
     fit = SimpleNamespace(terms=[Term("drive_compliance")])
     assert drive_functions(SimpleNamespace(case=case, fit=fit), NAMES).empty
+
+
+def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give():
+    name = "drive_error_function"
+    case = arms.case_of(arms.measure(count=60), name)
+    fit = fit_model(case, [calibrate(case)], [Term(name)], 3.0 * case.library[name].coordinates.typical)
+    table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
+    stepped = replace(case, library={name: replace(case.library[name], along_drives=None)})
+    again = drive_functions(SimpleNamespace(case=stepped, fit=fit), NAMES)
+    for column in ("error", "low_95", "high_95"):
+        np.testing.assert_allclose(table[column], again[column], rtol=0.0, atol=1e-9)
+    assert set(table["drive"]) == {1, 2, 3, 4, 5, 6} and (table["high_95"] > table["low_95"]).all()

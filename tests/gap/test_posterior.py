@@ -18,7 +18,8 @@ from rrru.robots.rrru3 import Rrru3
 from tests.gap.campaigns import EFFECTS, NOISE_MM
 from tests.places import ROOT
 
-WITH_LEGS = EFFECTS.keys() - {"frame_misregistration", "thermal_growth", "joint_axis_error"}
+_OF_ALL = {"frame_misregistration", "thermal_growth", "joint_axis_error", "base_drift", "pedestal_compliance"}
+WITH_LEGS = EFFECTS.keys() - _OF_ALL
 
 
 def _stub(explained=0.0, library=EFFECTS):

@@ -55,6 +55,53 @@ def test_the_corrected_file_of_a_robot_is_linked_from_where_the_page_lies(folder
     assert '<a href="corrected.xml">' in (place.parent / "report.html").read_text()
 
 
+def _with_file(folder, **verdict):
+    """The page of the folder whose campaign has a corrected file."""
+    place = folder / "campaigns" / CAMPAIGN
+    (place / "corrected.urdf").write_text("<robot/>")
+    facts.write(answered(**verdict), place / "verdict.json")
+    return written(folder)
+
+
+def test_what_a_corrected_file_is_worth_stands_beside_its_link(folder):
+    remains = "this URDF holds the geometry only and not backlash: 0.54 mm rms remain; use corrected_drives"
+    text = _with_file(
+        folder, file_error_mm=0.31, file_error_fresh_mm=0.54, file_remainder=remains, not_in_model="backlash"
+    )
+    link = text.index(f'<a href="campaigns/{CAMPAIGN}/corrected.urdf">')
+    worth = text.index("It is 0.31 mm rms off the diagnosed robot at the measured poses, 0.54 mm at 200 fresh ones.")
+    assert link < worth < text.index(remains[1:]) and f'<p class="lead">{remains[:10]}' not in text
+    assert '<p class="lead">After calibration' in text
+
+
+def test_a_corrected_file_that_is_worse_than_the_calibration_is_the_headline(folder):
+    headline = (
+        "the corrected file misses the readings by 0.35 mm rms, the calibration by 0.009 mm; it cannot hold: ball1"
+    )
+    text = _with_file(folder, file_error_mm=0.3, file_error_fresh_mm=0.3, file_headline=headline, not_in_model="ball1")
+    assert f'<p class="lead">T{headline[1:]}.</p>' in text
+
+
+def test_a_file_that_was_not_corrected_has_no_link_but_a_reason(folder):
+    text = _with_file(folder, not_in_model="not corrected: it would miss by 1 mm rms")
+    assert (
+        "corrected.urdf" not in text and "Your robot&#39;s file was not corrected: it would miss by 1 mm rms." in text
+    )
+
+
+def test_a_corrected_file_that_is_the_diagnosed_robot_is_off_by_no_rounding(folder):
+    text = _with_file(folder, file_error_mm=1.1e-9, file_error_fresh_mm=0.0)
+    assert "It is less than 0.001 mm rms off the diagnosed robot at the measured poses, less than 0.001 mm at" in text
+
+
+def test_without_an_answer_that_is_the_headline_and_no_cause_is_on_the_card(folder):
+    why = "the best answer leaves 12 mm rms, 600 times the noise of 0.02 mm"
+    text = _with_file(folder, effects="unexplained", no_answer=why, not_in_model=f"not corrected: {why}")
+    card = text[text.index(f'id="answer-{CAMPAIGN}"') : text.index("</article>")]
+    assert f'<p class="lead">No cause is named: {why}.</p>' in card and "corrected.urdf" not in card
+    assert "make check-data" in card and "backlash" not in card and "link flexure" not in card
+
+
 def test_texts_of_files_are_texts_on_the_page(folder):
     assert "a &lt;b&gt; &amp; c" in written(folder)
 

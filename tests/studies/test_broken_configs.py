@@ -75,6 +75,22 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
         ('loads: {arm_mass_kg: "8e-05"}', "it is text to YAML: write 8.0e-05, without quotes"),
         ("campaigns: {crooked: {platform_mass_kg: 3.0}}", "crooked: 'platform_mass_kg' is not one of ['robot', "),
         ("campaigns: {mine: {robot: rrru3, ingest: a.csv, unit: mms}}", "did you mean mm for mms?"),
+        (
+            "campaigns: {mine: {robot: rrru3, ingest: a.csv, motion: stop_and_goo}}",
+            "mine.motion: 'stop_and_goo' is not one of ['stop_and_go', 'continuous']; did you mean stop_and_go",
+        ),
+        (
+            "campaigns: {mine: {robot: rrru3, ingest: a.csv, motion: {kind: stop_and_go, between: joints}}}",
+            "mine.motion.between: 'joints' is not one of ['tool', 'drives']",
+        ),
+        (
+            "campaigns: {mine: {robot: rrru3, ingest: a.csv, motion: {between: tool}}}",
+            "mine.motion: 'kind' is a required property",
+        ),
+        (
+            "campaigns: {mine: {robot: rrru3, ingest: a.csv, motion: {kind: continuous, path: tool}}}",
+            "'path' was unexpected); allowed: kind, between",
+        ),
         ("campaigns: {mine: {robot: rrru3, virtual: crooked}}", "'trajectories' is a required property"),
         ("campaigns: {mine: {robot: rrru3}}", "a measured one has `ingest: file.csv` instead"),
         ("gap: {zzz: 3}", "; allowed: effects"),

@@ -28,7 +28,9 @@ def main(settings, inputs, outputs):
         # MuJoCo is loaded where a file is written only
         from rrru.gap.corrected_model import write_corrected
 
-        result = write_corrected(result, settings["robot"]["dimensions"], masses, outputs["corrected"])
+        result = write_corrected(
+            result, settings["robot"]["dimensions"], masses, outputs["corrected"], settings["seed"]
+        )
     words = drive_words(nominal)
     told = answer(settings["campaign"], result.verdict, result.tables, words)
     facts.write(told, outputs["verdict"])

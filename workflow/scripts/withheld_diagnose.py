@@ -28,7 +28,8 @@ def main(settings, inputs, outputs):
         result = diagnose(points, MeasuredRobot(robot, Masses(**told["masses"]), noise_mm, name), known, details=False)
         verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
         numbers = fitted(parameter_rows(result.attribution))
-        states.append(state_row(name, result.attribution.calibrated.deviations, result.state, numbers))
+        fit = result.attribution
+        states.append(state_row(name, fit.calibrated.deviations, result.state, fit.case.library, numbers))
         budgets.append(result.tables["gap_budget"].assign(robot=name))
     frames = {
         "withheld_verdicts": pd.DataFrame(verdicts),

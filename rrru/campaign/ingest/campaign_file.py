@@ -101,7 +101,7 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
         frame = frame.assign(**vector_columns("command", sent_to(frame, spec, mechanism, problems)))
         which = f"{drives[0]} to {drives[-1]} ({mechanism.name}, nominal)"
         notes.append(f"no commanded positions: computed from {which}")
-    frame, more = number_runs(frame)
+    frame, more = number_runs(frame, spec.motion is not None and spec.motion.stops)
     sheet = Sheet(spec, mechanism, problems, found, frame)
     return sheet, notes + more + _notes_on_columns(sheet)
 
@@ -139,6 +139,8 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
         upright = sheet.mechanism.orients and not set(TURNS["command"]) <= set(frame)
         held = "; nor orientations: it is taken to be turned as at home all the time" if upright else ""
         notes.append(f"no {sheet.drive_name}: {names} computed from the commanded positions ({which}){held}")
+    if sheet.spec.motion:
+        notes.append(f"motion: {sheet.spec.motion.words}, as stated")
     if np.array_equal(frame[[*MEASURED]], frame[[*COMMAND]]):
         notes.append("every measured position equals the commanded one: no instrument gives that")
     return notes
@@ -160,6 +162,8 @@ def _table(
         told |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
     if mounted:
         told |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
+    if sheet.spec.motion:
+        told |= sheet.spec.motion.columns()
     frame = sheet.frame.assign(**told, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         places = frame.loc[outlier, ["run", "point"]].to_numpy()
@@ -168,6 +172,6 @@ def _table(
         notes.append(f"{len(places)} points marked as outliers, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
     optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
-    extra = [name for name in optional if name in frame]
+    extra = [name for name in (*optional, "motion", "motion_between") if name in frame]
     frame = frame.reindex(columns=("run", "trajectory", "point", *moved, "status", *extra)).reset_index(drop=True)
     return frame.astype({"run": "int64", "point": "int64", "trajectory": "str", "status": "str"}), notes

@@ -12,12 +12,12 @@ _MOST_STALE = 0.1
 _COARSE_MM = 0.005
 
 
-def number_runs(frame):
-    """The frame with `run` and `point`, and what was done to get them.
+def number_runs(frame, at_rest=False):
+    """The frame with `run` and `point`, and what was done to get them; at_rest: the robot rests at each reading.
 
     Without a `run` a new one begins where the trajectory's name changes and where the point's number falls or, without
     a `point`, where the commanded path turns back on itself or starts again. Without a `point` they are counted within
-    the run.
+    the run. Stops follow no path that could turn back.
     """
     frame, notes = frame.copy(), []
     if "target" in frame and "point" in frame:
@@ -32,7 +32,9 @@ def number_runs(frame):
         )
         where = "the point's number falls" if numbered else "the commanded path turns back or starts again"
         where = f"the trajectory's name changes or {where}"
-        if not numbered and not follows_path(frame[[*COMMAND]].to_numpy(), frame["trajectory"].to_numpy()):
+        if not numbered and at_rest:
+            again, where = False, "the trajectory's name changes, as each point is a stop"
+        elif not numbered and not follows_path(frame[[*COMMAND]].to_numpy(), frame["trajectory"].to_numpy()):
             again, where = False, "the trajectory's name changes, as the points follow no path"
         frame["run"] = (change | again).cumsum().astype(float)
         notes.append(f"no column run: a new run wherever {where}, {int(frame['run'].max())} runs")

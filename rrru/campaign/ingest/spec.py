@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign.ingest.formats import Format
+from rrru.campaign.stated_motion import StatedMotion
 from rrru.errors import ConfigError
 
 MM = {"mm": 1.0, "m": 1000.0, "inch": 25.4}
@@ -34,7 +35,8 @@ class IngestSpec:
     that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
     with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
     day in `time_s`. signs: drive -> -1 where the file counts its values the other way round; order: names of the drives
-    to which the file's columns of drive values belong, in their order, none for the robot's own order.
+    to which the file's columns of drive values belong, in their order, none for the robot's own order. motion: how the
+    robot moved between the rows, None where nobody states it.
     """
 
     path: str
@@ -53,6 +55,7 @@ class IngestSpec:
     time_format: str | None = None
     signs: Mapping[str, int] = field(default_factory=dict)
     order: tuple[str, ...] = ()
+    motion: StatedMotion | None = None
 
     def __post_init__(self) -> None:
         theirs, points = [*self.columns.values()], self.registration_points
@@ -93,6 +96,8 @@ class IngestSpec:
         places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
         beside, order = tuple(given.pop("world_targets", ())), tuple(given.pop("order", ()))
         commands = given.pop("commands", None)
+        if "motion" in given:
+            given["motion"] = _stated(section)
         commands = commands if isinstance(commands, Mapping) else {"file": commands}
         return cls(
             section["ingest"],
@@ -105,3 +110,11 @@ class IngestSpec:
             commands_format=Format.from_config(commands.get("format")),
             **given,
         )
+
+
+def _stated(section: Mapping[str, Any]) -> StatedMotion:
+    """The StatedMotion of a campaign's section; raises ConfigError with the file for a wrong one."""
+    try:
+        return StatedMotion.from_config(section["motion"])
+    except ConfigError as error:
+        raise ConfigError(f"ingest of {section['ingest']}: {error}") from error

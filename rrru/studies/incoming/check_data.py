@@ -13,6 +13,7 @@ import yaml
 from rrru.campaign.ingest.columns import REQUIRED, resolve
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.spec import IngestSpec
+from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import ConfigError, IngestError, RrruError
 from rrru.studies.checks import check_keys
 from rrru.studies.incoming.costs import costs, without_times
@@ -29,6 +30,11 @@ _UNREADABLE = {
     "noise_mm": "0.02  # of the instrument, 1 sigma per axis; as it stands, the file tells it or it is estimated",
     "platform_mass_kg": "3.0  # what the robot carries beside payload_kg: the platform or tool",
 }
+# what only the user knows of a robot that stops
+_BETWEEN = (
+    "motion: {kind: stop_and_go, between: drives}  # it moves from stop to stop joint by joint (PTP); "
+    "tool: in straight lines (LIN)"
+)
 _OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
 
 
@@ -175,6 +181,8 @@ def _pasted(found):
         )
         lines += [f"    {line}" for line in (short if len(short) < _WIDE else long).splitlines()]
     lines += [f"    # {key}: {words}" for key, words in _UNREADABLE.items() if key not in found.section]
+    if found.section.get("motion") == STOP_AND_GO:
+        lines.append(f"    # {_BETWEEN}")
     return "\n".join(lines)
 
 

@@ -20,8 +20,8 @@ _SHOWN = 8
 # what gives what an effect needs
 _REMEDIES = {
     "time_s": "a column time_s, in seconds or times of day",
-    "drive_rate": "a column time_s on runs along a path",
-    "last_move": "points that are stops at poses in no order",
+    "drive_rate": "a column time_s on runs along a path that is passed without stops",
+    "last_move": "`motion: stop_and_go` of a robot that rests at each reading",
 }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import passes_points, stops
 from rrru.campaign.ingest.campaign_file import Ingested, ingest
 from rrru.campaign.ingest.cells import Cells
 from rrru.campaign.ingest.columns import convert, known_columns, resolve
@@ -17,6 +18,7 @@ from rrru.campaign.ingest.guess import guess_clock, guess_columns, guess_format,
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.sheet import COMMAND
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
+from rrru.campaign.stated_motion import STOP_AND_GO
 from rrru.errors import IngestError, RrruError
 from rrru.robots.robot import Robot
 from rrru.studies import config as parts
@@ -45,7 +47,20 @@ def propose(section, config):
     """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read."""
     mechanism = setup.mechanism(parts.robot(config, section))
     cells, section = _with_columns(_with_formats(section), mechanism)
-    return Proposal(*_fitting(section, cells, mechanism))
+    return _with_motion(Proposal(*_fitting(section, cells, mechanism)))
+
+
+def _with_motion(found):
+    """The Proposal with a `motion` that nobody states: stop and go where several targets were read at a stop, or the
+    points follow no path.
+    """
+    if found.result is None or "motion" in found.section:
+        return found
+    table = found.result.measurements
+    if not (np.bincount(stops(table)) > 1).any() and passes_points(table):
+        return found
+    section = found.section | {"motion": STOP_AND_GO}
+    return replace(found, section=section, result=ingest(IngestSpec.from_config(section), found.mechanism))
 
 
 def fitting_robots(section, config):

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.effects.drive_error_function import ORDERS
 from rrru.gap.evidence import STRENGTHS, averaged
 from rrru.gap.spectra import amplitudes
 from rrru.gap.terms import Term
@@ -47,6 +46,7 @@ def _verdict(studied: Studied) -> dict:
     own = {name: found[name] for name in (*told, "dropped_points")}
     before = studied.step("b").held_out_mm
     notes = (
+        f"no cause is named: {found['no_answer']}" if found["no_answer"] else "",
         found["notes"],
         _waves(studied),
         _far(studied),
@@ -79,7 +79,7 @@ def _found(studied: Studied) -> Mapping[str, Any]:
     """The verdict of the diagnosis; without one what a series has that nobody has diagnosed."""
     if studied.diagnosis:
         return studied.diagnosis.verdict
-    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes"), "")
+    texts = dict.fromkeys(("where", "confusable_with", "next_runs", "notes", "no_answer"), "")
     return defaultdict(lambda: np.nan, texts, effects=UNDIAGNOSED, points=studied.plain.count, dropped_points=0)
 
 
@@ -180,8 +180,10 @@ def _spectrum(studied: Studied) -> pd.DataFrame:
         if found is not None and studied.diagnosis:
             errors = studied.diagnosis.tables["gap_parameters"]
             errors = errors.loc[errors["effect"] == _FUNCTION[0], "standard_error"].to_numpy()
-            own = np.reshape(found, (-1, len(ORDERS), 2))[number, : len(orders)]
-            (sine, cosine), error = own.T, np.reshape(errors, (-1, len(ORDERS), 2))[number, : len(orders)].mean(axis=1)
+            shape = len(robot.parts.drives), -1, 2
+            own = np.reshape(found, shape)[number, : len(orders)]
+            error[: len(own)] = np.reshape(errors, shape)[number, : len(orders)].mean(axis=1)
+            sine[: len(own)], cosine[: len(own)] = own.T
         reach = float(np.ptp(case.motion.drive[case.used][:, number]))
         parts.append(
             pd.DataFrame(

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
+from rrru.effects.library import NAMES
 from rrru.errors import ConfigError
-from rrru.studies.withheld.outside import EFFECTS
 from rrru.studies.withheld.states import VERDICT
 from rrru.studies.withheld.verdicts import in_order, is_outside, is_right, scores
 
@@ -33,7 +33,7 @@ def read_field_answers(path):
         raise ConfigError(f"withheld.field_answers: {path} lacks the columns {', '.join(sorted(missing))}")
     for row, effects in zip(answers["campaign"], answers["effects"], strict=True):
         for name in effects.split("+"):
-            if name not in (*EFFECTS, "none") and not is_outside(name):
-                known = f"none, outside, {', '.join(EFFECTS)}"
+            if name not in (*NAMES, "none") and not is_outside(name):
+                known = f"none, outside, {', '.join(NAMES)}"
                 raise ConfigError(f"withheld.field_answers: campaign {row} has the effect {name!r}; known: {known}")
     return answers.assign(leg=pd.to_numeric(answers["leg"], errors="coerce").fillna(0).astype(int))

@@ -49,7 +49,8 @@ class Campaign:
         mechanism = sim(known.mechanism)
         case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
         calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
-        effects = case.effects
+        # the diagnosis finds the waves of laws of many coefficients; they are no signatures
+        effects = {name: effect for name, effect in case.effects.items() if not effect.coordinates.broad}
         keys = [(name, k) for name, effect in effects.items() for k in range(len(effect.coordinates.shapes))]
         linear = case.linearise(calibrated, keys)
         terms = [term for effect in effects.values() for term in variants(effect)]

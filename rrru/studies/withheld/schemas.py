@@ -39,7 +39,7 @@ The sims of the diagnosis: calibrated without and corrected with effects.
 robot
 calibrated             str    the mechanism's deviations (rad, mm) of the calibration alone, as a JSON list
 deviations             str    the mechanism's deviations of the corrected sim, as a JSON list
-fitted_effects         str    effects of the corrected sim, as a JSON list of [name, shape, coordinates]
+fitted_effects         str    effects of the corrected sim, as a JSON list of [name, shape, coordinates, waves]
 shapes                 str    shapes' parameters that were fitted further, as JSON by effect and name
 numbers                str    numbers of the effects, as a JSON list of [effect, parameter, value, standard error]
 

@@ -1,6 +1,6 @@
 """Verdicts beside the truth that was withheld from the diagnosis: the only code that sees both."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -61,9 +61,9 @@ def _right(row, robot, listed):
 
 def _measured(row, robot, points, about, taken_out):
     """What is computed from a robot itself: limits, the share of its gap that is truly closed, numbers that hold."""
-    calibrated, state = state_of(row)
+    calibrated, state, laws = state_of(row, about.library)
     case = _case(points.reset_index(drop=True), about, about.library)
-    closed = true_share(robot, about, case.mechanism, calibrated, state)
+    closed = true_share(robot, about, case.mechanism, calibrated, (state, laws))
     numbers, hold = held(row["numbers"], robot.numbers(about.conditions))
     told = {"file": robot.file, "cause": robot.cause, "share_closed_true": closed, "numbers": numbers, "held": hold}
     return told | asdict(_limits(row, robot, points, about, calibrated, taken_out))
@@ -80,8 +80,12 @@ def _limits(row, robot, points, about, calibrated, taken_out):
 
 
 def _known(library, taken_out):
-    """Names of a library without an effect and those that hold it as a special case."""
-    return [name for name in library if name != taken_out and taken_out not in HOLDS.get(name, ())]
+    """Names of a library without an effect, those that hold it as a special case, and laws of many coefficients.
+
+    The last imitate whatever depends on the drives' values.
+    """
+    few = [name for name, effect in library.items() if not effect.coordinates.broad]
+    return [name for name in few if name != taken_out and taken_out not in HOLDS.get(name, ())]
 
 
 def _case(measurements, about, library, mechanism=None):
@@ -91,15 +95,17 @@ def _case(measurements, about, library, mechanism=None):
     return make_case(measurements, mechanism, conditions.masses, conditions.noise_mm, library)
 
 
-def true_share(robot, about, mechanism, calibrated, state):
+def true_share(robot, about, mechanism, calibrated, corrected):
     """Share of the true gap that the corrected sim closes on runs never driven; NaN without gap or with a lost pose.
 
-    mechanism: with the numbers that were calibrated.
+    mechanism: with the numbers that were calibrated; corrected: the State and its effects by name.
     """
+    state, laws = corrected
     driven = fresh_runs(robot, about.conditions)
     if driven is None:
         return np.nan
-    case = _case(driven, about, about.library, mechanism).standing(state)
+    case = _case(driven, about, about.library, mechanism)
+    case = replace(case, library=case.library | laws).standing(state)
     # an effect of the drives' sense of arrival says nothing where that is unknown
     known = case.complete({name for name, _ in state.effects} & case.known.keys())
     before, after = case.residual(State(calibrated, {}))[known], case.residual(state)[known]

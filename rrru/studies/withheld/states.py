@@ -19,9 +19,15 @@ VERDICT = [
 ]
 
 
-def state_row(robot, calibrated, state, numbers="[]"):
-    """Row of `withheld_states` from the calibrated deviations (p,), the corrected sim and its numbers' errors."""
-    effects = [[name, int(shape), np.asarray(value).tolist()] for (name, shape), value in sorted(state.effects.items())]
+def state_row(robot, calibrated, state, library, numbers="[]"):
+    """Row of `withheld_states` from the calibrated deviations (p,), the corrected sim and its numbers' errors.
+
+    library: effects by name as the diagnosis fitted them.
+    """
+    effects = [
+        [name, int(shape), np.asarray(value).tolist(), library[name].waves]
+        for (name, shape), value in sorted(state.effects.items())
+    ]
     return {
         "robot": robot,
         "calibrated": json.dumps(np.asarray(calibrated).tolist()),
@@ -32,8 +38,19 @@ def state_row(robot, calibrated, state, numbers="[]"):
     }
 
 
-def state_of(row):
-    """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`."""
+def state_of(row, library):
+    """Calibrated deviations (p,) and corrected sim of a row of `withheld_states`, and its effects by name.
+
+    library: effects by name, from which those are made that a campaign has chosen the waves of.
+    """
     told = {key: json.loads(row[key]) for key in ("calibrated", "deviations", "fitted_effects", "shapes")}
-    effects = {(name, shape): np.array(value) for name, shape, value in told["fitted_effects"]}
-    return np.array(told["calibrated"]), State(np.array(told["deviations"]), effects, told["shapes"])
+    effects = {(name, shape): np.array(value) for name, shape, value, _ in told["fitted_effects"]}
+    laws = {name: _as_fitted(library[name], len(value), waves) for name, _, value, waves in told["fitted_effects"]}
+    return np.array(told["calibrated"]), State(np.array(told["deviations"]), effects, told["shapes"]), laws
+
+
+def _as_fitted(effect, count, waves):
+    """The effect with the waves that were found, or with so many coefficients."""
+    if waves:
+        return effect.with_waves(tuple(map(tuple, waves)))
+    return effect if effect.coarser is None else effect.coarser(count)

@@ -1,5 +1,7 @@
 """Files of robots whose drives have lost their zeros, in an instrument's own frame: ingest, calibration, words."""
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,7 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
-from rrru.fit.mastering import mastering_notes
+from rrru.gap.result_notes import zero_notes
 from rrru.robots.hexapod import hexapod
 from rrru.robots.serial import serial
 from tests.schemas import check_measurements
@@ -100,7 +102,7 @@ def test_lost_zeros_of_arms_are_found_with_frame_and_reflectors(seed, tmp_path):
     values = dict(zip(fit.parameters.names, fit.deviations.tolist(), strict=True))
     for k in (2, 3, 4, 5):
         assert values[f"dq{k}"] == pytest.approx(zeros[k - 1], abs=2e-3)
-    noted = " ".join(mastering_notes(fit, robot))
+    noted = " ".join(zero_notes(fit.estimate, robot))
     for k in (2, 3, 4, 5):
         assert (f"joint {k}: zero is off by " in noted) == (abs(values[f"dq{k}"]) > 5e-3)
     if np.abs(zeros[1:5]).max() > 0.05:
@@ -114,14 +116,12 @@ def test_lost_lengths_of_hexapods_are_found_with_frame_and_reflectors(seed, tmp_
     zeros = _two_far_off(generator, 20.0, 60.0)
     fit, robot = _calibrated(_file(tmp_path, made, generator, zeros), made[0])
     assert fit.rms_mm < 1.2 * np.sqrt(3.0) * _NOISE_MM and not fit.at_bound.any()
-    noted = mastering_notes(fit, robot)
-    assert any(note.startswith("leg ") and note.endswith(" mm") for note in noted)
-    # what is not sure is not told, what is has its error
-    off = np.abs(fit.deviations)
-    assert mastering_notes(fit, robot, 0.3 * off) == ()
-    assert [note.partition(" +- ")[0] for note in mastering_notes(fit, robot, 0.2 * off)] == [
-        note.removesuffix(" mm") for note in noted
-    ]
+    noted = list(zero_notes(fit.estimate, robot))
+    assert any(note.startswith("leg ") and " mm (95 %: " in note for note in noted)
+    # what is not sure is not told
+    unsure, sure = (replace(fit.estimate, covariance=np.diag((share * fit.deviations) ** 2)) for share in (0.3, 0.2))
+    assert not list(zero_notes(unsure, robot))
+    assert [note.partition(":")[0] for note in zero_notes(sure, robot)] == [note.partition(":")[0] for note in noted]
 
 
 def test_zeros_that_are_known_are_left_alone(tmp_path):
@@ -130,4 +130,4 @@ def test_zeros_that_are_known_are_left_alone(tmp_path):
     found = _file(tmp_path, made, generator, np.zeros(6))
     assert not any("lost" in note for note in found.notes)
     fit, robot = _calibrated(found, made[0])
-    assert mastering_notes(fit, robot) == ()
+    assert not list(zero_notes(fit.estimate, robot))

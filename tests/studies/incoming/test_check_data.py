@@ -258,3 +258,36 @@ def test_any_file_at_all_is_told(data, ending, tmp_path, monkeypatch):
     path = Path(tmp_path, f"any{ending}")
     path.write_bytes(data)
     assert main([str(path), "--robot", "rrru3"]) in (1, 2)
+
+
+def test_several_targets_at_a_stop_and_poses_in_no_order_are_proposed_as_stop_and_go(tmp_path, capsys, monkeypatch):
+    """A path that is passed gets no such proposal; what is stated stays."""
+    shuffled = FIELD[FIELD["run"] == 1].sample(frac=1.0, random_state=1).drop(columns=["time_s", "run", "point"])
+    assert "motion" not in proposed(checked(FIELD, tmp_path))
+    found = checked(shuffled, tmp_path)
+    assert proposed(found)["motion"] == "stop_and_go" and not found.refused
+    assert any("servo_lag" in line and "the robot rests at every point" in line for line in costs(found))
+    stated = {"robot": "rrru3", "ingest": str(tmp_path / "mine.csv"), "motion": "continuous"}
+    assert proposed(checked(shuffled, tmp_path, campaigns={"mine": stated}))["motion"] == "continuous"
+    monkeypatch.chdir(ROOT)
+    main([str(tmp_path / "mine.csv"), "--robot", "rrru3"])
+    assert "# motion: {kind: stop_and_go, between: drives}" in capsys.readouterr().out
+    file, robot = tmp_path / "stops.csv", {"mjcf": "data/models/hexapod.xml", "platform": "plate"}
+    _two_targets(setup.mechanism({"name": "own", "dimensions": robot})).to_csv(file, index=False)
+    taken = check_file(file, CONFIG | {"robots": CONFIG["robots"] | {"own": robot}}, "own")
+    assert taken.refused == () and proposed(taken)["motion"] == "stop_and_go"
+
+
+def _two_targets(robot):
+    """Two reflectors of a robot at each stop of a straight row of stops that turns slowly."""
+    at, generator = np.linspace(-1.0, 1.0, 60)[:, None], np.random.default_rng(1)
+    width = np.ptp(robot.drive_range, axis=1)
+    drive = robot.legs.home_drives + 0.15 * width * np.sin(at + np.arange(6)) - 0.15 * width * np.sin(np.arange(6))
+    poses = robot.solve(drive, np.tile(robot.legs.home_mm, (60, 1)))
+    assert poses.closed.all()
+    places = np.array([[60.0, 10.0, 40.0], [-50.0, 40.0, 70.0]])
+    seen = np.stack([poses.point(place) for place in places], axis=1).reshape(-1, 3)
+    seen = seen + 0.01 * generator.standard_normal(seen.shape)
+    told = dict(zip(robot.parts.columns, np.repeat(drive, 2, axis=0).T, strict=True))
+    told |= {f"measured_{axis}_mm": column for axis, column in zip("xyz", seen.T, strict=True)}
+    return pd.DataFrame({"trajectory": "row", "target": ["a", "b"] * 60, **told})

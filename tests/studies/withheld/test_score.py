@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.effects.library import library
 from rrru.errors import ConfigError
 from rrru.fit.calibration import calibrate
 from rrru.fit.campaign_fit import select
@@ -25,6 +26,7 @@ from rrru.studies.withheld.verdicts import is_right
 from tests.schemas import TABLES, check
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
+_LIBRARY = library(CONDITIONS.mechanism)
 _PART = {"part": "backlash", "kind": "effect", "rms_mm": 0.07, "probability": 0.99}
 
 
@@ -53,7 +55,7 @@ def _scored(robots, verdicts, states):
     base = {"check": "label", "probability": 0.9, "share_closed": 0.5}
     told = pd.DataFrame([base | {"robot": name} | verdict for name, verdict in verdicts.items()])
     told = answers[["robot", "kind"]].merge(told, on="robot")
-    corrected = pd.DataFrame([state_row(name, *state) for name, state in states.items()])
+    corrected = pd.DataFrame([state_row(name, *state, _LIBRARY) for name, state in states.items()])
     budget = pd.DataFrame([{"robot": name} | _PART for name in robots])
     scored = score_chunk(answers, measurements, told, corrected, budget, {"": Known(CONDITIONS)})
     for name, frame in scored._asdict().items():
@@ -92,9 +94,10 @@ def test_many_causes_are_scored_by_their_parts_and_have_no_limits(robots, effect
 
 
 def test_what_holds_an_effect_goes_with_it():
-    known = _known({"leg_asymmetry": None, "joint_axis_error": None, "backlash": None}, "leg_asymmetry")
-    assert known == ["backlash"]
-    assert len(_known(EFFECTS, "")) == len(EFFECTS)
+    library = {name: _LIBRARY[name] for name in ("leg_asymmetry", "joint_axis_error", "backlash")}
+    assert _known(library, "leg_asymmetry") == ["backlash"]
+    many = {"drive_error_function", "transmission_orders"}
+    assert set(_known(_LIBRARY, "")) == set(_LIBRARY) - many
 
 
 @pytest.mark.parametrize(
@@ -132,14 +135,23 @@ def test_right_is_what_names_exactly_the_truth(truth, verdict, check, right):
 def test_states_survive_as_text():
     state = State(
         np.array([1e-3, -2.5]),
-        {("thermal_growth", 2): np.array([1.25e-4]), ("backlash", 0): np.array([0.0, 1 / 3, 2.0])},
+        {
+            ("thermal_growth", 2): np.array([1.25e-4]),
+            ("backlash", 0): np.array([0.0, 1 / 3, 2.0]),
+            ("transmission_orders", 0): np.array([1e-4, -2e-4]),
+            ("drive_error_function", 0): 1e-5 * np.arange(3 * 2 * 7),
+        },
         {"thermal_growth": {"time_constant": 1 / 7}},
     )
-    calibrated, again = state_of(state_row("a", [0.5, 0.25], state))
+    fitted = _LIBRARY | {"transmission_orders": _LIBRARY["transmission_orders"].with_waves(((2, 7.25),))}
+    calibrated, again, laws = state_of(state_row("a", [0.5, 0.25], state, fitted), _LIBRARY)
     np.testing.assert_array_equal(calibrated, [0.5, 0.25])
     np.testing.assert_array_equal(again.deviations, state.deviations)
     assert set(again.effects) == set(state.effects) and again.shape_values == state.shape_values
     assert all((again.effects[key] == value).all() for key, value in state.effects.items())
+    assert laws["transmission_orders"].waves == ((2, 7.25),)
+    assert laws["transmission_orders"].parameters.names == ("sine_3_7.25", "cosine_3_7.25")
+    assert len(laws["drive_error_function"].coordinates) == 3 * 2 * 7 and laws["backlash"] is _LIBRARY["backlash"]
 
 
 def test_the_oracle_alarms_falsely_once_in_a_hundred(robots):
