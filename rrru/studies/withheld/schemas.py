@@ -207,12 +207,12 @@ check                  str    pages: all sentences and numbers of a page; mistak
 statement              int    number of the statement about this robot, from 0 on
 kind                   str    kind of sentence, number or mistake, see rrru/studies/withheld/sentences
 text                   str    as the page or the message has it
-result                 str    undecided: the truth does not contradict it, and does not have to bear it out {true, false,
-    undecided}
+result                 str    undecided: the truth does not contradict it, and does not have to bear it out {true,
+    false, undecided}
 
 ## sentences | tables/sentences.parquet | kind
-How many sentences and numbers on pages of own robots are true, kind by kind. A sentence of a kind that nothing can judge
-is of the unknown kind.
+How many sentences and numbers on pages of own robots are true, kind by kind. A sentence that nothing can judge is of
+the unknown kind.
 --
 kind                   str    as in withheld_statements
 true                   int    how many are true

@@ -1,7 +1,7 @@
 """Chains of turning and sliding joints by plain NumPy, and as URDF and MJCF. Lengths mm, angles rad, masses kg.
 
-Written from the textbook formula alone (product of a seat and a motion for every joint; loads as minus the derivative of
-the potential energy by a joint's value), so that nothing of the package's models can hide in it. Files count in m.
+Written from the textbook formula alone (product of a seat and a motion for every joint; loads as minus the derivative
+of the potential energy by a joint's value), so that nothing of the package's models can hide in it. Files count in m.
 """
 
 from dataclasses import dataclass, replace
@@ -21,9 +21,9 @@ _ARMATURE = {"rad": "5", "mm": "5"}
 class Joint:
     """A joint and the link behind it.
 
-    unit: "rad" where it turns about its axis (3,), "mm" where it slides along it; seat_mm (3,), seat_rad (3,): place and
-    rotation vector in the link before; span: least and largest value that is driven; mass_kg, centre_mm (3,): of the
-    link.
+    unit: "rad" where it turns about its axis (3,), "mm" where it slides along it; seat_mm (3,), seat_rad (3,): place
+    and rotation vector in the link before; span: least and largest value that is driven; mass_kg, centre_mm (3,): of
+    the link.
     """
 
     name: str
@@ -102,16 +102,19 @@ class Chain:
             yield place, turn
 
     def built(self, generator, length_mm, angle_rad):
-        """The chain as it is built: every seat and the tip off by normal errors of these sizes."""
+        """The chain as it is built: every seat and the tip off by normal errors of these sizes.
 
-        def off(values, size):
-            return tuple((np.array(values) + size * generator.standard_normal(3)).tolist())
-
-        joints = [
-            replace(one, seat_mm=off(one.seat_mm, length_mm), seat_rad=_turned(one.seat_rad, off((0, 0, 0), angle_rad)))
-            for one in self.joints
-        ]
-        return replace(self, joints=tuple(joints), tip_mm=off(self.tip_mm, length_mm))
+        Not along what the joint itself does, which would be a zero of its drive.
+        """
+        joints = []
+        for one in self.joints:
+            across = 1.0 - np.abs(one.axis)
+            shift = length_mm * generator.standard_normal(3) * (across if one.unit == "mm" else 1.0)
+            turn = angle_rad * generator.standard_normal(3) * (across if one.unit == "rad" else 1.0)
+            seat = tuple((np.array(one.seat_mm) + shift).tolist())
+            joints.append(replace(one, seat_mm=seat, seat_rad=_turned(one.seat_rad, turn)))
+        tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3)
+        return replace(self, joints=tuple(joints), tip_mm=tuple(tip.tolist()))
 
     def section(self, file, kind):
         """Its entry in `robots:` as a file of a kind."""
@@ -128,11 +131,12 @@ class Chain:
             link, (low, high) = f"{joint.name}_link", np.array(joint.span) * _scale(joint.unit)
             inertia = "".join(f' {name}="{0.01 * joint.mass_kg:.9g}"' for name in ("ixx", "iyy", "izz"))
             lines += [
-                f'  <link name="{link}"><inertial><origin xyz="{_m(joint.centre_mm)}"/><mass value="{joint.mass_kg:.9g}"/>'
-                f'<inertia{inertia} ixy="0" ixz="0" iyz="0"/></inertial></link>',
+                f'  <link name="{link}"><inertial><origin xyz="{metres(joint.centre_mm)}"/>'
+                f'<mass value="{joint.mass_kg:.9g}"/><inertia{inertia} ixy="0" ixz="0" iyz="0"/></inertial></link>',
                 f'  <joint name="{joint.name}" type="{"revolute" if joint.unit == "rad" else "prismatic"}">',
                 f'    <parent link="{before}"/><child link="{link}"/>',
-                f'    <origin xyz="{_m(joint.seat_mm)}" rpy="{_rpy(joint.seat_rad)}"/><axis xyz="{_plain(joint.axis)}"/>',
+                f'    <origin xyz="{metres(joint.seat_mm)}" rpy="{_rpy(joint.seat_rad)}"/>',
+                f'    <axis xyz="{spaced(joint.axis)}"/>',
                 f'    <limit lower="{low:.9g}" upper="{high:.9g}" effort="100" velocity="1"/>',
                 "  </joint>",
             ]
@@ -141,7 +145,7 @@ class Chain:
             '  <link name="tool"/>',
             '  <joint name="flange" type="fixed">',
             f'    <parent link="{before}"/><child link="tool"/>',
-            f'    <origin xyz="{_m(self.tip_mm)}" rpy="{_rpy(self.tip_rad)}"/>',
+            f'    <origin xyz="{metres(self.tip_mm)}" rpy="{_rpy(self.tip_rad)}"/>',
             "  </joint>",
             "</robot>",
         ]
@@ -153,16 +157,17 @@ class Chain:
         for depth, joint in enumerate(self.joints):
             pad, (low, high) = "  " * (depth + 2), np.array(joint.span) * _scale(joint.unit)
             kind = "hinge" if joint.unit == "rad" else "slide"
-            inertia = _plain([0.01 * joint.mass_kg] * 3)
+            inertia = spaced([0.01 * joint.mass_kg] * 3)
             lines += [
-                f'{pad}<body name="{joint.name}_link" pos="{_m(joint.seat_mm)}" quat="{quat(joint.seat_rad)}">',
-                f'{pad}  <joint name="{joint.name}" type="{kind}" axis="{_plain(joint.axis)}" '
+                f'{pad}<body name="{joint.name}_link" pos="{metres(joint.seat_mm)}" quat="{quat(joint.seat_rad)}">',
+                f'{pad}  <joint name="{joint.name}" type="{kind}" axis="{spaced(joint.axis)}" '
                 f'range="{low:.9g} {high:.9g}" armature="{_ARMATURE[joint.unit]}" damping="1"/>',
-                f'{pad}  <inertial pos="{_m(joint.centre_mm)}" mass="{joint.mass_kg:.9g}" diaginertia="{inertia}"/>',
+                f'{pad}  <inertial pos="{metres(joint.centre_mm)}" mass="{joint.mass_kg:.9g}" '
+                f'diaginertia="{inertia}"/>',
             ]
             servos.append(servo(joint.name, joint.unit))
         pad = "  " * (len(self.joints) + 2)
-        lines.append(f'{pad}<body name="tool" pos="{_m(self.tip_mm)}" quat="{quat(self.tip_rad)}"/>')
+        lines.append(f'{pad}<body name="tool" pos="{metres(self.tip_mm)}" quat="{quat(self.tip_rad)}"/>')
         lines += ["  " * (depth + 2) + "</body>" for depth in reversed(range(len(self.joints)))]
         return mjcf(lines, [], servos)
 
@@ -194,7 +199,7 @@ def servo(joint, unit):
 def quat(vector_rad):
     """Quaternion of a rotation vector (3,) as MuJoCo writes it."""
     x, y, z, w = Rotation.from_rotvec(vector_rad).as_quat()
-    return _plain((w, x, y, z))
+    return spaced((w, x, y, z))
 
 
 def _turned(first_rad, then_rad):
@@ -207,16 +212,16 @@ def _scale(unit):
     return 1e-3 if unit == "mm" else 1.0
 
 
-def _m(values_mm):
+def metres(values_mm):
     """Lengths in m as a file has them."""
-    return _plain(1e-3 * np.array(values_mm))
+    return spaced(1e-3 * np.array(values_mm))
 
 
 def _rpy(vector_rad):
     """A rotation vector as the roll, pitch and yaw of a URDF."""
-    return _plain(Rotation.from_rotvec(vector_rad).as_euler("xyz"))
+    return spaced(Rotation.from_rotvec(vector_rad).as_euler("xyz"))
 
 
-def _plain(values):
+def spaced(values):
     """Numbers as a file has them."""
     return " ".join(f"{value:.12g}" for value in values)

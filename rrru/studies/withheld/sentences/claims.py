@@ -1,7 +1,7 @@
 """What a page says: every sentence and number of it as a Claim of a kind. Lengths mm, angles rad.
 
-Sentences are told apart by a pattern each, numbers come from the facts and tables. A sentence that no pattern knows is of
-the kind UNKNOWN, so that none is passed over.
+Sentences are told apart by a pattern each, numbers come from the facts and tables. A sentence that no pattern knows is
+of the kind UNKNOWN, so that none is passed over.
 """
 
 import re
@@ -55,13 +55,13 @@ _NOTES = {
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
     "the weight is not as told": rf"weight not as told: {_X} \+- (?P<error>{_NUMBER}) (?P<unit>kg|rad) .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
-    "points used": rf"(?P<used>\d+) of (?P<rows>\d+) points used; .*",
-    "few readings": rf"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
-    "fitted without some points": rf"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
+    "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:; .*)?",
+    "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
+    "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
     "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot does not|instrument is worse).*",
     "the noise is smaller": rf"noise stated {_X} mm per axis, found {_Y}: the instrument is better",
     "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
-    "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns do not .*",
+    "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
     "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters take it up",
     "an effect cannot be told": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
@@ -70,7 +70,8 @@ _NOTES = {
     "the file would be worse": rf"not corrected: it would miss by {_X} mm rms, the file as it came misses by {_Y} mm",
     "the file is not corrected": r"not corrected: .*",
     "how the file was driven": r"corrected model not driven: .*",
-    "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*",
+    "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
+    r"|an effect is found .*|the others are .*",
     "the file cannot hold play": r"play of (?P<names>.*)",
     "the file cannot hold compliance": r"compliance of (?P<names>.*)",
     "the file cannot hold an effect": r"(?P<name>[a-z]+(?:_[a-z]+)*)",
@@ -79,8 +80,8 @@ _NOTES = {
 _READ = {
     "no commanded positions": r"no commanded positions: computed from .*",
     "no such column": r"no column (?P<column>\w+): .*",
-    "registered": rf"measured positions registered to the commanded ones at (?P<points>\d+) points: residual {_X} mm .*",
-    "a reflector was found": rf"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
+    "registered": r"measured positions registered to the commanded ones at (?P<points>\d+) points: .*",
+    "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>\S+): .*",
     "points are outliers": r"(?P<count>\d+) points marked as outliers, .*",
@@ -182,6 +183,10 @@ def _of_tables(tables):
             text = f"{row['factor']} {row['level']}: {row['share_low']:.3f} to {row['share_high']:.3f}"
             told = {"factor": row["factor"], "level": row["level"], "ends": (row["share_low"], row["share_high"])}
             result.append(Claim(f"interval of a share: by {row['factor']}", text, told))
+    for row in tables["gap_identifiability"].to_dict("records") if "gap_identifiability" in tables else ():
+        if np.isfinite(row["detectable_mm"]):
+            told = {"effect": row["effect"], "value": row["detectable_mm"]}
+            result.append(Claim("detectable_mm", f"{row['effect']}: {row['detectable_mm']:.4g} mm", told))
     shrink = tables["gap_shrink"]
     for kind in ("given_model", "corrected_model"):
         own = shrink[(shrink["kind"] == kind) & (shrink["trajectory"] == "*")]

@@ -1,6 +1,6 @@
-"""Own robots driven with a hidden cause or none, and what a user would hand in: files. Lengths mm, angles rad, s, kg."""
+"""Own robots driven with a hidden cause or none, and what a user would hand in: files. mm, rad, s, kg."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +36,8 @@ class Draw:
 
     plant: numpy or mujoco; kind: of the file; zeros (K,): what every drive stands off; cause: None where nothing acts;
     stops; reading: one of READINGS; targets: places by name, None for the tool; frame: rotation and translation from
-    the robot's frame to the instrument's; registered: the file does not state that they are one; noise_mm, per axis.
+    the robot's frame to the instrument's; registered: the file does not state that they are one; noise_mm, per axis;
+    driven: poses by whether the cause acts, of a robot that MuJoCo has driven, see `driven`.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Draw:
     registered: bool
     noise_mm: float
     seed: int
+    driven: dict = field(default_factory=dict)
 
     @property
     def targets(self):
@@ -60,29 +62,22 @@ class Draw:
         return {"": (0.0, 0.0, 0.0)} if self.reading in ("tool", "pose") else _TARGETS_MM
 
     def poses(self, cause=True, stops=None):
-        """Exact positions (n, 3) and rotations (n, 3, 3) of the platform in the robot's frame; cause: whether it acts."""
+        """Exact positions (n, 3) and rotations (n, 3, 3) of the platform, robot frame; cause: whether it acts."""
         stops = stops or self.stops
         acting = self.cause if cause else None
         if self.plant == "mujoco":
-            from rrru.studies.withheld.sentences.driven import mujoco_poses
-
-            return mujoco_poses(self, stops, acting)
+            return self.driven[acting is not None]
         off = acting.at_drives(self.built, stops) if acting else 0.0
         place, turn = self.built.poses(stops.drive + self.zeros + off)
         return place + (acting.of_base(stops) if acting else 0.0), turn
 
     def readings(self, poses):
-        """Exact positions (m, 3) in the instrument's frame, one row for every target of every stop, and turns (m, 3)."""
+        """Exact positions (m, 3) and turns (m, 3) in the instrument's frame, a row for every target of every stop."""
         place, turn = poses
         rotation, shift = self.frame
         seen = np.stack([place + turn @ np.array(target) for target in self.targets.values()], axis=1)
         vectors = Rotation.from_matrix(rotation @ turn).as_rotvec()
         return seen.reshape(-1, 3) @ rotation.T + shift, np.repeat(vectors, len(self.targets), axis=0)
-
-    @staticmethod
-    def poses_turns(vectors):
-        """Rotations (m, 3, 3) of rotation vectors (m, 3)."""
-        return Rotation.from_rotvec(vectors).as_matrix()
 
     def table(self, readings, noisy):
         """The file's rows of exact readings, with noise or without."""

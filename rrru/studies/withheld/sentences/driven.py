@@ -1,12 +1,11 @@
 """Own robots that MuJoCo drives. Lengths mm, angles rad, N."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from rrru.errors import SimulationError, UnreachableError
 from rrru.plant.mujoco_robot import MujocoRobot
 from rrru.robots.catalogue import make_mechanism
 from rrru.seeds import stream
@@ -27,11 +26,12 @@ class DriveList:
     position_mm: np.ndarray
 
 
-def mujoco_poses(draw, stops, cause):
-    """Positions (n, 3) and rotations (n, 3, 3) of the platform of a Draw at Stops under a Cause or none.
+def mujoco_poses(draw, cause):
+    """Positions (n, 3) and rotations (n, 3, 3) of the platform of a Draw at its stops under a Cause or none.
 
     It is built with errors of the seats in its file. Raises SimulationError where it does not come to rest.
     """
+    stops = draw.stops
     with TemporaryDirectory() as folder:
         file = Path(folder) / draw.robot_file
         file.write_text(draw.nominal.text("mjcf"))
@@ -51,12 +51,13 @@ def mujoco_poses(draw, stops, cause):
     return machine.drive(motion, False)
 
 
-def can_drive(draw):
-    """Whether MuJoCo comes to rest at all stops of a Draw, with its cause and without."""
-    try:
-        return all(np.isfinite(draw.poses(cause)[0]).all() for cause in {draw.cause is not None, False})
-    except (SimulationError, UnreachableError):
-        return False
+def driven(draw):
+    """The Draw with its poses as MuJoCo drives it, with its cause and without.
+
+    Raises SimulationError or UnreachableError where it cannot.
+    """
+    causes = {draw.cause is not None, False}
+    return replace(draw, driven={acts: mujoco_poses(draw, draw.cause if acts else None) for acts in causes})
 
 
 def _causes(draw, cause):

@@ -3,7 +3,6 @@
 Loops of an MJCF are closed by Newton's method on MuJoCo's own constraint Jacobian, at stated values of the drives.
 """
 
-from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco

@@ -5,6 +5,8 @@ standard errors) and the two digits that are printed. A number that is said with
 of these; a stated 95 % interval where it holds the true number. Lengths mm, angles rad.
 """
 
+import re
+
 import numpy as np
 
 from rrru.studies.withheld.sentences.claims import UNKNOWN
@@ -19,9 +21,11 @@ _SURE = 0.9
 # what a file's error may be of the estimate's, and a stated remainder of the true one
 _AS_GOOD, _REMAINDER = 1.1, 0.1
 # of a noise; of the places of reflectors in mm, and of angles that are read
-_NEAR_NOISE, _NEAR_PLACE_MM = 0.15, 5.0
+_NEAR_NOISE, _NEAR_PLACE_MM, _NEAR_TURN_RAD = 0.15, 5.0, 0.03
 # least share of the largest error about a place that is called the worst
 _WORST = 0.5
+# share of a file's rows that are no outliers
+_MOST_LEFT = 0.95
 _NEIGHBOURS = 10
 
 
@@ -96,8 +100,7 @@ def _share_of_cause(told, truth, _facts):
     """The effect makes that share of the gap at points that were left out."""
     if told["name"].replace(" ", "_") not in truth.effects:
         return False
-    share = (truth.strength * truth.noise_rms_mm / truth.before_mm) ** 2 if truth.before_mm else 0.0
-    return abs(float(told["share"]) / 100.0 - min(share, 1.0)) <= _NEAR_SHARE
+    return abs(float(told["share"]) / 100.0 - truth.share) <= _NEAR_SHARE
 
 
 def _size_of_cause(told, truth, _facts):
@@ -136,7 +139,7 @@ def _rival(told, truth, _facts):
     if told["name"].replace(" ", "_") in truth.effects or (told["name"].startswith("something") and truth.outside):
         return True
     if told["name"] == "that nothing acts":
-        return False if truth.chi2 > _SEEN else True
+        return truth.chi2 <= _SEEN
     return None
 
 
@@ -267,7 +270,7 @@ def _budget(told, truth, _facts):
     if told["kind"] == "effect":
         if part not in truth.effects:
             return told["ends"][0] <= 0.0
-        return _holds(told["ends"], (truth.strength * truth.noise_rms_mm) ** 2 / truth.before_mm**2)
+        return _holds(told["ends"], truth.share)
     if told["kind"] == "unexplained":
         return told["ends"][1] > 0.0 if truth.outside else told["ends"][0] <= 0.0
     return told["ends"][0] <= 0.0
@@ -296,7 +299,7 @@ def _by_factor(told, truth, _facts):
     squares = truth.error_mm**2
     if told["factor"] == "direction":
         return _holds(told["ends"], squares[:, "xyz".index(told["level"])].sum() / squares.sum())
-    chosen = truth.labels["payload"] == float(told["level"].removesuffix(" kg"))
+    chosen = truth.payload_kg == float(told["level"].removesuffix(" kg"))
     return _holds(told["ends"], squares[chosen].sum() / squares.sum())
 
 
@@ -320,6 +323,13 @@ def _drives(_told, truth, _facts):
     return _sized(truth.drives_mm, truth.after_mm, truth, truth.stops) if np.isfinite(truth.drives_mm) else None
 
 
+def _detectable(told, truth, facts):
+    """An effect that is so much larger than what can be detected is named."""
+    if told["effect"] not in truth.effects or truth.strength * truth.noise_rms_mm < STRONG * told["value"]:
+        return None
+    return told["effect"] in {one["name"] for one in facts["effects"]}
+
+
 def _reflector(told, truth, _facts):
     """A reflector's place, of a robot that is not calibrated yet, within some mm."""
     if told["name"] not in truth.places:
@@ -339,8 +349,23 @@ def _missing(told, _truth, _facts):
 
 
 def _registered(told, truth, _facts):
-    """So many points were read."""
-    return int(told["points"]) == truth.rows
+    """So many points were read, but for a few outliers."""
+    return _MOST_LEFT * truth.rows <= int(told["points"]) <= truth.rows
+
+
+def _overlap(_told, _truth, facts):
+    """The shares of the effects are more than the whole."""
+    return sum(one["share"] or 0.0 for one in facts["effects"]) > 1.0
+
+
+def _next_run(told, truth, _facts):
+    """The run that is advised is one of the campaign's path, or of poses; whether it decides is not tried here."""
+    return told["run"].startswith(("stops", "poses")) or bool(re.match(r"\d+ poses", told["run"]))
+
+
+def _turned(told, _truth, _facts):
+    """The instrument's orientations are those of the platform, but for the robot's own errors."""
+    return float(told["value"]) <= _NEAR_TURN_RAD
 
 
 def _undecided(_told, _truth, _facts):
@@ -360,14 +385,14 @@ _JUDGES = {
     "a cause with a size": _cause,
     "a cause without a share": _cause,
     "shares cannot be told": _shares_not_told,
-    "shares overlap": _undecided,
+    "shares overlap": _overlap,
     "something is unexplained": _unexplained,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,
     "what is left with it": lambda told, t, _: _sized(told["value"], t.after_mm, t, t.rows),
     "these data cannot rule out": _undecided,
-    "next, a run": _undecided,
+    "next, a run": _next_run,
     "next, none is advised": _unexplained,
     "next, nothing more": _next_nothing,
     "next, nothing would settle it": _undecided,
@@ -398,14 +423,14 @@ _JUDGES = {
     "no such column": _missing,
     "registered": _registered,
     "a reflector was found": _reflector,
-    "orientations are turned": _undecided,
+    "orientations are turned": _turned,
     "zeros are lost": _zeros_lost,
     "points are outliers": _outliers,
     "stale readings": _outliers,
     "undeclared columns": _outliers,
     "beyond a range": _outliers,
     "rows may be shifted": _outliers,
-    "far from the commands": _undecided,
+    "far from the commands": _outliers,
     "not this reflector": _outliers,
     "place of a cause": _place,
     "size of a cause": _size_of_cause,
@@ -431,5 +456,6 @@ _JUDGES = {
     "the corrected file is as good as the estimate": _as_good,
     "the corrected file is not worse than the given one": _not_worse,
     "corrected_drives bring it there": _drives,
+    "detectable_mm": _detectable,
 }
 KINDS = (*_JUDGES, UNKNOWN)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.studies.withheld.sentences.chains import G, _m, _plain, mjcf, quat, servo
+from rrru.studies.withheld.sentences.chains import G, metres, mjcf, servo, spaced
 
 _NEWTON_STEPS, _CLOSED_MM = 30, 1e-9
 _STEP = {"rad": 1e-5, "mm": 1e-2}
@@ -144,8 +144,10 @@ class Rods:
         return home + (values[:, list(self.drive)] if self.kind == "strut" else np.zeros((len(values), 6)))
 
     def built(self, generator, length_mm, angle_rad):
-        """The robot as it is built: balls, rods and axes off by normal errors of these sizes."""
-        # of balls, no rod is longer than its file says but by what its balls are off, and by its own error
+        """The robot as it is built: balls, rods and axes off by normal errors of these sizes.
+
+        Not along what the drives themselves do, which would be a zero of theirs.
+        """
         nominal = np.linalg.norm(self.home_mm + self.head_mm - self.foot_mm, axis=1)
         foot, head = (one + length_mm * generator.standard_normal((6, 3)) for one in (self.foot_mm, self.head_mm))
         if len(self.units) == 3:
@@ -154,13 +156,22 @@ class Rods:
                 np.repeat(one[::2] - own[::2], 2, axis=0) + own
                 for one, own in ((foot, self.foot_mm), (head, self.head_mm))
             )
-        extra = length_mm * generator.standard_normal(6)
+        foot = self.foot_mm + _across(foot - self.foot_mm, self._way())
+        # a strut that is longer is one whose zero is off
+        extra = length_mm * generator.standard_normal(6) * (self.kind != "strut")
         extra = np.repeat(extra[::2], 2) if len(self.units) == 3 else extra
         axis = self.axis + angle_rad * generator.standard_normal((6, 3))
         axis = np.repeat(axis[[self.drive.index(k) for k in range(len(self.units))]], 6 // len(self.units), axis=0)
         axis = axis / np.linalg.norm(axis, axis=1, keepdims=True) if self.kind != "strut" else self.axis
         moved = np.linalg.norm(self.home_mm + head - foot, axis=1)
         return replace(self, foot_mm=foot, head_mm=head, axis=axis, extra_mm=nominal - moved + extra)
+
+    def _way(self):
+        """Unit vectors (6, 3) along which the drives move the balls at drive values of 0, zero where they do not."""
+        if self.kind == "strut":
+            return np.zeros((6, 3))
+        way = self.axis if self.kind == "rail" else np.cross(self.axis, self.foot_mm - self.pivot_mm)
+        return way / np.linalg.norm(way, axis=1, keepdims=True)
 
     def section(self, file, kind):
         """Its entry in `robots:` as a file of a kind."""
@@ -171,7 +182,7 @@ class Rods:
         del kind
         platform_kg, moved_kg, rod_kg = self.masses_kg
         bodies = [
-            f'    <body name="plate" pos="{_m(self.home_mm)}">',
+            f'    <body name="plate" pos="{metres(self.home_mm)}">',
             '      <freejoint name="plate_free"/>',
             f'      <inertial pos="0 0 0" mass="{platform_kg:.9g}" diaginertia="0.04 0.04 0.08"/>',
             "    </body>",
@@ -182,7 +193,7 @@ class Rods:
             bodies += self._leg(name, k, mine, (moved_kg, rod_kg))
             equalities += [
                 f'    <connect name="{self._of(name, mine, rod)}_ball" body1="plate" '
-                f'body2="{self._end(name, mine, rod)}" anchor="{_m(self.head_mm[rod])}"/>'
+                f'body2="{self._end(name, mine, rod)}" anchor="{metres(self.head_mm[rod])}"/>'
                 for rod in mine
             ]
         return mjcf(bodies, equalities, [servo(name, self.unit) for name in self._names])
@@ -206,7 +217,8 @@ class Rods:
         if self.kind == "strut":
             length = np.linalg.norm(rod[first])
             return [
-                f'    <body name="{name}_cylinder" pos="{_m(self.foot_mm[first])}" zaxis="{_plain(rod[first] / length)}">',
+                f'    <body name="{name}_cylinder" pos="{metres(self.foot_mm[first])}" '
+                f'zaxis="{spaced(rod[first] / length)}">',
                 f'      <joint name="{name}_u" axis="1 0 0" damping="0.5"/>',
                 f'      <joint name="{name}_v" axis="0 1 0" damping="0.5"/>',
                 f'      <inertial pos="0 0 {_CYLINDER_MM / 1e3:.9g}" mass="{moved_kg:.9g}" diaginertia="{inertia}"/>',
@@ -221,15 +233,15 @@ class Rods:
         kind = "hinge" if self.kind == "crank" else "slide"
         centre = 0.5 * (self.foot_mm[mine].mean(axis=0) - seat) if self.kind == "crank" else np.zeros(3)
         lines = [
-            f'    <body name="{name}_drive" pos="{_m(seat)}">',
-            f'      <joint name="{name}" type="{kind}" axis="{_plain(self.axis[first])}" {stroke}/>',
-            f'      <inertial pos="{_m(centre)}" mass="{moved_kg:.9g}" diaginertia="{inertia}"/>',
+            f'    <body name="{name}_drive" pos="{metres(seat)}">',
+            f'      <joint name="{name}" type="{kind}" axis="{spaced(self.axis[first])}" {stroke}/>',
+            f'      <inertial pos="{metres(centre)}" mass="{moved_kg:.9g}" diaginertia="{inertia}"/>',
         ]
         for one in mine:
             length, own = np.linalg.norm(rod[one]), self._of(name, mine, one)
             lines += [
-                f'      <body name="{own}_rod" pos="{_m(self.foot_mm[one] - seat)}" '
-                f'zaxis="{_plain(rod[one] / length)}">',
+                f'      <body name="{own}_rod" pos="{metres(self.foot_mm[one] - seat)}" '
+                f'zaxis="{spaced(rod[one] / length)}">',
                 f'        <joint name="{own}_elbow" type="ball" damping="0.02"/>',
                 f'        <inertial pos="0 0 {length / 2e3:.12g}" mass="{rod_kg:.9g}" diaginertia="{inertia}"/>',
                 "      </body>",
@@ -237,6 +249,10 @@ class Rods:
         return [*lines, "    </body>"]
 
 
+def _across(shift, way):
+    """Shifts (6, 3) without what lies along unit vectors (6, 3)."""
+    return shift - (shift * way).sum(axis=1, keepdims=True) * way
+
+
 # of a strut: centre of the cylinder from its foot, of the piston from the ball that it carries; length of the piston
 _CYLINDER_MM, _PISTON_MM, _ROD_MM = 120.0, 120.0, 250.0
-__all__ = ["Rods", "quat"]

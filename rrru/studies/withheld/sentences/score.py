@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pandas as pd
 
-from rrru.errors import RrruError
+from rrru.errors import RrruError, SimulationError, UnreachableError
 from rrru.gap.settings import GapSettings
 from rrru.studies.withheld.chunks import MISTAKES, PAGES, RIGHT
 from rrru.studies.withheld.sentences import mistakes, page
@@ -58,9 +58,13 @@ def _driven(number, settings):
     """The Draw of a number, by plain NumPy where MuJoCo cannot drive it."""
     own = draw(number, settings["seed"], settings["stops"], settings["mujoco_share"])
     if own.plant == "mujoco":
-        from rrru.studies.withheld.sentences.driven import can_drive
+        # a simulator is not small, and most robots do not need it
+        from rrru.studies.withheld.sentences.driven import driven
 
-        return own if can_drive(own) else draw(number, settings["seed"], settings["stops"], 0.0)
+        try:
+            return driven(own)
+        except (SimulationError, UnreachableError):
+            return draw(number, settings["seed"], settings["stops"], 0.0)
     return own
 
 

@@ -1,15 +1,15 @@
-"""What is true of an own robot whose page has been made: the only code here that knows draw and diagnosis. mm, rad, kg.
+"""What is true of an own robot whose page has been made: the only code here that knows draw and diagnosis.
 
-Sizes are of exact positions: the robot's own, of its plant, against what the calibrated or corrected sim of the diagnosis
-says at the same stops, those of the file and fresh ones that no file has.
+Sizes are of exact positions: the robot's own, of its plant, against what the calibrated or corrected sim of the
+diagnosis says at the same stops, those of the file and fresh ones that no file has. Lengths mm, angles rad, masses kg.
 """
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
-from rrru.errors import RrruError
 from rrru.gap.calibrate import calibrate
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
@@ -24,15 +24,16 @@ _APPROACH = {"rad": 0.05, "mm": 20.0}
 
 @dataclass(frozen=True)
 class Truth:
-    """effects: names that act and that the library holds; outside: something acts that it lacks; leg: the one drive,
-    or 0; strength: what a calibration of exact readings leaves of the cause, over the noise's rms; chi2: the same as a
-    chi-square of the file's readings; numbers: true values by effect and parameter; geometry: values that exact readings
-    without a cause give the calibration's parameters; zeros: by drive; before_mm, after_mm: rms at fresh stops of the
-    calibrated and of the corrected sim, seen_mm: of the calibrated one at the file's; noise_rms_mm; rows, stops: of the
-    file; again: stops were measured twice; payloads: different ones; places: found places of targets by name; squares:
-    exact squared errors (n,) of the calibrated sim at the file's rows, by row; worst: rms about each of the file's
-    stops; given_mm, file_mm: rms at fresh stops of the robot's file as it came and as corrected, NaN where that is not
-    known, file_seen_mm: at the file's rows; drives_mm: rms of the robot where `corrected_drives` sends it.
+    """effects: names that act and that the library holds; outside: something acts that it lacks; leg: the one drive, or
+    0; strength: what a calibration of exact readings leaves of the cause, over the noise's rms; chi2: the same as a
+    chi-square of the file's readings; numbers: true values by effect and parameter; geometry: values that exact
+    readings without a cause give the calibration's parameters; zeros: of the drives by site; before_mm, after_mm: rms
+    at fresh stops of the calibrated and of the corrected sim, seen_mm: of the calibrated one at the file's rows;
+    rows, stops: how many the file has; again: stops were measured twice; payloads: how many different ones; turned:
+    orientations were read; error_mm, position_mm (rows, 3): exact errors of the calibrated sim, and where; payload_kg
+    (rows,); places: of the targets by name; given_mm, file_mm: rms at fresh stops of the robot's file as it came and as
+    corrected, NaN where that is not known, given_seen_mm, file_seen_mm: at the file's rows; drives_mm: rms of the robot
+    about where `corrected_drives` sends it.
     """
 
     effects: frozenset
@@ -43,7 +44,6 @@ class Truth:
     numbers: dict
     geometry: dict
     zeros: dict
-    units: dict
     before_mm: float
     after_mm: float
     seen_mm: float
@@ -56,19 +56,26 @@ class Truth:
     turned: bool
     error_mm: np.ndarray
     position_mm: np.ndarray
-    labels: dict = field(default_factory=dict)
+    payload_kg: np.ndarray
     places: dict = field(default_factory=dict)
     given_mm: float = np.nan
     file_mm: float = np.nan
     given_seen_mm: float = np.nan
     file_seen_mm: float = np.nan
     drives_mm: float = np.nan
-    reaches: object = None
 
     @property
     def acts(self):
         """Whether anything does."""
         return bool(self.effects) or self.outside
+
+    @property
+    def share(self):
+        """The cause's share of the gap at points that were left out: all but what noise does to the calibration."""
+        if not self.acts or not self.before_mm:
+            return 0.0
+        uncertain = self.noise_rms_mm**2 * len(self.geometry) / (3.0 * self.rows)
+        return float(np.clip(1.0 - uncertain / self.before_mm**2, 0.0, 1.0))
 
 
 def truth_of(draw, run, folder, gap):
@@ -97,7 +104,6 @@ def truth_of(draw, run, folder, gap):
         numbers={name: draw.cause.numbers(draw.nominal)} if held else {},
         geometry=dict(zip(case.mechanism.parameters.names, geometry.tolist(), strict=True)),
         zeros=dict(zip([one.site for one in case.mechanism.parts.drives], draw.zeros.tolist(), strict=True)),
-        units=dict(zip([one.site for one in case.mechanism.parts.drives], draw.nominal.units, strict=True)),
         before_mm=_rms(before[fresh]),
         after_mm=_rms(after[fresh]),
         seen_mm=_rms(seen),
@@ -110,9 +116,8 @@ def truth_of(draw, run, folder, gap):
         turned=draw.reading == "pose",
         error_mm=seen,
         position_mm=rows.command(exact)[chosen],
-        labels={"payload": exact["payload_kg"].to_numpy()[chosen], "time": exact["time_s"].to_numpy()[chosen]},
+        payload_kg=exact["payload_kg"].to_numpy()[chosen],
         places=dict(draw.targets),
-        reaches=_reaches(draw),
     )
     return replace(told, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
 
@@ -140,14 +145,28 @@ def _as_read(draw, run, readings, folder):
     exact = exact.assign(**rows.vector_columns("measured", given.apply(seen) if given else seen), status="ok")
     exact = exact.assign(time_s=table["time_s"])
     if "measured_rx_rad" in exact:
-        turns = draw.poses_turns(vectors)
-        turns = given.rotation @ turns if given else turns
-        exact = exact.assign(**rows.turn_columns("measured", turns))
+        rotation = given.rotation if given else np.eye(3)
+        exact = exact.assign(**rows.turn_columns("measured", rotation @ turned(vectors) @ _seat(draw, own, rotation)))
     if "target" in own:
         first = own.drop_duplicates("target").set_index("target")
         columns = [f"target_{axis}_mm" for axis in "xyz"]
         exact = exact.assign(**{name: first.loc[exact["target"], name].to_numpy() for name in columns})
     return exact
+
+
+def turned(vectors_rad):
+    """Rotations (m, 3, 3) of rotation vectors (m, 3)."""
+    return Rotation.from_rotvec(np.array(vectors_rad)).as_matrix()
+
+
+def _seat(draw, own, rotation):
+    """Rotation (3, 3) by which the file's turns have been turned back, as the instrument's target sits on the platform.
+
+    own: the file's measurement table; rotation (3, 3): of the registration.
+    """
+    noisy = draw.table(draw.readings(draw.poses()), True)[[f"measured_r{axis}_rad" for axis in "xyz"]].to_numpy()
+    back = (rotation @ turned(noisy[: len(own)])).transpose(0, 2, 1) @ rows.turns(own, "measured")
+    return Rotation.from_matrix(back).mean().as_matrix()
 
 
 def _calibrated(exact, run):
@@ -196,21 +215,3 @@ def _of_drives(draw, run):
     place, _ = draw.poses(stops=stops)
     rotation, shift = draw.frame
     return _rms((place @ rotation.T + shift)[1::2] - rows.command(table))
-
-
-def _reaches(draw):
-    """A function that tells whether drive values (n, K) are in range and lead somewhere."""
-
-    def reaches(values):
-        low, high = draw.nominal.spans.T
-        inside = ((values >= low) & (values <= high)).all(axis=1)
-        return bool(inside.all() and np.isfinite(draw.nominal.poses(values)[0]).all())
-
-    return reaches
-
-
-def refusal(error):
-    """The words of an error that ends a run; raises it where it is none that the package means."""
-    if isinstance(error, RrruError):
-        return str(error)
-    raise error
