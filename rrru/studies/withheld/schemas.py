@@ -204,6 +204,7 @@ What pages of own robots say, and what becomes of files with gross mistakes and 
 robot
 check                  str    pages: all sentences and numbers of a page; mistakes: a file with one gross mistake;
     right_files: a file without {pages, mistakes, right_files}
+truth                  str    what is true in words: cause or mistake, plant, file, what is read
 statement              int    number of the statement about this robot, from 0 on
 kind                   str    kind of sentence, number or mistake, see rrru/studies/withheld/sentences
 text                   str    as the page or the message has it

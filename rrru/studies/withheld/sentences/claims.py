@@ -51,7 +51,7 @@ _SENTENCES = {
 }
 # kinds of notes of the diagnosis and of what a corrected file cannot hold
 _NOTES = {
-    "a zero is off": rf"(?P<site>\S+): zero is off by {_X}(?: \+- (?P<error>{_NUMBER}))? (?P<unit>degrees|mm)",
+    "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X}(?: \+- (?P<error>{_NUMBER}))? (?P<unit>degrees|mm)",
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
     "the weight is not as told": rf"weight not as told: {_X} \+- (?P<error>{_NUMBER}) (?P<unit>kg|rad) .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
@@ -83,7 +83,7 @@ _READ = {
     "registered": r"measured positions registered to the commanded ones at (?P<points>\d+) points: .*",
     "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
-    "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>\S+): .*",
+    "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
     "points are outliers": r"(?P<count>\d+) points marked as outliers, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",

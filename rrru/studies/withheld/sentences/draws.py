@@ -108,6 +108,15 @@ class Draw:
         return told
 
     @property
+    def in_words(self):
+        """What is true of it: cause, plant, file, reading and frame."""
+        cause = "none"
+        if self.cause is not None:
+            cause = self.cause.name + (f" at drive {self.cause.leg}" if self.cause.leg else "")
+        frame = "registered" if self.registered else "in the robot's frame"
+        return f"{cause}; {self.plant}, {self.kind}, {self.reading}, {frame}"
+
+    @property
     def robot_file(self):
         """Name of the robot's file."""
         return "own.urdf" if self.kind == "urdf" else "own.xml"
@@ -171,7 +180,8 @@ def _sized(draw, cause, strength):
 def _frame(generator, registered):
     """Rotation and translation from the robot's frame to the instrument's."""
     if registered:
-        turn = Rotation.random(random_state=np.random.RandomState(generator.integers(2**31))).as_matrix()
+        # four normal numbers are a quaternion of any turn alike
+        turn = Rotation.from_quat(generator.standard_normal(4)).as_matrix()
         return turn, generator.uniform(-3000.0, 3000.0, 3)
     turn = Rotation.from_rotvec(_FRAME_RAD * generator.standard_normal(3)).as_matrix()
     return turn, _FRAME_MM * generator.standard_normal(3)

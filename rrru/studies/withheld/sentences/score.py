@@ -20,7 +20,7 @@ _WORDS = {True: "true", False: "false", None: "undecided"}
 _BESIDE = ", beside something unexplained"
 _OF_NUMBERS = "interval of a number: calibration"
 _LONGEST = 400
-COLUMNS = ["check", "robot", "statement", "kind", "text", "result"]
+COLUMNS = ["check", "robot", "truth", "statement", "kind", "text", "result"]
 
 
 def statements(check, numbers, settings):
@@ -29,16 +29,16 @@ def statements(check, numbers, settings):
     rows = []
     for number in numbers:
         with TemporaryDirectory() as folder:
-            name, said = made(number, settings, Path(folder))
+            name, true, said = made(number, settings, Path(folder))
             for count, (kind, text, result) in enumerate(said):
                 # where the files lay is nobody's business, and differs from run to run
                 shown = " ".join(text.replace(f"{folder}/", "").split())[:_LONGEST]
-                rows.append([check, name, count, kind, shown, _WORDS[result]])
+                rows.append([check, name, true, count, kind, shown, _WORDS[result]])
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def _of_page(number, settings, folder):
-    """Name of a robot, and (kind, text, result) of all that its page says."""
+    """Name of a robot, what is true of it in words, and (kind, text, result) of all that its page says."""
     own = _driven(number, settings)
     rows = own.table(own.readings(own.poses()), True)
     own.write(folder, rows[np.repeat(~own.stops.fresh, len(own.targets))], "stops.csv")
@@ -46,12 +46,15 @@ def _of_page(number, settings, folder):
     try:
         run = page.run(own.name, section, robot, settings)
     except RrruError as error:
-        return own.name, [("a right campaign is refused", f"{type(error).__name__}: {error}", False)]
+        said = [("a right campaign is refused", f"{type(error).__name__}: {error}", False)]
+        return own.name, own.in_words, said
     # anything else that ends a run is a defect, whatever it is
     except Exception as error:
-        return own.name, [("a run ends with a traceback", f"{type(error).__name__}: {error}", False)]
+        said = [("a run ends with a traceback", f"{type(error).__name__}: {error}", False)]
+        return own.name, own.in_words, said
     truth = truth_of(own, run, folder, settings["gap"])
-    return own.name, [_judged(claim, truth, run.page.facts) for claim in claims(run.page)]
+    true = f"{own.in_words}; {truth.strength:.3g} times the noise after a calibration"
+    return own.name, true, [_judged(claim, truth, run.page.facts) for claim in claims(run.page)]
 
 
 def _driven(number, settings):
@@ -77,26 +80,30 @@ def _judged(claim, truth, facts):
 
 
 def _of_mistake(number, settings, folder):
-    """Name of a robot, and what becomes of a mistake in its file."""
+    """Name of a robot, its mistake, and what becomes of it."""
     name, own, handed = mistakes.with_mistake(number, settings["seed"], settings["stops"])
     if not mistakes.shows(name, own, handed):
-        return own.name, [(f"mistake named: {name}", "does not show in the file", None)]
+        return own.name, name, [(f"mistake named: {name}", "does not show in the file", None)]
     became, words = mistakes.read(own, handed, folder)
     warned = "may be shifted" in words or "see that unit, frame and rows belong together" in words
     wanted = f" [wanted: {', '.join(handed.words)}]"
     right = became != "traceback" and mistakes.named(handed, words)
-    return own.name, [
-        (f"mistake named: {name}", f"{became}: {words}{'' if right else wanted}", right),
-        ("a mistake is not accepted without a word", f"{name}: {words}", became != "accepted" or warned),
-        ("a mistake ends in no traceback", f"{name}: {words}", became != "traceback"),
-    ]
+    return (
+        own.name,
+        f"{name}; {own.in_words}",
+        [
+            (f"mistake named: {name}", f"{became}: {words}{'' if right else wanted}", right),
+            ("a mistake is not accepted without a word", f"{name}: {words}", became != "accepted" or warned),
+            ("a mistake ends in no traceback", f"{name}: {words}", became != "traceback"),
+        ],
+    )
 
 
 def _of_right_file(number, settings, folder):
-    """Name of a robot, and whether its right file is accepted."""
+    """Name of a robot, how it is measured, and whether its right file is accepted."""
     own, handed = mistakes.right_file(number, settings["seed"], settings["stops"])
     became, words = mistakes.read(own, handed, folder)
-    return own.name, [("a right file is not suspected", f"{became}: {words}", became == "accepted")]
+    return own.name, own.in_words, [("a right file is not suspected", f"{became}: {words}", became == "accepted")]
 
 
 def sentences(told):
