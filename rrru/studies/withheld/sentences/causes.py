@@ -37,6 +37,13 @@ class Cause:
         """The same cause, so many times as large."""
         return replace(self, sizes=tuple((factor * np.array(self.sizes)).tolist()))
 
+    def beyond(self, robot):
+        """Whether it is larger than any robot has it."""
+        if self.name == "base_drift":
+            return bool(np.abs(self.sizes).max() > _MOST_DRIFT_MM_S)
+        most = _MOST.get(self.name, _MOST[""])
+        return bool((np.abs(self.sizes) > [most[unit] for unit in robot.units]).any())
+
     def at_drives(self, robot, stops):
         """By how much (n, K) the drives stand off."""
         sizes = np.array(self.sizes)
@@ -117,6 +124,13 @@ _AT_DRIVES = {
     "drive_error_function": _local,
     "scale_step": _step,
 }
+# largest sizes by the unit of a drive, and of a drift
+_MOST = {
+    "": {"rad": 5e-3, "mm": 0.5},
+    "backlash": {"rad": 1e-2, "mm": 0.8},
+    "drive_compliance": {"rad": 5e-7, "mm": 0.02},
+}
+_MOST_DRIFT_MM_S = 5e-3
 # what MuJoCo can make of these
 MUJOCO = {"backlash": "play", "drive_compliance": "actuator_stiffness"}
 NAMES = (*_AT_DRIVES, "base_drift")

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from rrru.errors import UnreachableError
 from rrru.seeds import stream
 from rrru.studies.withheld.sentences.causes import MUJOCO, NAMES, Cause, Stops, draw_cause
 from rrru.studies.withheld.sentences.kinds import KINDS
@@ -28,6 +29,7 @@ _TARGETS_MM = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -7
 _INSIDE = 0.9
 # what a cause's size begins from, so small that its displacement is in proportion, and times that it is set
 _SMALL, _SIZINGS = 1e-6, 3
+_ATTEMPTS, _ACTING = 30, 0.65
 
 
 @dataclass(frozen=True)
@@ -128,30 +130,52 @@ class Draw:
 
 
 def draw(number, seed, most_stops, mujoco_share):
-    """The Draw of a number: kinds of robots take turns, then plants, causes and readings are drawn."""
+    """The Draw of a number: kinds of robots take turns, then plants, causes and readings are drawn.
+
+    Drawn again where the robot as it is built has no pose at a stop, or no such robot has a cause of that size.
+    """
+    for attempt in range(_ATTEMPTS):
+        generator = stream(seed, "sentences", number, attempt)
+        plant = "mujoco" if generator.random() < mujoco_share else "numpy"
+        own = _still(number, seed, plant, most_stops, generator)
+        names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if _fits(name, own.nominal)]
+        if generator.random() < _ACTING:
+            cause = draw_cause(str(generator.choice(names)), own.nominal, generator)
+            own = _sized(own, cause, float(np.exp(generator.uniform(*np.log([_WEAKEST, _STRONGEST])))))
+        if np.isfinite(replace(own, plant="numpy").poses()[0]).all() and not (
+            own.cause and own.cause.beyond(own.nominal)
+        ):
+            return own
+    raise UnreachableError(f"robot {number}: no pose at some stop, or a cause too large, in {_ATTEMPTS} draws")
+
+
+def _still(number, seed, plant, most_stops, generator):
+    """The Draw of a robot without a cause."""
     kind = [*KINDS][number % len(KINDS)]
-    generator = stream(seed, "sentences", number)
     nominal = KINDS[kind](generator)
-    plant = "mujoco" if generator.random() < mujoco_share else "numpy"
-    format_ = "mjcf" if plant == "mujoco" else str(generator.choice(nominal.formats))
     built = nominal.built(generator, _LENGTH_MM, _ANGLE_RAD)
     zeros = np.array([_ZERO[unit] for unit in nominal.units]) * generator.standard_normal(len(nominal.units))
-    noise_mm = float(np.exp(generator.uniform(*np.log(NOISE_MM))))
     registered = bool(generator.random() < 0.5)
     # MuJoCo takes its time from stop to stop
     count = _FEWEST if plant == "mujoco" else int(np.exp(generator.uniform(*np.log([_FEWEST, most_stops]))))
-    stops = _stops(nominal, count, plant, generator)
-    names = [*MUJOCO] if plant == "mujoco" else [name for name in NAMES if _fits(name, nominal)]
-    cause = draw_cause(str(generator.choice(names)), nominal, generator) if generator.random() < 0.65 else None
     reading = str(generator.choice(READINGS))
     # orientations that are never turned do not tell a frame from a tool
     reading = "tool" if reading in ("pose", "found") and not _turns(nominal) else reading
-    name, frame = f"{kind}_{number:04d}", _frame(generator, registered)
-    own = Draw(
-        name, kind, plant, format_, nominal, built, zeros, None, stops, reading, frame, registered, noise_mm, seed
-    )
-    return (
-        own if cause is None else _sized(own, cause, float(np.exp(generator.uniform(*np.log([_WEAKEST, _STRONGEST])))))
+    return Draw(
+        name=f"{kind}_{number:04d}",
+        robot_kind=kind,
+        plant=plant,
+        kind="mjcf" if plant == "mujoco" else str(generator.choice(nominal.formats)),
+        nominal=nominal,
+        built=built,
+        zeros=zeros,
+        cause=None,
+        stops=_stops(nominal, count, plant, generator),
+        reading=reading,
+        frame=_frame(generator, registered),
+        registered=registered,
+        noise_mm=float(np.exp(generator.uniform(*np.log(NOISE_MM)))),
+        seed=seed,
     )
 
 

@@ -285,6 +285,16 @@ def read(own, handed, folder):
     return "accepted", "; ".join(found.notes)
 
 
+def is_mirrored(own, handed, words):
+    """Whether exchanged legs of a robot that is its own mirror image have been taken for a mirrored frame.
+
+    Of three like legs both explain the readings alike, and no file tells which it is.
+    """
+    legs = len(own.nominal.units) == 3 and own.nominal.formats == ("mjcf",)
+    exchanged = any(pattern.startswith("order:") for pattern in handed.words)
+    return legs and exchanged and bool(re.search("right-handed|would fit the robot's", words))
+
+
 def named(handed, words):
     """Whether words name the mistake with the key to write."""
     return all(re.search(pattern, words, re.DOTALL) for pattern in handed.words)

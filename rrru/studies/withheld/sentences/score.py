@@ -88,6 +88,7 @@ def _of_mistake(number, settings, folder):
     warned = "may be shifted" in words or "see that unit, frame and rows belong together" in words
     wanted = f" [wanted: {', '.join(handed.words)}]"
     right = became != "traceback" and mistakes.named(handed, words)
+    right = None if not right and mistakes.is_mirrored(own, handed, words) else right
     return (
         own.name,
         f"{name}; {own.in_words}",
