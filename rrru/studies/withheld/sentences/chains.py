@@ -104,16 +104,16 @@ class Chain:
     def built(self, generator, length_mm, angle_rad):
         """The chain as it is built: every seat and the tip off by normal errors of these sizes.
 
-        Not along what the joint itself does, which would be a zero of its drive.
+        Not along what the joint itself or the one before does, which would be a zero of its drive.
         """
-        joints = []
+        joints, before = [], ()
         for one in self.joints:
-            across = 1.0 - np.abs(one.axis)
-            shift = length_mm * generator.standard_normal(3) * (across if one.unit == "mm" else 1.0)
-            turn = angle_rad * generator.standard_normal(3) * (across if one.unit == "rad" else 1.0)
+            shift = length_mm * generator.standard_normal(3) * _across("mm", one, *before)
+            turn = angle_rad * generator.standard_normal(3) * _across("rad", one, *before)
             seat = tuple((np.array(one.seat_mm) + shift).tolist())
             joints.append(replace(one, seat_mm=seat, seat_rad=_turned(one.seat_rad, turn)))
-        tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3)
+            before = (one,)
+        tip = np.array(self.tip_mm) + length_mm * generator.standard_normal(3) * _across("mm", *before)
         return replace(self, joints=tuple(joints), tip_mm=tuple(tip.tolist()))
 
     def section(self, file, kind):
@@ -205,6 +205,12 @@ def quat(vector_rad):
 def _turned(first_rad, then_rad):
     """Rotation vector of two rotations, the second in the frame that the first has turned."""
     return tuple((Rotation.from_rotvec(first_rad) * Rotation.from_rotvec(then_rad)).as_rotvec().tolist())
+
+
+def _across(unit, *joints):
+    """0 or 1 (3,) for every direction: 0 along the axes of those joints that have this unit."""
+    own = [np.abs(joint.axis) for joint in joints if joint.unit == unit]
+    return 1.0 - np.max([np.zeros(3), *own], axis=0)
 
 
 def _scale(unit):

@@ -24,6 +24,12 @@ _AS_GOOD, _REMAINDER = 1.1, 0.1
 _NEAR_NOISE, _NEAR_PLACE_MM, _NEAR_TURN_RAD = 0.15, 5.0, 0.03
 # least share of the largest error about a place that is called the worst
 _WORST = 0.5
+# what errors of the links can make of a zero
+_OF_LINKS = {"rad": 1e-3, "mm": 0.5}
+# shares are printed to whole per cents
+_PRINTED = 0.005
+# a robot that errs by this share of the noise without a cause has errors that no model holds
+_OWN = 0.3
 # share of a file's rows that are no outliers
 _MOST_LEFT = 0.95
 _NEIGHBOURS = 10
@@ -155,7 +161,8 @@ def _zero(told, truth, _facts):
     scale = np.degrees(1.0) if told["unit"] == "degrees" else 1.0
     off = abs(float(told["value"]) - scale * truth.zeros[told["site"]])
     # a zero without an error is good to the digits that are printed
-    return off <= _ERRORS * float(told.get("error", 0.01 * abs(float(told["value"]))))
+    error = float(told.get("error", 0.01 * abs(float(told["value"]))))
+    return off <= _ERRORS * error + scale * _OF_LINKS[{"degrees": "rad"}.get(told["unit"], "mm")]
 
 
 def _zeros_lost(told, truth, _facts):
@@ -183,8 +190,8 @@ def _few(told, truth, _facts):
 
 
 def _noise_larger(_told, truth, _facts):
-    """The noise is as stated, so that only something that the model lacks makes it look larger."""
-    return truth.outside
+    """The noise is as stated: only what no model holds, as of MuJoCo's servos, makes it look larger."""
+    return truth.outside or truth.still_mm > _OWN * truth.noise_rms_mm
 
 
 def _unmeasured_again(_told, truth, _facts):
@@ -209,20 +216,18 @@ def _cannot_be_told(told, truth, _facts):
 
 
 def _file_leaves(told, truth, _facts):
-    """The corrected file's error at the readings, their noise included, within a tenth."""
-    return _within(told["value"], truth.file_seen_mm, truth)
+    """The corrected file's error at the readings within a tenth."""
+    return _within(told["value"], truth.file_read_mm)
 
 
-def _within(said, exact_mm, truth):
-    """Whether an rms at noisy readings is that of an exact error and the noise, within a tenth."""
-    if not np.isfinite(exact_mm):
-        return None
-    return abs(float(said) / np.hypot(exact_mm, truth.noise_rms_mm) - 1.0) <= _REMAINDER
+def _within(said, true_mm):
+    """Whether an rms is the true one within a tenth."""
+    return abs(float(said) / true_mm - 1.0) <= _REMAINDER if np.isfinite(true_mm) else None
 
 
 def _file_worse(told, truth, _facts):
     """What the given file misses by."""
-    return _within(told["other"], truth.given_seen_mm, truth)
+    return _within(told["other"], truth.given_read_mm)
 
 
 def _lost(told, _truth, facts):
@@ -254,14 +259,14 @@ def _worst(told, truth, _facts):
     return about(np.array(told["at"])) >= _WORST * max(about(point) for point in truth.position_mm)
 
 
-def _holds(ends, true):
-    """Whether an interval holds a number."""
-    return None if true is None or not np.isfinite(true) else ends[0] <= true <= ends[1]
+def _holds(ends, true, digit=0.0):
+    """Whether an interval holds a number, its ends good to a digit."""
+    return None if true is None or not np.isfinite(true) else ends[0] - digit <= true <= ends[1] + digit
 
 
 def _closed(told, truth, _facts):
     """Interval of the share that the verdict's effects close of the gap at fresh stops."""
-    return _holds(told["ends"], 1.0 - truth.after_mm / truth.before_mm) if truth.before_mm else None
+    return _holds(told["ends"], 1.0 - truth.after_mm / truth.before_mm, _PRINTED) if truth.before_mm else None
 
 
 def _budget(told, truth, _facts):
@@ -269,11 +274,11 @@ def _budget(told, truth, _facts):
     part = told["part"]
     if told["kind"] == "effect":
         if part not in truth.effects:
-            return told["ends"][0] <= 0.0
-        return _holds(told["ends"], truth.share)
+            return told["ends"][0] <= _PRINTED
+        return _holds(told["ends"], truth.share, _PRINTED)
     if told["kind"] == "unexplained":
-        return told["ends"][1] > 0.0 if truth.outside else told["ends"][0] <= 0.0
-    return told["ends"][0] <= 0.0
+        return told["ends"][1] > 0.0 if truth.outside else told["ends"][0] <= _PRINTED
+    return told["ends"][0] <= _PRINTED
 
 
 def _number(told, truth, _facts):
@@ -298,9 +303,9 @@ def _by_factor(told, truth, _facts):
         return None
     squares = truth.error_mm**2
     if told["factor"] == "direction":
-        return _holds(told["ends"], squares[:, "xyz".index(told["level"])].sum() / squares.sum())
+        return _holds(told["ends"], squares[:, "xyz".index(told["level"])].sum() / squares.sum(), _PRINTED)
     chosen = truth.payload_kg == float(told["level"].removesuffix(" kg"))
-    return _holds(told["ends"], squares[chosen].sum() / squares.sum())
+    return _holds(told["ends"], squares[chosen].sum() / squares.sum(), _PRINTED)
 
 
 def _as_good(_told, truth, facts):
@@ -451,8 +456,8 @@ _JUDGES = {
     "interval of a share: by direction": _by_factor,
     "interval of a share: by payload": _by_factor,
     **{f"interval of a number: {kind}": _number for kind in ("calibration", "cause", "weight")},
-    "rms of the given_model": lambda told, t, _: _within(told["value"], t.given_seen_mm, t),
-    "rms of the corrected_model": lambda told, t, _: _within(told["value"], t.file_seen_mm, t),
+    "rms of the given_model": lambda told, t, _: _within(told["value"], t.given_read_mm),
+    "rms of the corrected_model": lambda told, t, _: _within(told["value"], t.file_read_mm),
     "the corrected file is as good as the estimate": _as_good,
     "the corrected file is not worse than the given one": _not_worse,
     "corrected_drives bring it there": _drives,

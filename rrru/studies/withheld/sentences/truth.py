@@ -29,11 +29,12 @@ class Truth:
     chi-square of the file's readings; numbers: true values by effect and parameter; geometry: values that exact
     readings without a cause give the calibration's parameters; zeros: of the drives by site; before_mm, after_mm: rms
     at fresh stops of the calibrated and of the corrected sim, seen_mm: of the calibrated one at the file's rows;
-    rows, stops: how many the file has; again: stops were measured twice; payloads: how many different ones; turned:
-    orientations were read; error_mm, position_mm (rows, 3): exact errors of the calibrated sim, and where; payload_kg
-    (rows,); places: of the targets by name; given_mm, file_mm: rms at fresh stops of the robot's file as it came and as
-    corrected, NaN where that is not known, given_seen_mm, file_seen_mm: at the file's rows; drives_mm: rms of the robot
-    about where `corrected_drives` sends it.
+    still_mm: what a calibration of exact readings leaves without a cause; rows, stops: how many the file has; again:
+    stops were measured twice; payloads: how many different ones; turned: orientations were read; error_mm, position_mm
+    (rows, 3): exact errors of the calibrated sim, and where; payload_kg (rows,); places: of the targets by name;
+    given_mm, file_mm: rms at fresh stops of the robot's file as it came and as corrected, NaN where that is not known,
+    given_read_mm, file_read_mm: at the file's readings; drives_mm: rms of the robot about where `corrected_drives`
+    sends it.
     """
 
     effects: frozenset
@@ -47,6 +48,7 @@ class Truth:
     before_mm: float
     after_mm: float
     seen_mm: float
+    still_mm: float
     noise_rms_mm: float
     noise_mm: float
     rows: int
@@ -60,8 +62,8 @@ class Truth:
     places: dict = field(default_factory=dict)
     given_mm: float = np.nan
     file_mm: float = np.nan
-    given_seen_mm: float = np.nan
-    file_seen_mm: float = np.nan
+    given_read_mm: float = np.nan
+    file_read_mm: float = np.nan
     drives_mm: float = np.nan
 
     @property
@@ -90,7 +92,7 @@ def truth_of(draw, run, folder, gap):
     before = whole.left(State(attribution.calibrated.deviations, {}))[:count]
     after = whole.standing(attribution.state).left(attribution.state)[:count]
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
-    geometry, _ = _calibrated(free[~fresh], run)
+    geometry, without = _calibrated(free[~fresh], run)
     _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
     seen, name = before[~fresh], draw.cause.name if draw.cause else None
     held = name in library
@@ -107,6 +109,7 @@ def truth_of(draw, run, folder, gap):
         before_mm=_rms(before[fresh]),
         after_mm=_rms(after[fresh]),
         seen_mm=_rms(seen),
+        still_mm=_rms(without),
         noise_rms_mm=noise_rms,
         noise_mm=draw.noise_mm,
         rows=int((~fresh).sum()),
@@ -186,7 +189,8 @@ def _of_files(draw, run, exact, fresh):
     files = {"given": written.with_name(draw.robot_file)}
     if not any(text.startswith("not corrected") for text in run.page.not_in_model):
         files["file"] = written
-    measured = rows.measured(exact)
+    measured, read = rows.measured(exact), rows.measured(run.ingested.measurements)
+    right = (run.ingested.measurements["status"] == "ok").to_numpy()
     for key, file in files.items():
         loops = draw.kind == "mjcf" and draw.nominal.formats == ("mjcf",)
         gives = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
@@ -195,8 +199,8 @@ def _of_files(draw, run, exact, fresh):
         place, turn, sites = file_poses(file, draw, draw.stops.drive, draw.stops.payload_kg)
         points = [sites.get(name, np.array(at)) if key == "file" else np.array(at) for name, at in draw.targets.items()]
         seen = np.stack([place + turn @ point for point in points], axis=1).reshape(-1, 3)
-        off = measured - seen
-        result |= {f"{key}_mm": _rms(off[fresh]), f"{key}_seen_mm": _rms(off[~fresh])}
+        left = (read - seen[~fresh])[right]
+        result |= {f"{key}_mm": _rms((measured - seen)[fresh]), f"{key}_read_mm": _rms(left)}
     return result
 
 
