@@ -107,7 +107,7 @@ def test_a_digest_follows_imports_wherever_they_stand(tmp_path, monkeypatch):
             {
                 *("diagnose", "gather_gap"),
                 *("withheld_diagnose", "withheld_score", "withheld_beliefs", "withheld_methods"),
-                "withheld_advice",
+                *("withheld_advice", "withheld_statements", "withheld_sentences"),
             },
         ),
     ],

@@ -11,6 +11,8 @@ from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.noise import NOISES
 from rrru.studies.withheld.verdicts import PLANTS
 
+# what is done with own robots whose pages and files are judged
+PAGES, MISTAKES, RIGHT = "pages", "mistakes", "right_files"
 # so many kinds of causes further on every next file begins
 _APART = 4
 
@@ -60,6 +62,15 @@ def chunks(section):
     for k, group in zip(np.cumsum([0, *map(len, groups)]).tolist(), groups, strict=False):
         result |= {f"robots_{k + first:04d}": group[first : first + size] for first in range(0, len(group), size)}
     return result
+
+
+def statement_chunks(section):
+    """(check, first number, first of the next) of every chunk by its name, from `withheld.sentences`."""
+    found, size = {}, section["chunk"]
+    for check in (PAGES, MISTAKES, RIGHT):
+        for first in range(0, section[check], size):
+            found[f"{check}_{first:04d}"] = (check, first, min(first + size, section[check]))
+    return found
 
 
 def _of_file(plant, files, k):

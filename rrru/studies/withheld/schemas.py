@@ -197,6 +197,31 @@ settled                int    how many of them are settled
 value                  float? share of them; null where the group is empty
 low                    float? lower end of the 95 % Wilson interval
 high                   float? upper end
+
+## withheld_statements | withheld/statements/{chunk}.parquet | check robot statement
+What pages of own robots say, and what becomes of files with gross mistakes and of right ones, each beside the truth.
+--
+robot
+check                  str    pages: all sentences and numbers of a page; mistakes: a file with one gross mistake;
+    right_files: a file without {pages, mistakes, right_files}
+truth                  str    what is true in words: cause or mistake, plant, file, what is read
+statement              int    number of the statement about this robot, from 0 on
+kind                   str    kind of sentence, number or mistake, see rrru/studies/withheld/sentences
+text                   str    as the page or the message has it
+result                 str    undecided: the truth does not contradict it, and does not have to bear it out {true,
+    false, undecided}
+
+## sentences | tables/sentences.parquet | kind
+How many sentences and numbers on pages of own robots are true, kind by kind. A sentence that nothing can judge is of
+the unknown kind.
+--
+kind                   str    as in withheld_statements
+true                   int    how many are true
+false                  int    how many are false
+undecided              int    how many are neither
+example_true           str    the first that is true, behind the robot's name; empty for none
+example_false          str    the first that is false
+example_undecided      str    the first that is neither
 """)
 _ANSWERS = _TABLES[0]
 

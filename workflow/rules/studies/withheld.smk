@@ -1,4 +1,4 @@
-from rrru.studies.withheld.chunks import chunks, described, rivalled
+from rrru.studies.withheld.chunks import chunks, described, rivalled, statement_chunks
 
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
@@ -7,6 +7,8 @@ WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits
 WITHHELD_ADVICE = ["withheld_advice", "withheld_advice_summary"]
 # the chunks that have robots whose cause is hidden
 WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.check == "label" for member in members)]
+# what pages say of own robots, and gross mistakes in files
+STATEMENTS = statement_chunks(config["withheld"]["sentences"])
 WITHHELD_FIGURES = {
     "withheld": (
         "rrru.studies.withheld.figures:withheld",
@@ -40,7 +42,7 @@ WITHHELD_KNOWN, WITHHELD_TOLD = (
 
 
 wildcard_constraints:
-    chunk="|".join(WITHHELD) or "none",
+    chunk="|".join([*WITHHELD, *STATEMENTS]) or "none",
 
 
 rule withheld_robots:
@@ -166,9 +168,48 @@ rule withheld_advice:
         "../../scripts/withheld_advice.py"
 
 
+# a robot is drawn, and its page made and judged, in one job: the diagnosis is given files alone
+rule withheld_statements:
+    output:
+        **named(["withheld_statements"], under("withheld/{chunk}")),
+    log:
+        f"{RESULTS}/logs/withheld_statements/{{chunk}}.log",
+    params:
+        settings=lambda wildcards: {
+            "chunk": STATEMENTS[wildcards.chunk],
+            **reads("seed", "gap", "loads", "calibration.singularity_margin"),
+            **reads("withheld.sentences.stops", "withheld.sentences.mujoco_share"),
+        },
+        own_effects=own_effects_digests(),
+        code=code("withheld_statements"),
+    script:
+        "../../scripts/withheld_statements.py"
+
+
+rule withheld_sentences:
+    input:
+        withheld_statements=[under(f"withheld/{chunk}")("withheld_statements") for chunk in STATEMENTS],
+    output:
+        **named(["sentences"]),
+    log:
+        f"{RESULTS}/logs/withheld_sentences.log",
+    params:
+        settings={},
+        code=code("withheld_sentences"),
+    script:
+        "../../scripts/withheld_sentences.py"
+
+
+# a part of the check by itself
+rule sentences:
+    input:
+        rules.withheld_sentences.output,
+
+
 # not part of the default run
 rule withheld:
     input:
         named([*WITHHELD_TABLES, *WITHHELD_ADVICE]).values(),
+        rules.withheld_sentences.output,
         rules.withheld_methods.output,
         drawn(FIGURES["withheld"]).values(),

@@ -1,0 +1,199 @@
+"""What a page says: every sentence and number of it as a Claim of a kind. Lengths mm, angles rad.
+
+Sentences are told apart by a pattern each, numbers come from the facts and tables. A sentence that no pattern knows is
+of the kind UNKNOWN, so that none is passed over.
+"""
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+UNKNOWN = "unknown kind"
+_NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
+_X = rf"(?P<value>{_NUMBER})"
+_Y = rf"(?P<other>{_NUMBER})"
+_P = rf"(?P<probability>more than 0\.99|less than 0\.01|{_NUMBER})"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """kind; text: as the page has it; told: what it says, by name."""
+
+    kind: str
+    text: str
+    told: dict = field(default_factory=dict)
+
+
+# kinds of sentences of the answer
+_SENTENCES = {
+    "the robot still misses by": rf"After calibration the robot still misses by {_X} mm at points left out of it .*",
+    "nothing systematic is left": rf"After calibration nothing systematic is left .*\(probability {_P}\): the robot "
+    rf"misses by {_X} mm, the measuring noise is {_Y} mm\.",
+    "a cause with a share": rf"(?P<share>{_NUMBER}) %(?: of that)? is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?"
+    r"(?: \((?P<sizes>[^)]*)\))?(?:: .*)?\.",
+    "a cause with a size": rf"{_X} mm is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?(?: \((?P<sizes>[^)]*)\))?"
+    r"(?:: .*)?\.",
+    "a cause without a share": r"Also there is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?"
+    r"(?: \((?P<sizes>[^)]*)\))?(?:: .*)?\.",
+    "shares cannot be told": r"The gap is so small beside the noise that its shares cannot be told\.",
+    "shares overlap": r"These shares overlap.*",
+    "something is unexplained": rf"(?:Beside that|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
+    "probability of this answer": rf"Probability of this answer: {_P}\.",
+    "it does not repeat": rf"(?:(?P<share>{_NUMBER}) %|Some of it) does not repeat from pass to pass.*",
+    "it is random error": rf"(?:(?P<share>{_NUMBER}) %|Some of it) is random error above the stated noise.*",
+    "what is left with it": rf"Add (?:it|them) to the simulator and {_X} mm is left on runs .*; the noise is {_Y} mm\.",
+    "these data cannot rule out": r"(?:These data cannot rule out|Parts of it could be): (?P<names>.*)\.",
+    "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That decides (?P<contest>.*)\.",
+    "next, none is advised": r"Next: no run is advised.*",
+    "next, nothing more": r"Next: nothing more needs to be measured for this answer\.",
+    "next, nothing would settle it": r"Next: no further run that was tried in computation would settle it\.",
+}
+# kinds of notes of the diagnosis and of what a corrected file cannot hold
+_NOTES = {
+    "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X}(?: \+- (?P<error>{_NUMBER}))? (?P<unit>degrees|mm)",
+    "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
+    "the weight is not as told": rf"weight not as told: {_X} \+- (?P<error>{_NUMBER}) (?P<unit>kg|rad) .*",
+    "the fit did not converge": r"the fit of .* did not converge.*",
+    "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:; .*)?",
+    "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
+    "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
+    "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot does not|instrument is worse).*",
+    "the noise is smaller": rf"noise stated {_X} mm per axis, found {_Y}: the instrument is better",
+    "repeatability is unknown": r"repeatability is unknown: no pose was measured twice",
+    "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
+    "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
+    "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters take it up",
+    "an effect cannot be told": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
+    "an effect is not tested": r"(?P<name>\w+) not tested: .*",
+    "the file leaves": rf"the corrected file leaves {_X} mm rms at the readings, the diagnosis {_Y} mm",
+    "the file would be worse": rf"not corrected: it would miss by {_X} mm rms, the file as it came misses by {_Y} mm",
+    "the file is not corrected": r"not corrected: .*",
+    "how the file was driven": r"corrected model not driven: .*",
+    "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
+    r"|an effect is found .*|the others are .*",
+    "the file cannot hold play": r"play of (?P<names>.*)",
+    "the file cannot hold compliance": r"compliance of (?P<names>.*)",
+    "the file cannot hold an effect": r"(?P<name>[a-z]+(?:_[a-z]+)*)",
+}
+# kinds of what reading the file noted
+_READ = {
+    "no commanded positions": r"no commanded positions: computed from .*",
+    "no such column": r"no column (?P<column>\w+): .*",
+    "registered": r"measured positions registered to the commanded ones at (?P<points>\d+) points: .*",
+    "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
+    "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
+    "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
+    "points are outliers": r"(?P<count>\d+) points marked as outliers, .*",
+    "stale readings": r"(?P<count>\d+) stale readings, .*",
+    "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",
+    "beyond a range": r"(?P<count>\d+) of (?P<rows>\d+) points are outside of the range of .*",
+    "rows may be shifted": r".*: the rows may be shifted",
+    "far from the commands": r"measured positions are .* from the commanded ones in the median: .*",
+    "not this reflector": r"run \S+ point \S+: .*",
+}
+
+
+def claims(page):
+    """Every Claim of a Page."""
+    facts, result = page.facts, []
+    for text in facts["sentences"]:
+        result += _of_text(text, _SENTENCES)
+    for text in [*facts["notes"], *page.not_in_model]:
+        result += _of_text(text, _NOTES)
+    for text in page.read:
+        result += _of_text(text, _READ)
+    return [*result, *_of_facts(facts), *_of_tables(page.tables)]
+
+
+def _of_text(text, patterns):
+    """Claims of a sentence: its own, and one for every number or name that it holds besides."""
+    for kind, pattern in patterns.items():
+        if found := re.fullmatch(pattern, text, re.DOTALL):
+            told = {name: value for name, value in found.groupdict().items() if value is not None}
+            return [Claim(kind, text, told), *_inside(text, told)]
+    return [Claim(UNKNOWN, text)]
+
+
+def _inside(text, told):
+    """Claims of what a sentence holds beside what it says."""
+    result = []
+    if "place" in told and "name" in told and "," not in told["place"]:
+        result.append(Claim("place of a cause", text, told))
+    if "sizes" in told:
+        pattern = rf"(?P<names>\w+(?: = \w+)*) = {_X} ± (?P<error>{_NUMBER})"
+        for found in re.finditer(pattern, told["sizes"]):
+            result += [
+                Claim("size of a cause", text, {"effect": told["name"], "parameter": name, **found.groupdict()})
+                for name in found["names"].split(" = ")
+            ]
+    if "share" in told and "name" in told:
+        result.append(Claim("share of a cause", text, told))
+    if "probability" in told:
+        result.append(Claim("probability", text, told))
+    if "names" in told and text.startswith(("These data", "Parts of")):
+        result += [Claim("a rival", text, {"name": name}) for name in told["names"].split(", ")]
+    if "other" in told and "noise is" in text:
+        result.append(Claim("the measuring noise", text, {"value": told["other"]}))
+    return result
+
+
+def _of_facts(facts):
+    """Claims of the numbers of the verdict."""
+    named = [one["name"] for one in facts["effects"]]
+    result = [
+        Claim("verdict", _listed(facts), {"names": named, "unexplained": facts["unexplained"]}),
+        Claim("names in the verdict", _listed(facts), {"names": named}),
+        Claim("leg of the verdict", f"leg {facts['leg']}: {_listed(facts)}", {"leg": facts["leg"], "names": named}),
+        Claim("gap_rms_mm", f"{facts['gap_rms_mm']:.4g} mm", {"value": facts["gap_rms_mm"]}),
+        Claim("noise_rms_mm", f"{facts['noise_rms_mm']:.4g} mm", {"value": facts["noise_rms_mm"]}),
+        Claim("worst place", str(np.round(facts["worst_mm"], 1).tolist()), {"at": facts["worst_mm"]}),
+    ]
+    if named:
+        after = facts["gap_after_rms_mm"]
+        result.append(Claim("gap_after_rms_mm", f"{after:.4g} mm", {"value": after}))
+        ends = facts["share_closed_low"], facts["share_closed_high"]
+        result.append(Claim("interval of share_closed", f"{ends[0]:.3f} to {ends[1]:.3f}", {"ends": ends}))
+    for part in facts["budget"]:
+        ends = part["share_low"], part["share_high"]
+        told = {"part": part["part"], "kind": part["kind"], "ends": ends}
+        result.append(
+            Claim(f"interval of a share: {part['kind']}", f"{part['part']}: {ends[0]:.3f} to {ends[1]:.3f}", told)
+        )
+    return result
+
+
+def _listed(facts):
+    """The verdict in a line."""
+    names = [one["name"] for one in facts["effects"]] + ["unexplained"] * facts["unexplained"]
+    return f"{'+'.join(names) or 'none'} ({facts['probability']:.3f})"
+
+
+def _of_tables(tables):
+    """Claims of the numbers in the tables."""
+    result = []
+    for row in tables["gap_parameters"].to_dict("records"):
+        kind = {"calibration": "calibration", "weight": "weight"}.get(row["effect"], "cause")
+        if np.isfinite(row["low_95"]) and np.isfinite(row["standard_error"] or np.nan):
+            text = f"{row['effect']} {row['parameter']}: {row['low_95']:.6g} to {row['high_95']:.6g} {row['unit']}"
+            told = {"effect": row["effect"], "parameter": row["parameter"], "ends": (row["low_95"], row["high_95"])}
+            result.append(Claim(f"interval of a number: {kind}", text, told))
+    for row in tables["gap_locate"].to_dict("records") if "gap_locate" in tables else ():
+        if row["factor"] in ("direction", "payload"):
+            text = f"{row['factor']} {row['level']}: {row['share_low']:.3f} to {row['share_high']:.3f}"
+            told = {"factor": row["factor"], "level": row["level"], "ends": (row["share_low"], row["share_high"])}
+            result.append(Claim(f"interval of a share: by {row['factor']}", text, told))
+    for row in tables["gap_identifiability"].to_dict("records") if "gap_identifiability" in tables else ():
+        if np.isfinite(row["detectable_mm"]):
+            told = {"effect": row["effect"], "value": row["detectable_mm"]}
+            result.append(Claim("detectable_mm", f"{row['effect']}: {row['detectable_mm']:.4g} mm", told))
+    shrink = tables["gap_shrink"]
+    for kind in ("given_model", "corrected_model"):
+        own = shrink[(shrink["kind"] == kind) & (shrink["trajectory"] == "*")]
+        result += [Claim(f"rms of the {kind}", f"{value:.4g} mm", {"value": value}) for value in own["rms_mm"]]
+    if (shrink["kind"] == "corrected_model").any():
+        result.append(Claim("the corrected file is as good as the estimate", "corrected file"))
+        result.append(Claim("the corrected file is not worse than the given one", "corrected file"))
+    if len(tables.get("corrected_drives", ())):
+        result.append(Claim("corrected_drives bring it there", "corrected_drives"))
+    return result

@@ -1,0 +1,17 @@
+"""Sentences and numbers of own robots' pages, and gross mistakes in files, of a chunk, each beside the truth."""
+
+from rrru.store import tables
+from rrru.store.job import run
+from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.withheld.sentences.score import settings_of, statements
+
+
+def main(settings, inputs, outputs):
+    """Write the statements of a chunk."""
+    check, first, end = settings["chunk"]
+    told = statements(check, range(first, end), settings_of(settings))
+    tables.write_all(TABLES, {"withheld_statements": told}, outputs)
+
+
+if __name__ == "__main__":
+    run(main, snakemake)
