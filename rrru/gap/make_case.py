@@ -169,11 +169,13 @@ def _stopping(measurements, mechanism, course):
 def _path_drive(measurements, path, drives, degree=DEGREE):
     """Actuator values (N, K) along a path (N, 3) by splines of an odd degree through the points of each run.
 
+    Straight between stops in no order.
+
     drives: the robot, its actuator values (n, K) at the measured points, and the rows (n,) of these on the path.
     """
     mechanism, actuators, index = drives
-    if mechanism.orients:
-        # positions do not tell the orientation between the points
+    if mechanism.orients or not passes_points(measurements):
+        # positions do not tell the orientation between the points, nor the way between stops
         evenly = np.stack([np.interp(np.arange(len(path)), index, one) for one in actuators.T], axis=1)
         result = smooth_drives(measurements, evenly, index, degree)
     else:

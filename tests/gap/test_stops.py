@@ -1,6 +1,7 @@
 """Several readings at one stop: how far they count as independent, that folds keep them together, and noisy targets."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
@@ -10,7 +11,8 @@ from rrru.estimation.noise_model import NoiseModel, alike
 from rrru.gap.calibrate import calibrate
 from rrru.gap.heldout import HeldOut
 from rrru.gap.make_case import make_case
-from tests.gap import arms
+from rrru.robots.dynamics import Masses
+from tests.gap import arms, gantry
 
 _STOPS, _TARGETS = 150, ("a", "b", "c")
 _PLACES = {"a": (60.0, 10.0, 90.0), "b": (-50.0, 40.0, 120.0), "c": (0.0, -70.0, 60.0)}
@@ -170,3 +172,22 @@ def test_no_jump_below_the_stated_noise_counts():
     quiet = np.flatnonzero(series == 1)[40]
     residual[quiet] += [0.4, 0.0, 0.0]
     assert not isolated(residual, series, 0.05, series).any()
+
+
+def test_between_stops_in_no_order_slides_come_from_the_stop_before():
+    """Of a robot whose platform cannot turn, too: no spline through stops tells a way between them."""
+    generator = np.random.default_rng(4)
+    low, high = gantry.RANGES_MM.T
+    drive = low + (high - low) * generator.random((60, 3))
+    command = rows.vector_columns("command", gantry.GANTRY.forward(drive))
+    frame = pd.DataFrame({"run": 1, "trajectory": "poses", "point": np.arange(1, 61), "status": "ok"})
+    frame = frame.assign(**command, **dict(zip(gantry.GANTRY.parts.columns, drive.T, strict=True)))
+    frame = frame.assign(**dict.fromkeys(("time_s", "speed_mm_s", "payload_kg"), np.nan))
+    frame = frame.assign(**rows.vector_columns("measured", rows.command(frame)))
+    motion = make_case(frame, gantry.GANTRY, Masses(0.0, 0.0, 0.0), 0.01, {}).motion
+    effect, width = find("backlash", gantry.GANTRY), 0.02
+    made = effect.contribute(motion, np.full(3, width)).twists
+    sites = gantry.GANTRY.legs.site_numbers
+    for number, part in enumerate(gantry.GANTRY.parts.drives):
+        change = made[1:, sites[part.site]] @ part.twist
+        np.testing.assert_allclose(change, -0.5 * width * np.sign(np.diff(drive[:, number])), atol=1e-12)
