@@ -179,7 +179,9 @@ def _causes(facts):
     told = _shares_told(facts)
     said = [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(facts["effects"])]
     if not told and said:
-        said.append("The gap is so small beside the noise that its shares cannot be told.")
+        small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
+        why = "The gap is so small beside the noise" if small else "The effects imitate each other so much"
+        said.append(f"{why} that shares of the gap cannot be told.")
     elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:

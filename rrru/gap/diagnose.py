@@ -135,6 +135,11 @@ def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataF
         yield f"{effect} not tested: {note}"
 
 
+def _joined(notes: Sequence[str]) -> str:
+    """Notes as one text, separated by semicolons, which none of them has itself."""
+    return "; ".join(note.replace("; ", ", ") for note in notes)
+
+
 def _row(
     attribution: Attribution,
     verdict: Verdict,
@@ -165,7 +170,7 @@ def _row(
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": "; ".join([*found, *_notes(attribution, stated_mm, excluded)]),
+        "notes": _joined([*found, *_notes(attribution, stated_mm, excluded)]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,

@@ -105,13 +105,16 @@ def test_without_a_pose_measured_twice_repeatability_is_unknown():
     )
 
 
-@pytest.mark.parametrize(("factor", "gap"), [(12.0, 0.02), (1.0, 0.0)])
-def test_of_a_gap_that_is_small_beside_the_noise_sizes_are_told_and_no_shares(factor, gap):
+@pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
+def test_where_shares_cannot_be_told_sizes_are_and_why(factor, gap, why):
     budget = synthetic_gap.gap_budget(CAMPAIGN)
     shares = budget[["share", "share_low", "share_high"]] * (factor if gap else 0.0)
     said = " ".join(answered(budget.assign(**shares), gap_rms_mm=gap)["sentences"])
     size = budget.set_index("part").loc["link_flexure", "rms_mm"]
-    assert "%" not in re.sub(r"\(95 %: [^)]*\)", "", said) and "so small beside the noise" in said
+    assert "%" not in re.sub(r"\(95 %: [^)]*\)", "", said)
+    assert ("so small beside the noise" in said) == (why == "small") and ("imitate each other so" in said) == (
+        why == "alike"
+    )
     assert f"{answer.rounded(size)} mm is link flexure" in said
 
 

@@ -9,6 +9,7 @@ import pytest
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect
 from rrru.errors import ConfigError, FitError
+from rrru.gap import diagnose as diagnose_module
 from rrru.gap.settings import GapSettings
 from rrru.parameters import Parameter, ParameterSet
 from rrru.robots.legs import WORLD
@@ -313,3 +314,10 @@ def test_a_time_constant_between_those_of_the_grid_is_fitted(time_constant):
     assert numbers["time_constant"] == pytest.approx(time_constant, rel=0.1) and numbers["strain"] == pytest.approx(
         8e-4, rel=0.05
     )
+
+
+def test_a_note_that_has_a_semicolon_stays_one_note():
+    assert diagnose_module._joined(["9 of 10 points used; left out: 1 stale reading", "b"]).split("; ") == [
+        "9 of 10 points used, left out: 1 stale reading",
+        "b",
+    ]

@@ -190,7 +190,9 @@ def _table(
     if outlier.any():
         where = ", ".join(f"row {row}" for row in frame.index[outlier][:10])
         more = ", ..." if outlier.sum() > 10 else ""
-        notes.append(f"{outlier.sum()} points marked as outliers, kept and left out of fits: {where}{more}")
+        count = int(outlier.sum())
+        points = "1 point marked as outlier" if count == 1 else f"{count} points marked as outliers"
+        notes.append(f"{points}, kept and left out of fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
     optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
     extra = [name for name in (*optional, "motion", "motion_between") if name in frame]

@@ -84,7 +84,7 @@ _READ = {
     "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
-    "points are outliers": r"(?P<count>\d+) points marked as outliers, .*",
+    "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",
     "beyond a range": r"(?P<count>\d+) of (?P<rows>\d+) points are outside of the range of .*",
