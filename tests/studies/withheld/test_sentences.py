@@ -9,9 +9,9 @@ from rrru.studies.withheld.sentences.claims import UNKNOWN, Claim
 from rrru.studies.withheld.sentences.truth import Truth
 
 _EFFECT = {"name": "backlash", "place": "at q2", "share": 0.8}
-_FACTS = {"effects": [_EFFECT], "unexplained": False, "probability": 0.97, "notes": []}
-_NONE = {"effects": [], "unexplained": False, "probability": 0.97, "notes": []}
-_OUTSIDE = {"effects": [], "unexplained": True, "probability": 0.97, "notes": []}
+_FACTS = {"effects": [_EFFECT], "unexplained": False, "probability": 0.97, "notes": [], "corrected_file": None}
+_NONE = {"effects": [], "unexplained": False, "probability": 0.97, "notes": [], "corrected_file": None}
+_OUTSIDE = {"effects": [], "unexplained": True, "probability": 0.97, "notes": [], "corrected_file": None}
 _GRID = np.stack(np.meshgrid(*[np.arange(5.0)] * 3), axis=-1).reshape(-1, 3)
 
 
@@ -58,6 +58,7 @@ _SHARE = 1.0 - 0.035**2 / 375.0 / 0.3**2
 _BUDGET = {"part": "backlash", "kind": "effect"}
 _OF_DQ1 = {"effect": "calibration", "parameter": "dq1"}
 _SIZE = {"effect": "backlash", "parameter": "width2"}
+_SIZES = {"amplitude3": 1.76e-4, "phase3": -0.59, "phase4": -0.59, "phase1": 0.1}
 # kind, what is said, what is different in truth, facts of the page: once true, once false
 _CASES = [
     ("the robot still misses by", ({"value": "0.31"}, {}, _FACTS), ({"value": "12"}, {}, _FACTS)),
@@ -65,6 +66,7 @@ _CASES = [
     ("a cause with a share", ({"name": "backlash"}, {}, _FACTS), ({"name": "servo lag"}, {}, _FACTS)),
     ("a cause with a size", ({"name": "backlash"}, {}, _FACTS), ({"name": "backlash"}, _UNKNOWN, _FACTS)),
     ("a cause without a share", ({"name": "backlash"}, {}, _FACTS), ({"name": "axis tilt"}, {}, _FACTS)),
+    ("the corrected file is worse", ({}, {"file_mm": 0.59}, _FACTS), ({}, {}, _FACTS)),
     ("shares cannot be told", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
     (
         "shares overlap",
@@ -82,8 +84,8 @@ _CASES = [
     ("next, nothing more", ({}, {}, _FACTS), ({}, _UNKNOWN, _FACTS)),
     (
         "a zero is off",
-        ({"site": "q1", "value": "0.571", "error": "0.002", "unit": "degrees"}, {}, _FACTS),
-        ({"site": "q2", "value": "0.527", "error": "0.0045", "unit": "degrees"}, {}, _FACTS),
+        ({"site": "q1", "value": "0.571", "low": "0.567", "high": "0.575", "unit": "degrees"}, {}, _FACTS),
+        ({"site": "q2", "value": "0.527", "low": "0.518", "high": "0.536", "unit": "degrees"}, {}, _FACTS),
     ),
     (
         "zeros are lost",
@@ -132,8 +134,8 @@ _CASES = [
     ),
     (
         "size of a cause",
-        (_SIZE | {"value": "0.00098", "error": "0.00001"}, {}, _FACTS),
-        (_SIZE | {"value": "0.0011", "error": "0.00001"}, {}, _FACTS),
+        (_SIZE | {"value": 0.00098, "low_95": 0.00096, "high_95": 0.001}, {}, _FACTS),
+        (_SIZE | {"value": 0.0011, "low_95": 0.00108, "high_95": 0.00112}, {}, _FACTS),
     ),
     (
         "share of a cause",
@@ -211,12 +213,20 @@ _CASES = [
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
+    *("the effects imitate each other", "a zero cannot be told", "a zero is not determined", "a weight cannot be told"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }
 # kinds that are true, or false, of every robot that is drawn
 _ALWAYS = {"no commanded positions": True} | dict.fromkeys(
     [
-        *("the weight is not as told", "the noise is smaller", "points are outliers", "stale readings"),
+        *(
+            "no cause is named",
+            "what to check",
+            "the weight is not as told",
+            "the noise is smaller",
+            "points are outliers",
+            "stale readings",
+        ),
         *("undeclared columns", "beyond a range", "rows may be shifted", "not this reflector", "far from the commands"),
     ],
     False,
@@ -239,7 +249,7 @@ def test_no_kind_is_without_a_judge():
 
 
 def test_phases_may_have_gone_round():
-    told = {"effect": "encoder eccentricity", "parameter": "phase1", "value": "3.1", "error": "0.05"}
+    told = {"effect": "encoder_eccentricity", "parameter": "phase1", "value": 3.1, "low_95": 3.0, "high_95": 3.2}
     eccentric = {"effects": frozenset(["encoder_eccentricity"]), "numbers": {"encoder_eccentricity": {"phase1": -3.12}}}
     assert judge.judge(Claim("size of a cause", "", told), _truth(**eccentric), _FACTS) is True
     ends = {"effect": "encoder_eccentricity", "parameter": "phase1", "ends": (3.0, 3.2)}
@@ -254,21 +264,33 @@ def _page(sentences=(), notes=(), read=()):
 
 def test_sentences_are_told_apart():
     cause = (
-        "74 % of that is encoder eccentricity at q3 (amplitude3 = 0.000176 ± 0.000014 rad, phase3 = phase4 = -0.59 ± "
-        "0.10 rad): the encoder's disc sits off its shaft's centre."
+        "74 % of that (95 %: 60 % to 80 %) is encoder eccentricity at q3, amplitude3 = 0.000176 rad (95 %: 0.000148 "
+        "to 0.000204), phase3 = phase4 = -0.59 rad (95 %: -0.79 to -0.39): the encoder's disc sits off its shaft's "
+        "centre. It is largest for q3 at 30.0 degrees: 0.0002 rad (95 %: 0.0001 to 0.0003) off its mean over the "
+        "measured range."
     )
     said = _page([cause, "These data cannot rule out: screw growth, that nothing acts.", "Nobody ever said this."])
     kinds = [claim.kind for claim in said]
     assert kinds == [
-        *("a cause with a share", "place of a cause", "size of a cause", "size of a cause", "size of a cause"),
-        *("share of a cause", "these data cannot rule out", "a rival", "a rival", UNKNOWN),
+        *("a cause with a share", "place of a cause", "share of a cause"),
+        *("these data cannot rule out", "a rival", "a rival", UNKNOWN),
     ]
-    first, second = said[2].told, said[4].told
-    assert (first["parameter"], first["value"], first["error"]) == ("amplitude3", "0.000176", "0.000014")
-    assert (second["parameter"], second["value"], second["effect"]) == ("phase4", "-0.59", "encoder eccentricity")
-    zero = _page(notes=["joint 7: zero is off by 0.527 +- 0.0045 degrees", "q7: zero is off by -0.5 mm"])
-    assert [claim.told["site"] for claim in zero] == ["joint 7", "q7"]
-    assert {claim.kind for claim in zero} == {"a zero is off"} and zero[1].told["unit"] == "mm"
+    assert said[1].told["place"] == " at q3" and said[2].told["share"] == "74"
+    found = [{"parameter": name, "value": size, "low_95": size, "high_95": size} for name, size in _SIZES.items()]
+    sizes = claims._sizes_in(cause, {"effects": [{"name": "encoder_eccentricity", "parameters": found}]})
+    assert [claim.told["parameter"] for claim in sizes] == ["amplitude3", "phase3", "phase4"]
+    assert {claim.told["effect"] for claim in sizes} == {"encoder_eccentricity"}
+    zero = _page(
+        notes=[
+            "joint 7: zero is off by 0.527 degrees (95 %: 0.518 to 0.536)",
+            "q7: zero is off by -0.50 mm (95 %: -0.52 to -0.48)",
+            "q6: zero and the place of the target cannot be told apart, together they are a zero off by 1.0 degrees "
+            "(95 %: 0.9 to 1.1)",
+        ]
+    )
+    assert [claim.told["site"] for claim in zero] == ["joint 7", "q7", "q6"]
+    assert [claim.kind for claim in zero] == ["a zero is off", "a zero is off", "a zero cannot be told"]
+    assert zero[1].told["unit"] == "mm" and zero[1].told["high"] == "-0.48"
 
 
 def test_a_chains_loads_are_those_of_mujoco():

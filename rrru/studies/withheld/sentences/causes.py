@@ -1,7 +1,8 @@
 """Causes that act in the own robots, by formulas of their own. Lengths mm, angles rad, N, kg, s.
 
 Each changes where the drives stand, or how the instrument stands, at stops that are reached one after the other in the
-drives. The names of those that the library of the diagnosis holds are its own, `scale_step` has none there.
+drives. The names of those that the library of the diagnosis holds are its own; a step of a scale is an error over the
+drive's value as a local one is.
 """
 
 from dataclasses import dataclass, field, replace
@@ -32,6 +33,11 @@ class Cause:
         """Number from 1 on of the one drive at which it acts, 0 for several or none."""
         (acting,) = np.nonzero(self.sizes)
         return int(acting[0]) + 1 if len(acting) == 1 and self.name != "base_drift" else 0
+
+    @property
+    def effect(self):
+        """Name of what the diagnosis should find."""
+        return "drive_error_function" if self.name == "scale_step" else self.name
 
     def scaled(self, factor):
         """The same cause, so many times as large."""

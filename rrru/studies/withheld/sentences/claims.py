@@ -13,6 +13,15 @@ UNKNOWN = "unknown kind"
 _NUMBER = r"-?\d+\.?\d*(?:e[+-]?\d+)?"
 _X = rf"(?P<value>{_NUMBER})"
 _Y = rf"(?P<other>{_NUMBER})"
+# a number with its unit, and its 95 % interval
+_ENDS = r" \(95 %: [^)]*\)"
+_SIZED = rf"{_X}(?: [^\s(]+)?(?P<ends>{_ENDS})"
+_SHARE = rf"(?P<share>{_NUMBER}) %(?: of that)?(?:{_ENDS})?"
+# what is said of a cause after its share or size
+_CAUSE = (
+    r"(?P<name>[a-z ]+?)(?P<place> (?:in leg \d+|at [^,:]+?))?"
+    rf"(?P<sizes>, (?:\d+ numbers|[^,(]+{_ENDS}(?:, [^,(]+{_ENDS})*))?(?:: .*)?\."
+)
 _P = rf"(?P<probability>more than 0\.99|less than 0\.01|{_NUMBER})"
 
 
@@ -30,18 +39,19 @@ _SENTENCES = {
     "the robot still misses by": rf"After calibration the robot still misses by {_X} mm at points left out of it .*",
     "nothing systematic is left": rf"After calibration nothing systematic is left .*\(probability {_P}\): the robot "
     rf"misses by {_X} mm, the measuring noise is {_Y} mm\.",
-    "a cause with a share": rf"(?P<share>{_NUMBER}) %(?: of that)? is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?"
-    r"(?: \((?P<sizes>[^)]*)\))?(?:: .*)?\.",
-    "a cause with a size": rf"{_X} mm is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?(?: \((?P<sizes>[^)]*)\))?"
-    r"(?:: .*)?\.",
-    "a cause without a share": r"Also there is (?P<name>[a-z ]+?)(?P<place> (?:at|in leg) \S+)?"
-    r"(?: \((?P<sizes>[^)]*)\))?(?:: .*)?\.",
-    "shares cannot be told": r"The gap is so small beside the noise that its shares cannot be told\.",
+    "no cause is named": r"No cause is named: .*\.",
+    "what to check": r"Next: check units, signs and order of the drives, .*",
+    "the corrected file is worse": r"The corrected file misses the readings by .*",
+    "a cause with a share": rf"{_SHARE} is {_CAUSE}",
+    "a cause with a size": rf"{_X} mm is {_CAUSE}",
+    "a cause without a share": rf"Also there is {_CAUSE}",
+    "shares cannot be told": r"The gap is so small beside the noise that shares of the gap cannot be told\.",
+    "the effects imitate each other": r"The effects imitate each other so much that shares of the gap cannot be told\.",
     "shares overlap": r"These shares overlap.*",
     "something is unexplained": rf"(?:Beside that|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
     "probability of this answer": rf"Probability of this answer: {_P}\.",
-    "it does not repeat": rf"(?:(?P<share>{_NUMBER}) %|Some of it) does not repeat from pass to pass.*",
-    "it is random error": rf"(?:(?P<share>{_NUMBER}) %|Some of it) is random error above the stated noise.*",
+    "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
+    "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
     "what is left with it": rf"Add (?:it|them) to the simulator and {_X} mm is left on runs .*; the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of it could be): (?P<names>.*)\.",
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That decides (?P<contest>.*)\.",
@@ -51,11 +61,15 @@ _SENTENCES = {
 }
 # kinds of notes of the diagnosis and of what a corrected file cannot hold
 _NOTES = {
-    "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X}(?: \+- (?P<error>{_NUMBER}))? (?P<unit>degrees|mm)",
+    "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X} (?P<unit>degrees|mm) "
+    rf"\(95 %: (?P<low>{_NUMBER}) to (?P<high>{_NUMBER})\)",
+    "a zero cannot be told": r"(?P<site>[^:]+): zero and .* cannot be told apart, together they are a zero off by .*",
+    "a zero is not determined": r"(?P<site>[^:]+): zero is not determined beside other numbers .*",
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
-    "the weight is not as told": rf"weight not as told: {_X} \+- (?P<error>{_NUMBER}) (?P<unit>kg|rad) .*",
+    "the weight is not as told": rf"weight not as told: {_X} (?P<unit>kg|rad){_ENDS} .*",
+    "a weight cannot be told": r"(?:a mass at the platform|a lean of the base about \w) and what gives way cannot .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
-    "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:; .*)?",
+    "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:, .*)?",
     "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
     "fitted without some points": r"(?P<names>[\w, ]+) fitted without (?P<lacking>\d+) of (?P<used>\d+) points, .*",
     "the noise is larger": rf"noise stated {_X} mm per axis, found {_Y}: the (?:robot does not|instrument is worse).*",
@@ -98,7 +112,7 @@ def claims(page):
     """Every Claim of a Page."""
     facts, result = page.facts, []
     for text in facts["sentences"]:
-        result += _of_text(text, _SENTENCES)
+        result += [*_of_text(text, _SENTENCES), *_sizes_in(text, facts)]
     for text in [*facts["notes"], *page.not_in_model]:
         result += _of_text(text, _NOTES)
     for text in page.read:
@@ -120,13 +134,6 @@ def _inside(text, told):
     result = []
     if "place" in told and "name" in told and "," not in told["place"]:
         result.append(Claim("place of a cause", text, told))
-    if "sizes" in told:
-        pattern = rf"(?P<names>\w+(?: = \w+)*) = {_X} ± (?P<error>{_NUMBER})"
-        for found in re.finditer(pattern, told["sizes"]):
-            result += [
-                Claim("size of a cause", text, {"effect": told["name"], "parameter": name, **found.groupdict()})
-                for name in found["names"].split(" = ")
-            ]
     if "share" in told and "name" in told:
         result.append(Claim("share of a cause", text, told))
     if "probability" in told:
@@ -135,6 +142,19 @@ def _inside(text, told):
         result += [Claim("a rival", text, {"name": name}) for name in told["names"].split(", ")]
     if "other" in told and "noise is" in text:
         result.append(Claim("the measuring noise", text, {"value": told["other"]}))
+    return result
+
+
+def _sizes_in(text, facts):
+    """Claims of the numbers of a cause that a sentence holds, as the facts have them: it writes them in other units."""
+    result = []
+    for effect in facts["effects"]:
+        if f" is {effect['name'].replace('_', ' ')}" not in text:
+            continue
+        for one in effect["parameters"]:
+            if re.search(rf"\b{re.escape(one['parameter'])} = ", text):
+                told = {key: one[key] for key in ("parameter", "value", "low_95", "high_95")}
+                result.append(Claim("size of a cause", text, told | {"effect": effect["name"]}))
     return result
 
 

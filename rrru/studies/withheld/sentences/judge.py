@@ -9,6 +9,7 @@ import re
 
 import numpy as np
 
+from rrru.estimation.intervals import QUANTILE_95
 from rrru.studies.withheld.sentences.claims import UNKNOWN
 
 # of a size without an interval, of its mean square; of shares; standard errors
@@ -110,14 +111,24 @@ def _share_of_cause(told, truth, _facts):
 
 
 def _size_of_cause(told, truth, _facts):
-    """A number of a cause that is said with its standard error."""
+    """A number of a cause: within three standard errors by the width of its interval."""
     true = truth.numbers.get(told["effect"].replace(" ", "_"), {}).get(told["parameter"])
     if true is None:
         return False if told["effect"].replace(" ", "_") not in truth.effects else None
     off = float(told["value"]) - true
     if told["parameter"].startswith("phase"):
         off = (off + np.pi) % (2.0 * np.pi) - np.pi
-    return abs(off) <= _ERRORS * float(told["error"])
+    return abs(off) <= _ERRORS * _error(told["low_95"], told["high_95"])
+
+
+def _error(low, high):
+    """The standard error of a normal distribution with an interval of 95 %."""
+    return (float(high) - float(low)) / (2.0 * QUANTILE_95)
+
+
+def _misfit(_told, _truth, _facts):
+    """These files and robots belong together."""
+    return False
 
 
 def _shares_not_told(_told, truth, _facts):
@@ -160,9 +171,10 @@ def _zero(told, truth, _facts):
         return None
     scale = np.degrees(1.0) if told["unit"] == "degrees" else 1.0
     off = abs(float(told["value"]) - scale * truth.zeros[told["site"]])
-    # a zero without an error is good to the digits that are printed
-    error = float(told.get("error", 0.01 * abs(float(told["value"]))))
-    return off <= _ERRORS * error + scale * _OF_LINKS[{"degrees": "rad"}.get(told["unit"], "mm")]
+    return (
+        off
+        <= _ERRORS * _error(told["low"], told["high"]) + scale * _OF_LINKS[{"degrees": "rad"}.get(told["unit"], "mm")]
+    )
 
 
 def _zeros_lost(told, truth, _facts):
@@ -314,7 +326,8 @@ def _as_good(_told, truth, facts):
         return None
     if truth.file_mm <= _AS_GOOD * truth.after_mm:
         return True
-    return any(note.startswith("the corrected file leaves") for note in facts["notes"])
+    file = facts["corrected_file"]
+    return bool(file and (file["remainder"] or file["headline"]))
 
 
 def _not_worse(_told, truth, _facts):
@@ -389,7 +402,11 @@ _JUDGES = {
     "a cause with a share": _cause,
     "a cause with a size": _cause,
     "a cause without a share": _cause,
+    "no cause is named": _misfit,
+    "what to check": _misfit,
+    "the corrected file is worse": lambda told, t, _: t.file_mm > _AS_GOOD * t.after_mm,
     "shares cannot be told": _shares_not_told,
+    "the effects imitate each other": _undecided,
     "shares overlap": _overlap,
     "something is unexplained": _unexplained,
     "probability of this answer": _probability,
@@ -402,6 +419,9 @@ _JUDGES = {
     "next, nothing more": _next_nothing,
     "next, nothing would settle it": _undecided,
     "a zero is off": _zero,
+    "a zero cannot be told": _undecided,
+    "a zero is not determined": _undecided,
+    "a weight cannot be told": _undecided,
     "without it a number would be off": lambda told, t, _: told["name"] in t.effects,
     "the weight is not as told": _weight,
     "the fit did not converge": _undecided,

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from rrru.campaign.ingest.campaign_file import Ingested, ingest
 from rrru.campaign.ingest.spec import IngestSpec
-from rrru.gap.answer import answer, arm_drives
+from rrru.gap.answer import answer
 from rrru.gap.corrected_model import write_corrected
 from rrru.gap.diagnose import Diagnosis, MeasuredRobot, diagnose
+from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.studies import campaigns, setup
 from rrru.studies import config as parts
@@ -65,7 +66,7 @@ def run(name, section, robot_section, settings):
     kind = "urdf" if "urdf" in robot_section else "mjcf"
     file = Path(robot_section[kind]).with_name(_CORRECTED[kind])
     result = write_corrected(result, robot_section, masses, file)
-    facts = answer(name, result.verdict, result.tables, arm_drives(known))
+    facts = answer(name, result.verdict, result.tables, drive_words(known))
     lost = tuple(text for text in result.verdict["not_in_model"].split("; ") if text)
     page = Page(facts, result.tables, tuple(ingested.notes), lost, file)
     return Run(page, result, masses, ingested, section.get("noise_mm"))

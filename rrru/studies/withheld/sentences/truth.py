@@ -94,7 +94,7 @@ def truth_of(draw, run, folder, gap):
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
     geometry, without = _calibrated(free[~fresh], run)
     _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
-    seen, name = before[~fresh], draw.cause.name if draw.cause else None
+    seen, name = before[~fresh], draw.cause.effect if draw.cause else None
     held = name in library
     noise_rms, chosen = float(np.sqrt(3.0) * draw.noise_mm), np.repeat(~draw.stops.fresh, len(draw.targets))
     told = Truth(
