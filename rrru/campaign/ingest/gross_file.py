@@ -30,6 +30,8 @@ _MOST_ROWS, _MOST_SCREENED = 120, 40
 _LEAST_POSED = 0.9
 # readings farther off than so many medians are spoilt, and do not count
 _SPOILT = 6.0
+# mean square by which an axis of the body has to turn for a shift along it to be told from one of the instrument
+_LEAST_TURNED = 1e-5
 # independent errors of a robot whose model has few parameters: its joints have more; assumed
 _LEAST_INDEPENDENT = 15
 # a target that is nearer to its stated place than the first share of the robot's size is not grossly wrong, one that
@@ -160,17 +162,29 @@ class GrossFile:
             found = register_targets(readings, mistakes.mirrored)
         except FitError:
             return impossible
-        moved = np.linalg.norm((found.place_mm - self.place_mm)[self._stated], axis=1).max(initial=0.0)
+        place = self._near_stated(found.place_mm, readings.body_turn) if mistakes.free else found.place_mm
+        moved = np.linalg.norm((place - self.place_mm)[self._stated], axis=1).max(initial=0.0)
         size = self.robot.size_mm
         if mistakes.free and not _NEAREST_SHARE * size < moved < _FARTHEST_SHARE * size:
             return impossible
-        off = np.linalg.norm(found.residual_mm, axis=1)
-        rms = float(np.sqrt((off[off <= _SPOILT * np.median(off)] ** 2).mean()))
+        rms = _usual_rms(np.linalg.norm(found.residual_mm, axis=1), readings.target)
         # of what is seen and of what moves it, so that nothing wins by making one of them small
         share = rms / min(self._spread(readings), _spread(readings.measured_mm))
         return Hypothesis(
-            mistakes, rms, found.place_mm, found.rotation, self._log_evidence(mistakes, share, len(readings.target))
+            mistakes, rms, place, found.rotation, self._log_evidence(mistakes, share, len(readings.target))
         )
+
+    def _near_stated(self, place_mm: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """Places (k, 3) moved to the stated ones along axes that turns (n, 3, 3) leave where they are.
+
+        Along these a shift of all targets is one of the instrument, as along z for a robot that turns about z only.
+        """
+        if not self._stated.any():
+            return place_mm
+        off = turn - turn.mean(axis=0)
+        sizes, axes = np.linalg.eigh(np.einsum("nji,njk->ik", off, off) / len(turn))
+        still = axes[:, sizes < _LEAST_TURNED]
+        return place_mm + still @ still.T @ np.median((self.place_mm - place_mm)[self._stated], axis=0)
 
     def with_zeros(self) -> Hypothesis:
         """The Hypothesis of no mistake, with the lost zeros of the drives found that explain most."""
@@ -328,6 +342,13 @@ def _labels(frame: pd.DataFrame) -> np.ndarray:
 def _factor(units: Mapping[str, float], right: str | None, stated: str) -> float:
     """What brings numbers that were read in a stated unit to the right one, if that is another."""
     return units[right or stated] / units[stated]
+
+
+def _usual_rms(off: np.ndarray, target: np.ndarray) -> float:
+    """Rms of distances (n,) without spoilt readings, which are far off beside others of their target (n,)."""
+    _, number = np.unique(target, return_inverse=True)
+    medians = np.array([np.median(off[number == k]) for k in range(number.max() + 1)])
+    return float(np.sqrt((off[off <= _SPOILT * medians[number]] ** 2).mean()))
 
 
 def _spread(position: np.ndarray) -> float:

@@ -15,6 +15,7 @@ from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.spec import MM
 from rrru.errors import ConfigError, IngestError
 from rrru.robots.catalogue import make_mechanism
+from rrru.robots.from_dh import from_dh
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.test_lost_zeros import _arm, _hexapod
 from tests.robots import two_arms
@@ -76,6 +77,38 @@ def test_a_wrong_place_of_the_target_is_named_with_the_right_one(seed):
     assert found.advice.startswith("targets: {ball: [")
     place = [float(text) for text in found.advice.removeprefix("targets: {ball: [").removesuffix("]}").split(",")]
     np.testing.assert_allclose(place, _PLACE_MM, atol=3.0)
+
+
+def _scara(generator):
+    """A SCARA, its drive values and positions: it turns about z only."""
+    links = [{"a_mm": 400, "range_deg": [-120, 120]}, {"a_mm": 300, "alpha_deg": 180, "range_deg": [-130, 130]}]
+    wrist = [{"sliding": True, "range_mm": [0, 200]}, {"d_mm": 50, "range_deg": [-170, 170]}]
+    robot = from_dh([*links, *wrist], name="scara", parameter_set="full")
+    low, high = np.asarray(robot.drive_range).T
+    driven = low + (high - low) * generator.random((60, 4))
+    return robot, driven, robot.guess(driven)
+
+
+@pytest.mark.parametrize("kind", [_arm, _scara])
+def test_one_wrong_place_of_three_is_named_and_the_others_stay(kind):
+    """Of a robot that turns about z only, too, whose readings do not tell the heights of all together."""
+    generator = np.random.default_rng(11)
+    places = {"a": (60.0, 0.0, 40.0), "b": (-50.0, 60.0, 40.0), "c": (-40.0, -70.0, 60.0)}
+    robot, driven, position = kind(generator)
+    poses, turn = robot.solve(driven, position), Rotation.random(random_state=generator)
+    told = dict(zip(robot.parts.columns, driven.T, strict=True))
+    frames = []
+    for name, place in places.items():
+        seen = turn.apply(poses.point(np.array(place))) + np.array([900.0, -300.0, 200.0])
+        seen = seen + _NOISE_MM * generator.standard_normal(seen.shape)
+        frames.append(pd.DataFrame(told | rows.vector_columns("measured", seen)).assign(target=name))
+    frame = pd.concat(frames, ignore_index=True).assign(trajectory="poses")
+    assert find_gross_error(frame, replace(_SPEC, targets=places), robot) is None
+    wrong = places | {"b": (-10.0, 60.0, 40.0)}
+    found = find_gross_error(frame, replace(_SPEC, targets=wrong), robot)
+    for name, place in places.items():
+        text = re.search(rf"{name}: \[([^]]*)\]", found.advice)[1]
+        np.testing.assert_allclose([float(number) for number in text.split(",")], place, atol=1.0)
 
 
 def test_two_mistakes_at_once_are_named():
