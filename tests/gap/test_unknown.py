@@ -73,10 +73,12 @@ def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():
     assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place"}
 
 
-def test_a_tracker_that_drifts_is_unexplained_and_said_to_follow_the_time():
+def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_time():
     frame = measure()
-    frame["measured_z_mm"] += 2e-4 * frame["time_s"]
-    frame["measured_x_mm"] -= 1e-4 * frame["time_s"]
+    # from -1 to 1
+    passed = 2.0 * frame["time_s"] / frame["time_s"].max() - 1.0
+    frame["measured_z_mm"] += 0.15 * passed**2
+    frame["measured_x_mm"] -= 0.08 * (4.0 * passed**3 - 3.0 * passed)
     found = diagnosed(frame, details=True)
     assert found.verdict["effects"] == "unexplained"
     notes = found.tables["gap_attribute"].set_index("effect")["note"]

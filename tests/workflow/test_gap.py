@@ -35,11 +35,12 @@ def test_an_effect_of_ones_own_takes_part_and_editing_it_reruns_the_diagnosis(tm
     """A measured campaign that the library cannot explain is explained by ten lines of a user's."""
     (tmp_path / "drift.py").write_text(_DRIFT)
     campaign = "campaigns: {mine: {robot: rrru3, ingest: data/field_05.csv, noise_mm: 0.02}}\n"
+    few = "effects: [backlash, drive_compliance, thermal_growth]"
     target = "results/campaigns/mine/gap_verdicts.parquet"
-    code, output = _run(tmp_path, campaign, target)
+    code, output = _run(tmp_path, campaign + f"gap: {{{few}}}\n", target)
     assert code == 0, output
     assert "unexplained" in pd.read_parquet(tmp_path / target)["effects"].iloc[0]
-    own = campaign + 'gap: {own_effects: ["drift:Drift"]}\n'
+    own = campaign + f'gap: {{{few}, own_effects: ["drift:Drift"]}}\n'
     code, output = _run(tmp_path, own, target)
     assert code == 0, output
     verdict = pd.read_parquet(tmp_path / target).iloc[0]

@@ -110,7 +110,7 @@ def test_a_refused_file_says_where_and_leaves_nothing(tmp_path):
     code, output = run(tmp_path, "build/minimal/campaigns/bad/measurements.parquet", overlays=(MINIMAL, "bad.yaml"))
     assert code != 0
     assert (
-        "bad.csv, row 17, column measured_y_mm: got 'oops'" in output
+        "bad.csv, row 18, column measured_y_mm: got 'oops'" in output
         and "Traceback" not in output.split("IngestError")[-1]
     )
     assert not list((tmp_path / "build").rglob("*.parquet")) and not list((tmp_path / "build").rglob("*.partial"))

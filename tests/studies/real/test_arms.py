@@ -109,7 +109,7 @@ def test_orientations_have_to_fit_the_positions(tmp_path):
 
 
 def test_wrong_units_and_rows_that_come_twice_are_refused_by_the_files_names(tmp_path):
-    _refused(tmp_path, r"log_x\.csv, .*registration", error=IngestError, joint_unit="rad")
+    _refused(tmp_path, r"log_x\.csv, .*angle_unit: deg", error=IngestError, joint_unit="rad")
     raw = simulated_arm.log(30)
     # a few would be stale readings, which are left out
     for row in (7, 9, 11, 13):
