@@ -177,7 +177,7 @@ rule withheld_statements:
     params:
         settings=lambda wildcards: {
             "chunk": STATEMENTS[wildcards.chunk],
-            **reads("seed", "gap", "loads", "calibration.singularity_margin"),
+            **reads("seed", "gap", "calibration.singularity_margin"),
             **reads("withheld.sentences.stops", "withheld.sentences.mujoco_share"),
         },
         own_effects=own_effects_digests(),

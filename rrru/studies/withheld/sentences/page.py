@@ -53,14 +53,14 @@ def read(section, robot_section):
 def run(name, section, robot_section, settings):
     """The Run of a campaign's section.
 
-    settings: `gap`, a GapSettings; `margin`, of singularities; `loads`. Raises what the workflow ends with.
+    settings: `gap`, a GapSettings; `margin`, of singularities. Raises what the workflow ends with.
     """
     nominal = nominal_part(section, robot_section)
     ingested, gap = read(section, robot_section), settings["gap"]
     robot = setup.mechanism(nominal)
     measurements, _ = campaigns.with_singularities(robot, ingested.measurements, settings["margin"])
     known = setup.measured_robot(nominal, measurements)
-    masses = Masses(**parts.masses({"loads": settings["loads"], "robots": {"own": robot_section}}, section))
+    masses = Masses(**parts.masses({"loads": {}, "robots": {"own": robot_section}}, section))
     told = MeasuredRobot(known, masses, section.get("noise_mm"), name, section.get("noise_rad"))
     result = diagnose(measurements, told, gap)
     kind = "urdf" if "urdf" in robot_section else "mjcf"

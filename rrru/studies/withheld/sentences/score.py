@@ -24,7 +24,7 @@ COLUMNS = ["check", "robot", "truth", "statement", "kind", "text", "result"]
 
 
 def statements(check, numbers, settings):
-    """Rows of `withheld_statements` of a check's numbers; settings: gap, margin, loads, seed, stops, mujoco_share."""
+    """Rows of `withheld_statements` of a check's numbers; settings: gap, margin, seed, stops, mujoco_share."""
     made = {PAGES: _of_page, MISTAKES: _of_mistake, RIGHT: _of_right_file}[check]
     rows = []
     for number in numbers:
@@ -128,6 +128,4 @@ def settings_of(settings):
     told = settings["withheld"]["sentences"]
     gap = GapSettings.from_config(settings["gap"], settings["seed"])
     own = {"gap": gap, "margin": settings["calibration"]["singularity_margin"]}
-    return (
-        own | {key: settings[key] for key in ("loads", "seed")} | {key: told[key] for key in ("stops", "mujoco_share")}
-    )
+    return own | {"seed": settings["seed"]} | {key: told[key] for key in ("stops", "mujoco_share")}
