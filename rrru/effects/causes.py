@@ -59,9 +59,9 @@ CAUSES = {
     ),
     "drive_compliance": Cause(
         {
-            TURNING: "between motor and {moved} the drive gives way to the torque of the loads",
-            SLIDING: "between motor and slide the drive gives way to the force of the loads",
-            LENGTH: "the leg and its drive give way along the leg to the force of the loads",
+            TURNING: "between motor and {moved} the drive deflects under the torque of the loads",
+            SLIDING: "between motor and slide the drive deflects under the force of the loads",
+            LENGTH: "the leg and its drive deflect along the leg under the force of the loads",
         },
         {
             TURNING: "Hold the motor, load the {moved} with a known weight and read how far it turns: gearbox, "
@@ -72,12 +72,12 @@ CAUSES = {
             "nut, thrust bearing, ball joints; of a cable its cross-section.",
         },
         "Check payload, centre of mass and tool mass in the controller's payload table; correct the commands for the "
-        "load with the compliance found, or stiffen the part that gives way.",
+        "load with the compliance found, or stiffen the compliant part.",
         f"{_ISO_9283}, static compliance; Nubiola and Bonev, Robotics and Computer-Integrated Manufacturing 29, 2013 "
         "(joint compliances identified with a laser tracker)",
     ),
     "link_flexure": Cause(
-        "links that push a platform give way along their length, links and bearings of an arm across its joints",
+        "links that push a platform deflect along their length, links and bearings of an arm across its joints",
         "Load the platform with a known weight and read where it sinks: clamps and glued ends of the links, bearings "
         "of the joints, cracks, loose screws.",
         "Tighten or stiffen the link or its bearing; check the mass of tool and payload in the payload table; correct "
@@ -218,7 +218,7 @@ CAUSES = {
         "accuracy",
     ),
     "read_before_rest": Cause(
-        "the drives were read, or told, before the arm stood still; the point was measured when it did",
+        "the drives were read before the arm stood still, the point was measured when it did",
         "Look at the position after a move over time: how long until it stays within the noise? Compare the instants "
         "of both readings.",
         "Wait longer at each stop before anything is read, and read drives and instrument at one time.",
@@ -280,7 +280,7 @@ CAUSES = {
         f"{_ISO_9283}, drift of pose characteristics; {_THERMAL}, environmental temperature variation",
     ),
     "pedestal_compliance": Cause(
-        "what the robot stands on gives way to the moment of its weight",
+        "the robot's pedestal deflects under the moment of its weight",
         "Put a level or a target on the robot's foot and stretch the robot out to all sides: bolts, levelling feet, "
         "table, floor plate.",
         "Tighten or stiffen what the robot stands on, or fix the reference marks to the robot's foot.",

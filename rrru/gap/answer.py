@@ -180,8 +180,8 @@ def _causes(facts):
     said = [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(facts["effects"])]
     if not told and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
-        why = "The gap is so small beside the noise" if small else "The effects imitate each other so much"
-        said.append(f"{why} that shares of the gap cannot be told.")
+        why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
+        said.append(f"{why}: their shares of the gap cannot be determined.")
     elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
         said.append("These shares overlap, since the effects imitate each other in part.")
     if facts["unexplained"]:

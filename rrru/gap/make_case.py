@@ -75,7 +75,7 @@ def _tested(library, motion, used, told):
         if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
             coarser = effect.coarser(OPTIONS.max_coefficients_per_number * told) if effect.coarser else None
             if coarser is None:
-                untestable[name] = f"has {len(effect.coordinates)} numbers, too many for the {told} that were told"
+                untestable[name] = f"has {len(effect.coordinates)} coefficients, too many for {told} measured numbers"
                 continue
             effect = coarser
         lacking = _lacking(effect, motion, used)

@@ -32,9 +32,10 @@ def zero_notes(estimate, robot):
         unit, scale = ("degrees", np.degrees(1.0)) if drive.unit == "rad" else ("mm", 1.0)
         size = _sized(scale * value, scale * estimate.intervals[number], unit)
         if others := _one_with(robot, name, LARGE[drive.unit]):
-            yield f"{drive.site}: zero and {others} cannot be told apart, together they are a zero off by {size}"
+            both = f"{drive.site}: zero and {others} are not separately identifiable"
+            yield f"{both}, combined they equal a zero offset of {size}"
         elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
-            yield f"{drive.site}: zero is not determined beside other numbers of the robot, most probable is {size}"
+            yield f"{drive.site}: zero is not determined by the readings, its most probable offset is {size}"
         else:
             yield f"{drive.site}: zero is off by {size}"
 
@@ -47,12 +48,12 @@ def _sized(value, ends, unit):
 
 
 def _one_with(robot, zero, least):
-    """What a zero cannot be told apart from, in words: what makes `least` of it where it is off as far as it may be."""
+    """What a zero is confounded with, in words: what imitates an offset of `least` where it has its usual error."""
     usual = {"mm": OPTIONS.outside_error_mm, "rad": OPTIONS.outside_error_rad}
     on_platform = "the place of the target" if robot.legs.reflectors else "the place of the tool"
     others = (
         "the frame of the measurements" if WORLD in candidate.twists else on_platform
-        for candidate, size in robot.imitated_outside(zero)
+        for candidate, size in robot.confounded_outside(zero)
         if abs(size) * usual[candidate.unit] > least
     )
     return " and ".join(dict.fromkeys(others))
@@ -62,17 +63,20 @@ def weight_notes(attribution):
     """Sentences on what the weight is surely off by, as far as the readings determine it."""
     for name, unit, value, interval, determined in _weight_off(attribution):
         if determined:
-            what = "more at the platform" if unit == "kg" else f"that the base leans about {name[-1]}"
-            yield f"weight not as told: {_sized(value, interval, unit)} {what}"
+            size = _sized(value, interval, unit)
+            if unit == "kg":
+                yield f"the platform carries {size} more than stated"
+            else:
+                yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
 
 
 def weight_doubts(attribution):
     """Sentences on what the weight seems to be off by where something else may be the reason."""
     for name, unit, *_, determined in _weight_off(attribution):
         if not determined:
-            what = "a mass at the platform" if unit == "kg" else f"a lean of the base about {name[-1]}"
+            what = "a mass at the platform" if unit == "kg" else f"a tilt of the base about {name[-1]}"
             do = "measure with two loads" if unit == "kg" else "level the base"
-            yield f"{what} and what gives way cannot be told apart by these readings: {do}"
+            yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
 def _weight_off(attribution):

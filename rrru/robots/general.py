@@ -122,7 +122,7 @@ class GeneralRobot(Robot):
         """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
         return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
 
-    def imitated_outside(self, name):
+    def confounded_outside(self, name):
         """Candidates of frame, tool and reflectors that a parameter imitates, and its size for a unit of each."""
         names, (_, gauge) = self.parameters.names, self._chosen
         known = {one.name: one for one in self.candidates if self._outside.issuperset(one.twists)}

@@ -107,7 +107,7 @@ class Robot(ABC):
         """By number that is no parameter in words what stands for it; none of a fixed set."""
         return {}
 
-    def imitated_outside(self, name):
+    def confounded_outside(self, name):
         """Candidates outside the robot that are no parameters since a parameter imitates them, and its size for a unit.
 
         None of a fixed set.

@@ -112,9 +112,8 @@ def test_where_shares_cannot_be_told_sizes_are_and_why(factor, gap, why):
     said = " ".join(answered(budget.assign(**shares), gap_rms_mm=gap)["sentences"])
     size = budget.set_index("part").loc["link_flexure", "rms_mm"]
     assert "%" not in re.sub(r"\(95 %: [^)]*\)", "", said)
-    assert ("so small beside the noise" in said) == (why == "small") and ("imitate each other so" in said) == (
-        why == "alike"
-    )
+    assert ("too small relative to the noise" in said) == (why == "small")
+    assert ("are confounded with each other" in said) == (why == "alike")
     assert f"{answer.rounded(size)} mm is link flexure" in said
 
 

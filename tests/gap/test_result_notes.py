@@ -79,7 +79,7 @@ def test_a_sentence_on_a_zero_is_true(seed):
             assert low < value < high and abs(truth - value) < 2.5 * (high - low)
             said[joint] = value
         else:
-            assert "cannot be told apart" in note and note[:8] in ("joint 1:", "joint 7:")
+            assert "are not separately identifiable" in note and note[:8] in ("joint 1:", "joint 7:")
     lost = np.flatnonzero(np.abs(zeros[1:6]) > np.radians(0.5)) + 2
     assert set(said) == set(lost.tolist())
 
@@ -94,7 +94,7 @@ def test_the_zero_of_the_last_joint_is_not_told_from_the_place_of_a_target(known
     stated = case.measurements.assign(**rows.vector_columns("target", np.tile(place, (90, 1))))
     notes = _zeros(replace(case, measurements=stated))
     (last,) = (note for note in notes if note.startswith("joint 7"))
-    assert "zero and the place of the target cannot be told apart" in last
+    assert "zero and the place of the target are not separately identifiable" in last
     (third,) = (note for note in notes if note.startswith("joint 3"))
     assert _ZERO.match(third)
 
@@ -111,7 +111,7 @@ def test_a_zero_that_a_link_imitates_is_said_to_be_most_probable_only():
     direction[[zero, shift]] = 0.02, 10.0
     unsure = replace(estimate, covariance=estimate.covariance + np.outer(direction, direction))
     (note,) = (note for note in zero_notes(unsure, case.mechanism) if note.startswith("joint 3"))
-    assert "zero is not determined beside other numbers of the robot, most probable is 11.5 degrees (95 %: 9.2" in note
+    assert "zero is not determined by the readings, its most probable offset is 11.5 degrees (95 %: 9.2" in note
 
 
 def _weighed(passes, told_kg):
@@ -138,11 +138,11 @@ def test_of_a_weight_that_is_as_told_nothing_is_said(passes):
 
 def test_a_mass_that_nobody_told_is_said_where_two_loads_were_driven():
     _, (note,), doubts = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
-    low, high = map(float, re.search(r"\(95 %: (\S+) to (\S+)\) more at the platform", note).groups())
+    low, high = map(float, re.search(r"\(95 %: (\S+) to (\S+)\) more than stated", note).groups())
     assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not doubts
 
 
 def test_with_one_load_a_mass_and_a_compliance_are_not_told_apart():
     weight, notes, (doubt,) = _weighed((campaigns.FORWARD, campaigns.REVERSE), 0.5 * _PLATFORM_KG)
     assert weight[0][2] > 3.0 * weight[0][3]
-    assert not notes and doubt.endswith("cannot be told apart by these readings: measure with two loads")
+    assert not notes and doubt.endswith("are not separately identifiable from these readings: measure with two loads")

@@ -51,15 +51,15 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
     _asked(copy.deepcopy(base))
     assert len(CHECKS) >= 5
 
-    @many(COUNT)
+    # few edits of a configuration leave a right one
+    @many(4 * COUNT)
     @given(edits=EDITS)
     def one(edits):
         counted(counts, ConfigError, _asked, edited(base, edits))
 
     one()
     print("configurations", dict(counts))
-    # that a right one is taken stands above
-    assert counts["refused"]
+    assert counts["refused"] and counts["taken"]
 
 
 @pytest.mark.parametrize(

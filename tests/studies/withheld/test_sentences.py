@@ -17,7 +17,7 @@ _GRID = np.stack(np.meshgrid(*[np.arange(5.0)] * 3), axis=-1).reshape(-1, 3)
 
 def _truth(**more):
     """A robot whose second drive has a play that is plainly seen: 0.3 mm of a noise of 0.035 mm."""
-    told = {
+    stated = {
         "effects": frozenset(["backlash"]),
         "outside": False,
         "leg": 2,
@@ -48,7 +48,7 @@ def _truth(**more):
         "file_read_mm": 0.302,
         "drives_mm": 0.011,
     }
-    return Truth(**(told | more))
+    return Truth(**(stated | more))
 
 
 _NOTHING = {"effects": frozenset(), "leg": 0, "strength": 0.0, "chi2": 0.0, "numbers": {}}
@@ -67,7 +67,7 @@ _CASES = [
     ("a cause with a size", ({"name": "backlash"}, {}, _FACTS), ({"name": "backlash"}, _UNKNOWN, _FACTS)),
     ("a cause without a share", ({"name": "backlash"}, {}, _FACTS), ({"name": "axis tilt"}, {}, _FACTS)),
     ("the corrected file is worse", ({}, {"file_mm": 0.59}, _FACTS), ({}, {}, _FACTS)),
-    ("shares cannot be told", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
+    ("shares are not determined", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
     (
         "shares overlap",
         ({}, {}, _FACTS | {"effects": [_EFFECT, _EFFECT | {"share": 0.4}]}),
@@ -109,7 +109,11 @@ _CASES = [
         ({"needs": "payload_kg"}, {"payloads": 2}, _FACTS),
     ),
     ("an effect is a calibration's number", ({"name": "tool_offset"}, {}, _FACTS), ({"name": "backlash"}, {}, _FACTS)),
-    ("an effect cannot be told", ({"name": "link_flexure"}, {}, _FACTS), ({"name": "backlash"}, {}, _FACTS)),
+    (
+        "an effect is absorbed",
+        ({"name": "link_flexure"}, {}, _FACTS),
+        ({"name": "backlash"}, {}, _FACTS),
+    ),
     ("the file leaves", ({"value": "0.302"}, {}, _FACTS), ({"value": "0.2"}, {}, _FACTS)),
     ("the file would be worse", ({"other": "1.2"}, {}, _FACTS), ({"other": "0.56"}, {}, _FACTS)),
     ("the file cannot hold play", ({}, {}, _FACTS), ({}, {}, _NONE)),
@@ -213,7 +217,7 @@ _CASES = [
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
-    *("the effects imitate each other", "a zero cannot be told", "a zero is not determined", "a weight cannot be told"),
+    *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }
 # kinds that are true, or false, of every robot that is drawn
@@ -222,7 +226,8 @@ _ALWAYS = {"no commanded positions": True} | dict.fromkeys(
         *(
             "no cause is named",
             "what to check",
-            "the weight is not as told",
+            "the mass is not as stated",
+            "the base is tilted",
             "the noise is smaller",
             "points are outliers",
             "stale readings",
@@ -249,9 +254,9 @@ def test_no_kind_is_without_a_judge():
 
 
 def test_phases_may_have_gone_round():
-    told = {"effect": "encoder_eccentricity", "parameter": "phase1", "value": 3.1, "low_95": 3.0, "high_95": 3.2}
+    stated = {"effect": "encoder_eccentricity", "parameter": "phase1", "value": 3.1, "low_95": 3.0, "high_95": 3.2}
     eccentric = {"effects": frozenset(["encoder_eccentricity"]), "numbers": {"encoder_eccentricity": {"phase1": -3.12}}}
-    assert judge.judge(Claim("size of a cause", "", told), _truth(**eccentric), _FACTS) is True
+    assert judge.judge(Claim("size of a cause", "", stated), _truth(**eccentric), _FACTS) is True
     ends = {"effect": "encoder_eccentricity", "parameter": "phase1", "ends": (3.0, 3.2)}
     assert judge.judge(Claim("interval of a number: cause", "", ends), _truth(**eccentric), _FACTS) is True
 
@@ -275,22 +280,22 @@ def test_sentences_are_told_apart():
         *("a cause with a share", "place of a cause", "share of a cause"),
         *("these data cannot rule out", "a rival", "a rival", UNKNOWN),
     ]
-    assert said[1].told["place"] == " at q3" and said[2].told["share"] == "74"
+    assert said[1].stated["place"] == " at q3" and said[2].stated["share"] == "74"
     found = [{"parameter": name, "value": size, "low_95": size, "high_95": size} for name, size in _SIZES.items()]
     sizes = claims._sizes_in(cause, {"effects": [{"name": "encoder_eccentricity", "parameters": found}]})
-    assert [claim.told["parameter"] for claim in sizes] == ["amplitude3", "phase3", "phase4"]
-    assert {claim.told["effect"] for claim in sizes} == {"encoder_eccentricity"}
+    assert [claim.stated["parameter"] for claim in sizes] == ["amplitude3", "phase3", "phase4"]
+    assert {claim.stated["effect"] for claim in sizes} == {"encoder_eccentricity"}
     zero = _page(
         notes=[
             "joint 7: zero is off by 0.527 degrees (95 %: 0.518 to 0.536)",
             "q7: zero is off by -0.50 mm (95 %: -0.52 to -0.48)",
-            "q6: zero and the place of the target cannot be told apart, together they are a zero off by 1.0 degrees "
-            "(95 %: 0.9 to 1.1)",
+            "q6: zero and the place of the target are not separately identifiable, combined they equal a "
+            "zero offset of 1.0 degrees (95 %: 0.9 to 1.1)",
         ]
     )
-    assert [claim.told["site"] for claim in zero] == ["joint 7", "q7", "q6"]
-    assert [claim.kind for claim in zero] == ["a zero is off", "a zero is off", "a zero cannot be told"]
-    assert zero[1].told["unit"] == "mm" and zero[1].told["high"] == "-0.48"
+    assert [claim.stated["site"] for claim in zero] == ["joint 7", "q7", "q6"]
+    assert [claim.kind for claim in zero] == ["a zero is off", "a zero is off", "a zero is confounded"]
+    assert zero[1].stated["unit"] == "mm" and zero[1].stated["high"] == "-0.48"
 
 
 def test_a_chains_loads_are_those_of_mujoco():
@@ -386,12 +391,12 @@ def test_statements_are_the_same_again_and_nothing_is_of_an_unknown_kind():
     own = config["withheld"] | {"sentences": config["withheld"]["sentences"] | {"stops": 70, "mujoco_share": 0.0}}
     settings = settings_of(config | {"withheld": own, "seed": 4})
     # a gantry, whose diagnosis is short
-    told = statements("pages", [9], settings)
-    assert told.equals(statements("pages", [9], settings))
-    assert not (told["kind"] == UNKNOWN).any() and "/tmp" not in "".join(told["text"])
-    assert (told["result"] == "true").sum() > 20
-    table = sentences(told).set_index("kind")
-    assert table[["true", "false", "undecided"]].to_numpy().sum() == len(told)
+    stated = statements("pages", [9], settings)
+    assert stated.equals(statements("pages", [9], settings))
+    assert not (stated["kind"] == UNKNOWN).any() and "/tmp" not in "".join(stated["text"])
+    assert (stated["result"] == "true").sum() > 20
+    table = sentences(stated).set_index("kind")
+    assert table[["true", "false", "undecided"]].to_numpy().sum() == len(stated)
     assert table.loc["verdict", "example_true"].startswith("gantry3_0009") or not table.loc["verdict", "true"]
 
 

@@ -70,14 +70,14 @@ class Cause:
         stem = _STEMS.get(self.name)
         if stem is None:
             return {}
-        told = {f"{stem}{k}": size for k, size in enumerate(self.sizes, 1)}
+        numbers = {f"{stem}{k}": size for k, size in enumerate(self.sizes, 1)}
         if stem == "amplitude":
             phases = self.more["phase"]
-            told |= {f"phase{k}": phases[k - 1] for k, size in enumerate(self.sizes, 1) if size}
+            numbers |= {f"phase{k}": phases[k - 1] for k, size in enumerate(self.sizes, 1) if size}
         if "waves" in self.more:
             waves = self.more["waves"]
-            told |= {"ratio": waves} if "rad" in robot.units else {"lead": 2.0 * np.pi / waves}
-        return told
+            numbers |= {"ratio": waves} if "rad" in robot.units else {"lead": 2.0 * np.pi / waves}
+        return numbers
 
 
 _STEMS = {

@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-G = 9.80665
-# of central differences of the potential energy
-_STEP = {"rad": 1e-5, "mm": 1e-2}
+from rrru.studies.withheld.sentences.statics import G, drive_loads
+
 _SERVO = {"rad": "1e8", "mm": "1e8"}
 _DAMPING = {"rad": "4e4", "mm": "2e4"}
 _ARMATURE = {"rad": "5", "mm": "5"}
@@ -72,13 +71,7 @@ class Chain:
 
     def loads(self, values, payload_kg):
         """Torques in N mm or forces in N (n, K) of all weight on the drives, payloads (n,) hanging at the platform."""
-        result = np.empty_like(values)
-        for k, unit in enumerate(self.units):
-            step = np.zeros(values.shape[1])
-            step[k] = _STEP[unit]
-            up, down = (self._energy(values + sign * step, payload_kg) for sign in (1.0, -1.0))
-            result[:, k] = (down - up) / (2.0 * _STEP[unit])
-        return result
+        return drive_loads(lambda at: self._energy(at, payload_kg), values, self.units)
 
     def _energy(self, values, payload_kg):
         """Potential energy (n,) in N mm."""

@@ -1,6 +1,6 @@
 """What a page says: every sentence and number of it as a Claim of a kind. Lengths mm, angles rad.
 
-Sentences are told apart by a pattern each, numbers come from the facts and tables. A sentence that no pattern knows is
+Each kind of sentence has a pattern, numbers come from the facts and tables. A sentence that no pattern knows is
 of the kind UNKNOWN, so that none is passed over.
 """
 
@@ -27,11 +27,11 @@ _P = rf"(?P<probability>more than 0\.99|less than 0\.01|{_NUMBER})"
 
 @dataclass(frozen=True)
 class Claim:
-    """kind; text: as the page has it; told: what it says, by name."""
+    """kind; text: as the page has it; stated: what it says, by name."""
 
     kind: str
     text: str
-    told: dict = field(default_factory=dict)
+    stated: dict = field(default_factory=dict)
 
 
 # kinds of sentences of the answer
@@ -45,8 +45,8 @@ _SENTENCES = {
     "a cause with a share": rf"{_SHARE} is {_CAUSE}",
     "a cause with a size": rf"{_X} mm is {_CAUSE}",
     "a cause without a share": rf"Also there is {_CAUSE}",
-    "shares cannot be told": r"The gap is so small beside the noise that shares of the gap cannot be told\.",
-    "the effects imitate each other": r"The effects imitate each other so much that shares of the gap cannot be told\.",
+    "shares are not determined": r"The gap is too small relative to the noise: their shares .*",
+    "the effects are confounded": r"The effects are confounded with each other: their shares .*",
     "shares overlap": r"These shares overlap.*",
     "something is unexplained": rf"(?:Beside that|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
     "probability of this answer": rf"Probability of this answer: {_P}\.",
@@ -63,11 +63,12 @@ _SENTENCES = {
 _NOTES = {
     "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X} (?P<unit>degrees|mm) "
     rf"\(95 %: (?P<low>{_NUMBER}) to (?P<high>{_NUMBER})\)",
-    "a zero cannot be told": r"(?P<site>[^:]+): zero and .* cannot be told apart, together they are a zero off by .*",
-    "a zero is not determined": r"(?P<site>[^:]+): zero is not determined beside other numbers .*",
+    "a zero is confounded": r"(?P<site>[^:]+): zero and .* are not separately identifiable, .*",
+    "a zero is not determined": r"(?P<site>[^:]+): zero is not determined by the readings, .*",
     "without it a number would be off": rf"without (?P<name>\w+) (?P<parameter>\S+) would be off by {_X} .*",
-    "the weight is not as told": rf"weight not as told: {_X} (?P<unit>kg|rad){_ENDS} .*",
-    "a weight cannot be told": r"(?:a mass at the platform|a lean of the base about \w) and what gives way cannot .*",
+    "the mass is not as stated": rf"the platform carries {_X} kg{_ENDS} more than stated",
+    "the base is tilted": rf"the base is tilted by {_X} rad{_ENDS} about \w, the configuration assumes 0",
+    "a weight is confounded": r"(?:a mass at the platform|a tilt of the base about \w) and a compliance are not .*",
     "the fit did not converge": r"the fit of .* did not converge.*",
     "points used": r"(?P<used>\d+) of (?P<rows>\d+) points used(?:, .*)?",
     "few readings": r"few readings: (?P<numbers>\d+) numbers for (?P<parameters>\d+) parameters .*",
@@ -78,7 +79,7 @@ _NOTES = {
     "an effect needs what is not there": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+), which the columns .*",
     "an effect needs different values": r"(?P<name>\w+) not tested: needs (?P<needs>[\w, ]+) of more than one value",
     "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters take it up",
-    "an effect cannot be told": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
+    "an effect is absorbed": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
     "an effect is not tested": r"(?P<name>\w+) not tested: .*",
     "the file leaves": rf"the corrected file leaves {_X} mm rms at the readings, the diagnosis {_Y} mm",
     "the file would be worse": rf"not corrected: it would miss by {_X} mm rms, the file as it came misses by {_Y} mm",
@@ -124,24 +125,24 @@ def _of_text(text, patterns):
     """Claims of a sentence: its own, and one for every number or name that it holds besides."""
     for kind, pattern in patterns.items():
         if found := re.fullmatch(pattern, text, re.DOTALL):
-            told = {name: value for name, value in found.groupdict().items() if value is not None}
-            return [Claim(kind, text, told), *_inside(text, told)]
+            stated = {name: value for name, value in found.groupdict().items() if value is not None}
+            return [Claim(kind, text, stated), *_inside(text, stated)]
     return [Claim(UNKNOWN, text)]
 
 
-def _inside(text, told):
+def _inside(text, stated):
     """Claims of what a sentence holds beside what it says."""
     result = []
-    if "place" in told and "name" in told and "," not in told["place"]:
-        result.append(Claim("place of a cause", text, told))
-    if "share" in told and "name" in told:
-        result.append(Claim("share of a cause", text, told))
-    if "probability" in told:
-        result.append(Claim("probability", text, told))
-    if "names" in told and text.startswith(("These data", "Parts of")):
-        result += [Claim("a rival", text, {"name": name}) for name in told["names"].split(", ")]
-    if "other" in told and "noise is" in text:
-        result.append(Claim("the measuring noise", text, {"value": told["other"]}))
+    if "place" in stated and "name" in stated and "," not in stated["place"]:
+        result.append(Claim("place of a cause", text, stated))
+    if "share" in stated and "name" in stated:
+        result.append(Claim("share of a cause", text, stated))
+    if "probability" in stated:
+        result.append(Claim("probability", text, stated))
+    if "names" in stated and text.startswith(("These data", "Parts of")):
+        result += [Claim("a rival", text, {"name": name}) for name in stated["names"].split(", ")]
+    if "other" in stated and "noise is" in text:
+        result.append(Claim("the measuring noise", text, {"value": stated["other"]}))
     return result
 
 
@@ -153,8 +154,8 @@ def _sizes_in(text, facts):
             continue
         for one in effect["parameters"]:
             if re.search(rf"\b{re.escape(one['parameter'])} = ", text):
-                told = {key: one[key] for key in ("parameter", "value", "low_95", "high_95")}
-                result.append(Claim("size of a cause", text, told | {"effect": effect["name"]}))
+                stated = {key: one[key] for key in ("parameter", "value", "low_95", "high_95")}
+                result.append(Claim("size of a cause", text, stated | {"effect": effect["name"]}))
     return result
 
 
@@ -176,9 +177,9 @@ def _of_facts(facts):
         result.append(Claim("interval of share_closed", f"{ends[0]:.3f} to {ends[1]:.3f}", {"ends": ends}))
     for part in facts["budget"]:
         ends = part["share_low"], part["share_high"]
-        told = {"part": part["part"], "kind": part["kind"], "ends": ends}
+        stated = {"part": part["part"], "kind": part["kind"], "ends": ends}
         result.append(
-            Claim(f"interval of a share: {part['kind']}", f"{part['part']}: {ends[0]:.3f} to {ends[1]:.3f}", told)
+            Claim(f"interval of a share: {part['kind']}", f"{part['part']}: {ends[0]:.3f} to {ends[1]:.3f}", stated)
         )
     return result
 
@@ -196,17 +197,17 @@ def _of_tables(tables):
         kind = {"calibration": "calibration", "weight": "weight"}.get(row["effect"], "cause")
         if np.isfinite(row["low_95"]) and np.isfinite(row["standard_error"] or np.nan):
             text = f"{row['effect']} {row['parameter']}: {row['low_95']:.6g} to {row['high_95']:.6g} {row['unit']}"
-            told = {"effect": row["effect"], "parameter": row["parameter"], "ends": (row["low_95"], row["high_95"])}
-            result.append(Claim(f"interval of a number: {kind}", text, told))
+            stated = {"effect": row["effect"], "parameter": row["parameter"], "ends": (row["low_95"], row["high_95"])}
+            result.append(Claim(f"interval of a number: {kind}", text, stated))
     for row in tables["gap_locate"].to_dict("records") if "gap_locate" in tables else ():
         if row["factor"] in ("direction", "payload"):
             text = f"{row['factor']} {row['level']}: {row['share_low']:.3f} to {row['share_high']:.3f}"
-            told = {"factor": row["factor"], "level": row["level"], "ends": (row["share_low"], row["share_high"])}
-            result.append(Claim(f"interval of a share: by {row['factor']}", text, told))
+            stated = {"factor": row["factor"], "level": row["level"], "ends": (row["share_low"], row["share_high"])}
+            result.append(Claim(f"interval of a share: by {row['factor']}", text, stated))
     for row in tables["gap_identifiability"].to_dict("records") if "gap_identifiability" in tables else ():
         if np.isfinite(row["detectable_mm"]):
-            told = {"effect": row["effect"], "value": row["detectable_mm"]}
-            result.append(Claim("detectable_mm", f"{row['effect']}: {row['detectable_mm']:.4g} mm", told))
+            stated = {"effect": row["effect"], "value": row["detectable_mm"]}
+            result.append(Claim("detectable_mm", f"{row['effect']}: {row['detectable_mm']:.4g} mm", stated))
     shrink = tables["gap_shrink"]
     for kind in ("given_model", "corrected_model"):
         own = shrink[(shrink["kind"] == kind) & (shrink["trajectory"] == "*")]

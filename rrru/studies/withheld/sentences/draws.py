@@ -87,27 +87,27 @@ class Draw:
         generator = stream(self.seed, "sentences noise", self.name)
         row = np.repeat(np.arange(len(self.stops.drive)), len(self.targets))
         position = seen + noisy * self.noise_mm * generator.standard_normal(seen.shape)
-        told = {"trajectory": "stops", "time_s": self.stops.time_s[row]}
-        told |= dict(zip(self.nominal.columns, self.stops.drive[row].T, strict=True))
-        told |= {f"measured_{axis}_mm": values for axis, values in zip("xyz", position.T, strict=True)}
+        columns = {"trajectory": "stops", "time_s": self.stops.time_s[row]}
+        columns |= dict(zip(self.nominal.columns, self.stops.drive[row].T, strict=True))
+        columns |= {f"measured_{axis}_mm": values for axis, values in zip("xyz", position.T, strict=True)}
         if self.reading == "pose":
             small = noisy * NOISE_RAD * generator.standard_normal(vectors.shape)
             turned = (Rotation.from_rotvec(small) * Rotation.from_rotvec(vectors)).as_rotvec()
-            told |= {f"measured_r{axis}_rad": values for axis, values in zip("xyz", turned.T, strict=True)}
+            columns |= {f"measured_r{axis}_rad": values for axis, values in zip("xyz", turned.T, strict=True)}
         elif self.reading != "tool":
-            told["target"] = np.tile([*self.targets], len(self.stops.drive))
-        return pd.DataFrame(told | {"payload_kg": self.stops.payload_kg[row]})
+            columns["target"] = np.tile([*self.targets], len(self.stops.drive))
+        return pd.DataFrame(columns | {"payload_kg": self.stops.payload_kg[row]})
 
     def section(self, folder, file):
         """The campaign's section of the configuration of a file of rows in a folder."""
-        told = {"robot": "own", "ingest": str(Path(folder) / file), "errors": "full", "noise_mm": self.noise_mm}
+        section = {"robot": "own", "ingest": str(Path(folder) / file), "errors": "full", "noise_mm": self.noise_mm}
         if self.registered:
-            told["frame"] = "register"
+            section["frame"] = "register"
         if self.reading == "pose":
-            told["noise_rad"] = NOISE_RAD
+            section["noise_rad"] = NOISE_RAD
         if self.reading == "stated":
-            told["targets"] = {name: list(place) for name, place in self.targets.items()}
-        return told
+            section["targets"] = {name: list(place) for name, place in self.targets.items()}
+        return section
 
     @property
     def in_words(self):

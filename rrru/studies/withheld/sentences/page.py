@@ -61,8 +61,8 @@ def run(name, section, robot_section, settings):
     measurements, _ = campaigns.with_singularities(robot, ingested.measurements, settings["margin"])
     known = setup.measured_robot(nominal, measurements)
     masses = Masses(**parts.masses({"loads": {}, "robots": {"own": robot_section}}, section))
-    told = MeasuredRobot(known, masses, section.get("noise_mm"), name, section.get("noise_rad"))
-    result = diagnose(measurements, told, gap)
+    measured = MeasuredRobot(known, masses, section.get("noise_mm"), name, section.get("noise_rad"))
+    result = diagnose(measurements, measured, gap)
     kind = "urdf" if "urdf" in robot_section else "mjcf"
     file = Path(robot_section[kind]).with_name(_CORRECTED[kind])
     result = write_corrected(result, robot_section, masses, file)

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.studies.withheld.sentences.chains import G, metres, mjcf, servo, spaced
+from rrru.studies.withheld.sentences.chains import metres, mjcf, servo, spaced
+from rrru.studies.withheld.sentences.statics import G, drive_loads
 
 _NEWTON_STEPS, _CLOSED_MM = 30, 1e-9
-_STEP = {"rad": 1e-5, "mm": 1e-2}
 _TINY, _LARGEST_STEP = 1e-12, np.repeat([100.0, 0.3], 3)
 
 
@@ -99,13 +99,7 @@ class Rods:
 
     def loads(self, values, payload_kg):
         """Torques in N mm or forces in N (n, K) of all weight on the drives, payloads (n,) hanging at the platform."""
-        result = np.empty_like(values)
-        for k, unit in enumerate(self.units):
-            step = np.zeros(values.shape[1])
-            step[k] = _STEP[unit]
-            up, down = (self._energy(values + sign * step, payload_kg) for sign in (1.0, -1.0))
-            result[:, k] = (down - up) / (2.0 * _STEP[unit])
-        return result
+        return drive_loads(lambda at: self._energy(at, payload_kg), values, self.units)
 
     def _energy(self, values, payload_kg):
         """Potential energy (n,) in N mm."""

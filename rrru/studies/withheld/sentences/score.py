@@ -107,10 +107,10 @@ def _of_right_file(number, settings, folder):
     return own.name, own.in_words, [("a right file is not suspected", f"{became}: {words}", became == "accepted")]
 
 
-def sentences(told):
+def sentences(found):
     """Rows of `sentences`: how many statements of each kind are true, false and undecided, and the first of each."""
     rows = []
-    for kind, own in told.groupby("kind", sort=True):
+    for kind, own in found.groupby("kind", sort=True):
         by_result = {result: own[own["result"] == result] for result in ("true", "false", "undecided")}
         row = {"kind": kind} | {result: len(part) for result, part in by_result.items()}
         row |= {f"example_{result}": _example(part) for result, part in by_result.items()}
@@ -124,8 +124,8 @@ def _example(part):
 
 
 def settings_of(settings):
-    """What `statements` is told, from a rule's settings."""
-    told = settings["withheld"]["sentences"]
+    """The settings of `statements`, from a rule's settings."""
+    section = settings["withheld"]["sentences"]
     gap = GapSettings.from_config(settings["gap"], settings["seed"])
     own = {"gap": gap, "margin": settings["calibration"]["singularity_margin"]}
-    return own | {"seed": settings["seed"]} | {key: told[key] for key in ("stops", "mujoco_share")}
+    return own | {"seed": settings["seed"]} | {key: section[key] for key in ("stops", "mujoco_share")}

@@ -97,7 +97,7 @@ def truth_of(draw, run, folder, gap):
     seen, name = before[~fresh], draw.cause.effect if draw.cause else None
     held = name in library
     noise_rms, chosen = float(np.sqrt(3.0) * draw.noise_mm), np.repeat(~draw.stops.fresh, len(draw.targets))
-    told = Truth(
+    truth = Truth(
         effects=frozenset([name] if held else []),
         outside=name is not None and not held,
         leg=draw.cause.leg if draw.cause else 0,
@@ -122,7 +122,7 @@ def truth_of(draw, run, folder, gap):
         payload_kg=exact["payload_kg"].to_numpy()[chosen],
         places=dict(draw.targets),
     )
-    return replace(told, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
+    return replace(truth, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
 
 
 def _rms(values):
