@@ -51,6 +51,6 @@ def _panel(axes, part):
     look = {"color": style.VERMILION, "fontsize": 7.0, "ha": side, "va": "bottom" if size > 0.0 else "top"}
     axes.annotate(text, (at, size), xytext=(0.0, beyond), textcoords="offset points", in_layout=False, **look)
     axes.margins(x=0.02, y=0.3)
-    axes.set_xlabel(f"value of {part['name'].iloc[0]} ({value_unit})")
+    axes.set_xlabel(f"drive value, {part['name'].iloc[0]} ({value_unit})")
     axes.set_ylabel(f"error ({error_unit})")
     axes.grid(True)
