@@ -62,7 +62,7 @@ WITHOUT_UNIT = (
     *("model", "waves per turn", "row", "x (m)", "y (m)", "share of the gap's mean square (%)"),
     *(f"joint {number}\n(µrad)" for number in range(1, 7)),
     "size of the weight in the unit direction (angles as arcs at the robot's own length)",
-    *("value of axis1 (degrees)", "value of axis2 (degrees)", "error (mrad)", "error (µm)"),
+    *("drive value, axis1 (degrees)", "drive value, axis2 (degrees)", "error (mrad)", "error (µm)"),
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign
