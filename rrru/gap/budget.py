@@ -1,7 +1,7 @@
 """The budget of a gap: how much of its mean square each effect makes, and what does not repeat, runs and the unknown.
 
-Effects and what is unexplained are drawn from the posterior over hypotheses and their coefficients, with the
-calibration's share taken out. Squares of parts and twice the products of effects that imitate each other add up to the
+Mean squares are those of positions on the robot. Effects and what is unexplained are drawn from the posterior over
+hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of effects that imitate each other add up to the
 gap's mean square, but for what the draw of the noise has left in it ("sampling").
 """
 
@@ -22,11 +22,11 @@ _UNEXPLAINED = "unexplained"
 
 def budget(attribution, stated_mm, generator, draws):
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    squares, products = _drawn(attribution, generator, draws)
+    squares, products, fitted = _drawn(attribution, generator, draws)
     noise = _noise_parts(attribution, stated_mm, generator, draws)
     residual = attribution.case.residual(attribution.calibrated)
     instrument = float(noise.pop("instrument").mean())
-    gap = float((residual**2).sum(axis=1).mean()) - instrument
+    gap = float((residual[attribution.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
     beliefs = attribution.posterior
     unexplained = squares.pop(_UNEXPLAINED)
     rows = [(name, "effect", drawn, beliefs.marginal(name)) for name, drawn in squares.items()]
@@ -37,7 +37,7 @@ def budget(attribution, stated_mm, generator, draws):
     least = OPTIONS.min_covariance_share * max(gap, 1e-12)
     rows = [row for row in rows if row[1] != "covariance" or abs(row[2].mean()) > least]
     known = sum(float(drawn.mean()) for *_, drawn, _ in rows)
-    calibration = instrument * attribution.evidence.linear.base.shape[-1] / (3.0 * len(attribution.case)) * np.ones(1)
+    calibration = instrument * fitted * np.ones(1)
     rows.append(("sampling", "sampling", np.array([gap - known]), np.nan))
     rows.append(("calibration", "calibration", calibration, np.nan))
     total = gap + float(calibration[0])
@@ -52,12 +52,13 @@ def _row(part, kind, squares, probability, total):
 
 
 def _drawn(attribution, generator, draws):
-    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them."""
+    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
+    share of the noise that the calibration takes up.
+    """
     case, evidence, beliefs = attribution.case, attribution.evidence, attribution.posterior
     linear = evidence.linear
-    basis, _ = np.linalg.qr(linear.base.reshape(-1, linear.base.shape[-1]))
-    data = linear.data.ravel()
-    data = data - basis @ (basis.T @ data)
+    left = _LeftByCalibration(linear.base, case.on_robot)
+    data, count = left.of(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
     weights = beliefs.weights.ravel()
     counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
     names = [name for name in case.effects if beliefs.marginal(name) > OPTIONS.min_budget_probability]
@@ -67,21 +68,39 @@ def _drawn(attribution, generator, draws):
         row, level = np.unravel_index(number, beliefs.weights.shape)
         some = slice(first, first + counts[number])
         first = some.stop
-        parts = _parts(evidence, beliefs.hypotheses[row], level, basis, generator, counts[number])
+        parts = _parts(evidence, beliefs.hypotheses[row], level, left, generator, counts[number])
         for name in set(parts) & set(squares):
-            squares[name][some] = (parts[name] ** 2).sum(axis=0) / len(case)
+            squares[name][some] = (parts[name] ** 2).sum(axis=0) / count
         for pair in products:
             if set(pair) <= set(parts):
-                products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / len(case)
+                products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
         if beliefs.unexplained[row, level] and _UNEXPLAINED not in parts:
-            left = data[:, None] - sum(parts.values(), np.zeros((len(data), counts[number])))
-            spare = 3.0 * case.noise_mm**2 * (1.0 - basis.shape[1] / len(data))
-            squares[_UNEXPLAINED][some] = np.maximum((left**2).sum(axis=0) / len(case) - spare, 0.0)
-    return squares, products
+            beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
+            spare = 3.0 * case.noise_mm**2 * (1.0 - left.taken)
+            squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
+    return squares, products, left.taken
 
 
-def _parts(evidence, hypothesis, level, basis, generator, count):
-    """By effect of a hypothesis its part (3m, count) of the gap at drawn coefficients, the calibration's taken out.
+class _LeftByCalibration:
+    """What a calibration of columns (m, 3, p) leaves of numbers at those of the m readings that count.
+
+    taken: share of the noise that it takes up there.
+    """
+
+    def __init__(self, columns, counted):
+        self._basis, _ = np.linalg.qr(columns.reshape(-1, columns.shape[-1]))
+        self._counted = np.repeat(counted, 3)
+        self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
+
+    def of(self, numbers):
+        """Of numbers (3m, k) at all readings those (3n, k) at the readings that count."""
+        return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
+
+
+def _parts(evidence, hypothesis, level, left, generator, count):
+    """By effect of a hypothesis what the calibration leaves of its part of the gap, (3n, count), at drawn coefficients.
+
+    left: a _LeftByCalibration.
 
     Those of unknown functions together are what is unexplained.
     """
@@ -109,7 +128,7 @@ def _parts(evidence, hypothesis, level, basis, generator, count):
             part = part + np.einsum("nqc,c->nq", each, acting) @ drawn[len(mean) - each.shape[1] :]
         start += matrix.shape[1]
         name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect
-        result[name] = result.get(name, 0.0) + part - basis @ (basis.T @ part)
+        result[name] = result.get(name, 0.0) + left.of(part)
     return result
 
 

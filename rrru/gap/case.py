@@ -130,6 +130,11 @@ class Case:
         """Which rows (m,) are positions."""
         return self._kept < len(self.used)
 
+    @cached_property
+    def on_robot(self):
+        """Which rows (m,) are positions of points on the robot: a distance in mm that is stated is one of these."""
+        return self.positions & ~self.beside
+
     @property
     def count(self):
         """Number of used points."""

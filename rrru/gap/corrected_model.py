@@ -135,13 +135,14 @@ def gap_rows(attribution, corrected, section, file, shrink):
     except (ConfigError, SimulationError, UnreachableError) as error:
         why = f"corrected model not driven: {error}; closed at its drive values instead"
         poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
-    result, known = [], attribution.case.complete({term.effect for term in attribution.fit.terms})
+    result, case = [], attribution.case
+    known = case.on_robot & case.complete({term.effect for term in attribution.fit.terms})
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
-        twists = twists + _instrument(attribution.case, robot, corrected.found, kind == "corrected_model")
+        twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
         # the file is not judged where the sense of arrival of a drive is unknown
-        left = np.where(known[:, None], attribution.case.by_other(robot, own, twists), np.nan)
+        left = np.where(known[:, None], case.by_other(robot, own, twists), np.nan)
         if np.isfinite(left).all(axis=1).any():
-            result.append(model_row(shrink, kind, left, attribution.case.noise_mm))
+            result.append(model_row(shrink, kind, left, case.noise_mm))
     return pd.DataFrame(result), why
 
 

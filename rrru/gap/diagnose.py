@@ -96,7 +96,7 @@ def diagnose(
     case = attribution.case
     residual = case.residual(attribution.calibrated)
     further = advise(attribution, verdict, robot.masses)
-    worst = worst_spot(case.motion.position_mm[case.at], residual)
+    worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
     excluded = left_out(case, near)
     row = _row(attribution, verdict, steps, worst, further.runs, (robot.noise_mm, excluded))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))

@@ -50,7 +50,7 @@ def file_error(attribution, model, masses, generator):
     twists = model.twists(case.motion)
     poses = model.robot.solve(actuators, command, twists)
     of_file = case.by_other(model.robot, poses, twists + model.instrument)
-    known = case.positions & ~case.beside & case.complete({term.effect for term in attribution.fit.terms})
+    known = case.on_robot & case.complete({term.effect for term in attribution.fit.terms})
     of_file, diagnosed, calibrated = (
         left[known] for left in (of_file, case.residual(attribution.state), case.residual(attribution.calibrated))
     )

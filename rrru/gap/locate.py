@@ -21,21 +21,22 @@ def locate(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
     residual_mm (m, 3): what was read minus calibrated sim; drive (m, 3, K): derivative by the actuator values. Shares
-    are of the mean square with the noise taken off; their 95 % intervals come from resampled runs (stretches where
-    there are fewer than ten).
+    are of the mean square of positions on the robot, those of drives of all that was read, with the noise taken off;
+    their 95 % intervals come from resampled runs (stretches where there are fewer than ten).
     """
     resampled = resampled_rows(case, generator, draws)
-    whole = _Whole((residual_mm**2).sum(axis=1), case.noise_mm**2, resampled)
+    components = np.where(case.on_robot[:, None], residual_mm**2, 0.0)
+    whole = _Whole(components.sum(axis=1), 3.0 * case.on_robot, case.noise_mm**2, resampled)
     rows = []
     for name, levels in _levels(case).items():
-        for level in pd.unique(levels[levels != ""]):
-            chosen = levels == level
+        for level in pd.unique(levels[(levels != "") & case.on_robot]):
+            chosen = (levels == level) & case.on_robot
             rows.append(whole.row(name.split()[0], level, np.where(chosen, whole.squares, 0.0), 3.0 * chosen))
             if name == "region":
                 centre = case.motion.position_mm[case.at][chosen].mean(axis=0)
                 rows[-1] |= dict(zip(("x_mm", "y_mm", "z_mm"), centre.tolist(), strict=True))
-    one = np.ones(len(residual_mm))
-    rows.extend(whole.row("direction", axis, residual_mm[:, k] ** 2, one) for k, axis in enumerate("xyz"))
+    one = case.on_robot.astype(float)
+    rows.extend(whole.row("direction", axis, components[:, k], one) for k, axis in enumerate("xyz"))
     rows.extend(_drive_rows(case, residual_mm, drive, resampled))
     return pd.DataFrame(rows).reindex(columns=[*_COLUMNS, *_MORE_COLUMNS])
 
@@ -58,15 +59,18 @@ def drive_errors(residual_mm, drive):
 
 @dataclass(frozen=True)
 class _Whole:
-    """Sums of squares (n,) of three components each, their noise's variance, and resampled rows (draws, n)."""
+    """Sums of squares (n,) of so many components (n,), the variance of a component's noise, and resampled rows
+    (draws, n).
+    """
 
     squares: np.ndarray
+    freedom: np.ndarray
     variance: float
     resampled: np.ndarray
 
     def row(self, factor, level, part, freedom):
         """One row: share of a part (n,) of the squares, of so many components (n,)."""
-        excess, total = part - freedom * self.variance, self.squares - 3.0 * self.variance
+        excess, total = part - freedom * self.variance, self.squares - self.freedom * self.variance
         drawn_total = total[self.resampled].sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             drawn = np.where(drawn_total > 0.0, excess[self.resampled].sum(axis=1) / drawn_total, 0.0)
@@ -82,7 +86,7 @@ class _Whole:
             "share": share,
             "share_low": float(min(low, share)),
             "share_high": float(max(high, share)),
-            "share_of_noise": float(freedom.sum() / (3.0 * len(part))),
+            "share_of_noise": float(freedom.sum() / self.freedom.sum()),
             "noise_could": bool(part.sum() / self.variance < chdtri(freedom.sum(), OPTIONS.min_noise_p_value)),
         }
 
@@ -125,11 +129,12 @@ def _drive_rows(case, residual_mm, drive, resampled):
     own = case.noise_mm**2 * (np.linalg.pinv(drive) ** 2).sum(axis=-1)
     # a drive of another arm than the one that is read moves nothing, none what is fixed to the world
     scaled = np.divide(errors**2, own, out=np.zeros_like(own), where=own > 0.0)
-    whole, rows = _Whole(scaled.sum(axis=1), 1.0, resampled), []
+    moving = (own > 0.0).astype(float)
+    whole, rows = _Whole(scaled.sum(axis=1), moving.sum(axis=1), 1.0, resampled), []
     names = drive_words(case.mechanism).all_names
     for k, (name, unit) in enumerate(zip(names, case.mechanism.parts.units, strict=True)):
         moved = np.linalg.norm(drive[:, :3, k] * errors[:, k, None], axis=1)
-        row = whole.row("drive", name, scaled[:, k], np.ones(len(scaled)))
+        row = whole.row("drive", name, scaled[:, k], moving[:, k])
         row["rms_mm"] = float(np.sqrt((moved**2).mean()))
         row[f"drive_rms_{unit}"] = float(np.sqrt((errors[:, k] ** 2).mean()))
         rows.append(row)

@@ -1,6 +1,6 @@
 """How far the gap shrinks as effects are added: on points left out of the fit, and on the re-simulated campaign."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -13,23 +13,37 @@ CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
 
 @dataclass(frozen=True)
 class ShrinkStep:
-    """The gap after some effects are added: its square (n,) in mm^2 at each point, less noise; draws (b, n) of it."""
+    """The gap after some effects are added, at those of m readings that count.
+
+    squares_mm2 (m,): of the gap at each reading, less noise. For b draws: picks (b, m), readings resampled from all;
+    shown_mm2 (m,): what the residuals show of the squares; moved_mm2 (b, m): what drawn numbers make of them beside it.
+    """
 
     added: str
     effects: tuple
     residual_mm: np.ndarray
-    gap_mm2: np.ndarray
-    draws: np.ndarray
+    squares_mm2: np.ndarray
+    picks: np.ndarray
+    shown_mm2: np.ndarray
+    moved_mm2: np.ndarray
+    counted: np.ndarray
 
     def part(self, chosen):
-        """The step at some of its points (n,)."""
-        at = self.residual_mm[chosen], self.gap_mm2[chosen], self.draws[:, chosen]
-        return ShrinkStep(self.added, self.effects, *at)
+        """The step at those of the chosen readings (m,) that count."""
+        return replace(self, counted=self.counted & chosen)
 
     @property
     def gap_rms_mm(self):
         """Root mean square gap."""
-        return gap_rms(self.gap_mm2)
+        return gap_rms(self.squares_mm2[self.counted])
+
+    @property
+    def drawn_rms_mm(self):
+        """Root mean square gap (b,) of the draws, NaN of those that have no reading that counts."""
+        picked = self.counted[self.picks]
+        with np.errstate(invalid="ignore"):
+            shown = np.where(picked, self.shown_mm2[self.picks], 0.0).sum(axis=1) / picked.sum(axis=1)
+        return np.sqrt(np.maximum(shown + self.moved_mm2[:, self.counted].mean(axis=1), 0.0))
 
 
 def gap_rms(squares):
@@ -41,11 +55,11 @@ def order_by_share(attribution):
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
     hypothesis, level = attribution.hypothesis, attribution.level
     left, chosen, result = list(hypothesis.terms), [], []
-    noise = 3.0 * attribution.case.noise_mm**2
+    noise, counted = 3.0 * attribution.case.noise_mm**2, attribution.case.on_robot
 
     def gap(terms):
         prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
-        return max(float((prediction.residual_mm**2).sum(axis=1).mean()) - noise, 0.0)
+        return max(float((prediction.residual_mm[counted] ** 2).sum(axis=1).mean()) - noise, 0.0)
 
     start = now = gap([])
     while left:
@@ -66,8 +80,7 @@ def shrink_steps(attribution, ordered, generator, draws):
     redraw the fitted numbers.
     """
     case, hypothesis, level = attribution.case, attribution.hypothesis, attribution.level
-    picks = resampled_rows(case, generator, draws)
-    result = []
+    picks, result = resampled_rows(case, generator, draws), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
@@ -77,33 +90,35 @@ def shrink_steps(attribution, ordered, generator, draws):
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
         moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
-        drawn = weight * shown[picks] + (1.0 - weight) * moved
-        added = terms[-1].effect if terms else ""
-        result.append(ShrinkStep(added, tuple(t.effect for t in terms), prediction.residual_mm, squares, drawn))
+        drawn = picks, weight * shown, (1.0 - weight) * moved
+        names = terms[-1].effect if terms else "", tuple(term.effect for term in terms)
+        result.append(ShrinkStep(*names, prediction.residual_mm, squares, *drawn, case.on_robot))
     return tuple(result)
 
 
 def share_closed(before, after):
     """Share of the gap closed between two steps and its 95 % interval from their draws; zero where there was no gap."""
     share = _share(before.gap_rms_mm, after.gap_rms_mm)
-    pairs = [_share(gap_rms(a), gap_rms(b)) for a, b in zip(before.draws, after.draws, strict=True)]
-    low, high = np.quantile(pairs, OPTIONS.interval_quantiles)
-    return share, float(min(low, share)), float(max(high, share))
+    drawn = zip(before.drawn_rms_mm, after.drawn_rms_mm, strict=True)
+    pairs = [_share(*pair) for pair in drawn if np.isfinite(pair).all()]
+    low, high = np.quantile(pairs, OPTIONS.interval_quantiles) if pairs else (np.nan, np.nan)
+    return share, float(np.minimum(low, share)), float(np.maximum(high, share))
 
 
 def shrink_table(case, steps, resimulated_mm):
-    """Rows of `gap_shrink` without the campaign; resimulated_mm (n, 3): of the corrected sim, None without effects."""
+    """Rows of `gap_shrink` without the campaign; resimulated_mm (m, 3): of the corrected sim, None without effects."""
     trajectory = case.points["trajectory"].to_numpy()
     noise = float(np.sqrt(3.0) * case.noise_mm)
     rows = []
     for number, step in enumerate(steps):
-        for name in ("*", *pd.unique(trajectory)):
+        for name in ("*", *pd.unique(trajectory[case.on_robot])):
             chosen = np.full(len(trajectory), True) if name == "*" else trajectory == name
             part = step.part(chosen)
             share = share_closed(steps[0].part(chosen), part) if number else (np.nan,) * 3
-            sizes = _sizes(part.residual_mm) | {"noise_rms_mm": noise, "gap_rms_mm": part.gap_rms_mm}
+            sizes = _sizes(part.residual_mm[part.counted]) | {"noise_rms_mm": noise, "gap_rms_mm": part.gap_rms_mm}
             rows.append(_label(number, step, name, "held_out") | sizes | dict(zip(CLOSED, share, strict=True)))
     if resimulated_mm is not None:
+        resimulated_mm = resimulated_mm[case.on_robot]
         after = gap_rms((resimulated_mm**2).sum(axis=1) - noise**2)
         sizes = _sizes(resimulated_mm) | {"noise_rms_mm": noise, "gap_rms_mm": after}
         share = _share(steps[0].gap_rms_mm, after), np.nan, np.nan

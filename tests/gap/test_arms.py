@@ -31,6 +31,35 @@ def _diagnosed(acting, seed):
     return diagnose(frame, robot, GapSettings(_LAWS, draws=10), details=False)
 
 
+def test_distances_are_those_of_positions_where_orientations_are_read_too():
+    """Turns of a precise instrument weigh 5 m: mixed with positions they would state eleven times the distance."""
+    law = find("encoder_eccentricity", arms.ARM)
+    acting = arms.active("", np.full(len(law.coordinates), 4e-4), {}, law)
+    noise = arms.NOISE_MM, 4e-6
+    frame = arms.measure((acting,), _COUNT, 1, noise)
+    robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
+    found = diagnose(frame, robot, GapSettings(("encoder_eccentricity",), draws=50))
+    case = found.attribution.case
+    assert case.arm_mm == pytest.approx(5000.0)
+    left = case.left(found.attribution.calibrated)[: len(frame)]
+    squares = (left**2).sum(axis=1) - 3.0 * noise[0] ** 2
+    true = np.sqrt(squares.mean())
+    assert found.verdict["gap_rms_mm"] == pytest.approx(true, rel=0.1)
+    assert found.verdict["gap_after_rms_mm"] < noise[0]
+    shrink, budget, places = (found.tables[name] for name in ("gap_shrink", "gap_budget", "gap_locate"))
+    assert (shrink["points"] == len(frame)).all()
+    assert shrink.query("kind == 'resimulated'")["rms_mm"].item() == pytest.approx(np.sqrt(3.0) * noise[0], rel=0.15)
+    effect = budget.query("part == 'encoder_eccentricity'").iloc[0]
+    assert effect["rms_mm"] == pytest.approx(true, rel=0.1) and effect["share"] == pytest.approx(1.0, abs=0.1)
+    assert budget["share"].sum() == pytest.approx(1.0)
+    axes = places.query("factor == 'direction'")
+    np.testing.assert_allclose(axes["rms_mm"], np.sqrt((left**2).mean(axis=0)))
+    assert axes["share"].sum() == pytest.approx(1.0) and (axes["points"] == len(frame)).all()
+    assert places.query("factor == 'trajectory'")["rms_mm"].item() == pytest.approx(np.sqrt((left**2).sum(axis=1).mean()))
+    drives = places.query("factor == 'drive'")
+    assert drives["share"].sum() == pytest.approx(1.0) and drives["share_of_noise"].sum() == pytest.approx(1.0)
+
+
 def _rough(spectrum, seed):
     """A function of each drive drawn from the law's own prior, and its coefficients (c,)."""
     effect = find("drive_error_function", arms.ARM)

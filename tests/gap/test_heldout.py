@@ -159,7 +159,8 @@ def test_the_share_closed_holds_on_other_trajectories(name):
 
 def _step(residual_mm, draws=3):
     squares = (residual_mm**2).sum(axis=1)
-    return shrink.ShrinkStep("", (), residual_mm, squares, np.tile(squares, (draws, 1)))
+    every = np.tile(np.arange(len(squares)), (draws, 1)), squares, np.zeros((draws, len(squares)))
+    return shrink.ShrinkStep("", (), residual_mm, squares, *every, np.ones(len(squares), dtype=bool))
 
 
 def test_shares_of_made_up_steps():
