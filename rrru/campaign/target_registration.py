@@ -35,7 +35,20 @@ _GRID_ITERATIONS, _MAX_ITERATIONS, _TURN_TOLERANCE_RAD = 25, 60, 1e-12
 _MAX_REWEIGHTINGS, _MOVE_TOLERANCE_MM, _BEND, _MIN_BEND_MM = 50, 1e-6, 1.5 / 0.6745, 1e-3
 # a turn is determined where readings move by this share of their spread per rad
 _MIN_SHARE_OF_SPREAD = 1e-3
+# mean square by which an axis of the body has to turn for a shift along it to be told from one of the instrument
+_LEAST_TURNED = 1e-5
 _EYE = np.eye(3)
+
+
+def axes_by_turning(turn: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Axes (3, 3), in columns, of a body with orientations (n, 3, 3), and the rms (3,) by which each turns in them.
+
+    The rms of an axis that stays where it is, as that which a robot turns about, is zero: along it a shift of all
+    targets is one of the instrument.
+    """
+    off = turn - turn.mean(axis=0)
+    squares, axes = np.linalg.eigh(np.einsum("nji,njk->ik", off, off) / len(turn))
+    return axes, np.sqrt(np.where(squares < _LEAST_TURNED, 0.0, squares))
 
 
 @dataclass(frozen=True)

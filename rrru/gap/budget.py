@@ -1,8 +1,9 @@
 """The budget of a gap: how much of its mean square each effect makes, and what does not repeat, runs and the unknown.
 
 Mean squares are those of positions on the robot. Effects and what is unexplained are drawn from the posterior over
-hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of effects that imitate each other add up to the
-gap's mean square, but for what the draw of the noise has left in it ("sampling").
+hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of
+effects that imitate each other add up to the gap's mean square, but for what the draw of the noise has left in it
+("sampling").
 """
 
 from itertools import combinations

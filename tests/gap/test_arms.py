@@ -55,7 +55,9 @@ def test_distances_are_those_of_positions_where_orientations_are_read_too():
     axes = places.query("factor == 'direction'")
     np.testing.assert_allclose(axes["rms_mm"], np.sqrt((left**2).mean(axis=0)))
     assert axes["share"].sum() == pytest.approx(1.0) and (axes["points"] == len(frame)).all()
-    assert places.query("factor == 'trajectory'")["rms_mm"].item() == pytest.approx(np.sqrt((left**2).sum(axis=1).mean()))
+    assert places.query("factor == 'trajectory'")["rms_mm"].item() == pytest.approx(
+        np.sqrt((left**2).sum(axis=1).mean())
+    )
     drives = places.query("factor == 'drive'")
     assert drives["share"].sum() == pytest.approx(1.0) and drives["share_of_noise"].sum() == pytest.approx(1.0)
 

@@ -16,7 +16,7 @@ from rrru.campaign.ingest.mastering import lost_zeros
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
-from rrru.campaign.target_registration import TargetReadings, affine_rms, register_targets
+from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
 from rrru.robots.readings import Readings
 from rrru.robots.robot import Robot
@@ -30,8 +30,6 @@ _MOST_ROWS, _MOST_SCREENED = 120, 40
 _LEAST_POSED = 0.9
 # readings farther off than so many medians are spoilt, and do not count
 _SPOILT = 6.0
-# mean square by which an axis of the body has to turn for a shift along it to be told from one of the instrument
-_LEAST_TURNED = 1e-5
 # independent errors of a robot whose model has few parameters: its joints have more; assumed
 _LEAST_INDEPENDENT = 15
 # a target that is nearer to its stated place than the first share of the robot's size is not grossly wrong, one that
@@ -181,9 +179,8 @@ class GrossFile:
         """
         if not self._stated.any():
             return place_mm
-        off = turn - turn.mean(axis=0)
-        sizes, axes = np.linalg.eigh(np.einsum("nji,njk->ik", off, off) / len(turn))
-        still = axes[:, sizes < _LEAST_TURNED]
+        axes, turned = axes_by_turning(turn)
+        still = axes[:, turned == 0.0]
         return place_mm + still @ still.T @ np.median((self.place_mm - place_mm)[self._stated], axis=0)
 
     def with_zeros(self) -> Hypothesis:

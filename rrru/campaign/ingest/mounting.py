@@ -14,12 +14,15 @@ from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.mastering import LARGE, lost_zeros
 from rrru.campaign.ingest.sheet import TURNS, position_text
+from rrru.campaign.target_registration import axes_by_turning
 from rrru.robots.readings import Readings
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"
 # orientations that differ by less are the same
 _NEVER_TURNS = 1e-6
+# cosine from which on an axis is one of the body's
+_ALONG = 0.9999
 # rows that tell which zeros are lost; the calibration fits what is found to all of them
 _TELLING = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
@@ -82,7 +85,7 @@ def mounting(sheet):
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
         # a platform that never turns does not tell them from the frame's shift: they lie about the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
-    turn, notes = np.eye(3), notes + (_found(sheet, frames, place) if named else ())
+    turn, notes = np.eye(3), notes + (_found(sheet, frames, place, poses) if named else ())
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         if registered:
@@ -158,15 +161,49 @@ def _known(sheet, names):
     return np.array([stated.get(name, nowhere) for name in names], dtype=float)
 
 
-def _found(sheet, frames, place):
-    """Notes on the places that were found."""
+def _found(sheet, frames, place, poses):
+    """Notes on the places (n, 3) that were found, from Poses (n)."""
+    axes, errors = _precision(frames, poses)
     result = []
     for name in dict.fromkeys(frames.names.tolist()):
+        if name in sheet.spec.targets:
+            continue
         k = int(np.argmax(frames.names == name))
-        where = "beside the robot" if frames.on_world[k] else "on the platform"
-        if name not in sheet.spec.targets:
-            result.append(f"reflector {name} found at {position_text(place[k])} {where}")
+        if frames.on_world[k]:
+            result.append(f"reflector {name} found at {position_text(place[k])} beside the robot")
+        elif not np.isfinite(errors).any():
+            at = f"reflector {name} assumed at {position_text(place[k])} on the platform, the mean of all at the tool"
+            result.append(f"{at}: a platform that never turns does not determine it")
+        else:
+            result.append(f"reflector {name} found {_place_text(place[k], axes, errors)}")
     return tuple(result)
+
+
+def _precision(frames, poses):
+    """Axes (3, 3) of the platform, in columns, and how far (3,) along each of them a place that was found may be off.
+
+    A residual of the nominal robot's size may be what moves a place, however many readings there are. Endless along
+    axes on which the readings do not determine the places.
+    """
+    residual = frames.framed(poses).off_mm
+    if not frames.registered or (frames.known & frames.telling).any():
+        return np.eye(3), np.full(3, residual)
+    axes, turned = axes_by_turning(poses.turn)
+    with np.errstate(divide="ignore"):
+        return axes, np.where(turned > 0.0, residual / turned, np.inf)
+
+
+def _place_text(place, axes, errors):
+    """A place (3,) on the platform in words, with a question mark for a number that the readings do not determine."""
+    still = axes[:, ~np.isfinite(errors)].T
+    of_body = {int(np.abs(axis).argmax()) for axis in still if np.abs(axis).max() > _ALONG}
+    numbers = ("?" if k in of_body else f"{value:.6g}" for k, value in enumerate(place))
+    result = f"at ({', '.join(numbers)}) mm on the platform, to about {errors[np.isfinite(errors)].max():.2g} mm"
+    for axis in still:
+        largest = int(np.abs(axis).argmax())
+        along = "xyz"[largest] if largest in of_body else f"({', '.join(f'{value:.3g}' for value in axis)})"
+        result += f", its place along {along} is one number with that of the instrument: this axis never turns"
+    return result
 
 
 def _between(poses, turns, rotation):

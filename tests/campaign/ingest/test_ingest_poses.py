@@ -1,5 +1,7 @@
 """Files of poses and of several reflectors, with joints alone, in an instrument's own frame; refusals."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +15,7 @@ from rrru.fit.campaign_fit import select
 from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.robots.catalogue import make_mechanism
+from rrru.robots.from_dh import from_dh
 from rrru.robots.geometric_numbers import direction
 from rrru.robots.readings import Readings
 from rrru.robots.rrru3 import Rrru3
@@ -237,3 +240,56 @@ def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
     assert [one.name for one in own] == ["reflector_b_x", "reflector_b_y", "reflector_b_z"]
     twist = direction(robot.legs, own[1])
     assert twist[robot.legs.site_numbers["reflector b"]].tolist() == [0, 1, 0, 0, 0, 0] and np.count_nonzero(twist) == 1
+
+
+def _seen_by_a_tracker(robot, driven, places, errors, generator):
+    """A file of reflectors at places by name, read in a frame that nobody knows; errors: of the robot, by name."""
+    guess = robot.guess(driven)
+    poses = robot.solve(driven, guess, robot.twists_of(errors))
+    assert poses.closed.all()
+    seen = np.stack([_FRAME.apply(poses.point(np.asarray(place))) + _SHIFT for place in places.values()], axis=1)
+    seen = seen.reshape(-1, 3) + 0.01 * generator.standard_normal((len(driven) * len(places), 3))
+    joints = pd.DataFrame(dict(zip(robot.parts.columns, driven.T, strict=True)))
+    table = joints.loc[joints.index.repeat(len(places))].reset_index(drop=True)
+    table = table.assign(trajectory="poses", target=[*places] * len(driven))
+    return table.assign(**dict(zip(_POINTS, seen.T, strict=True)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_place_is_stated_as_far_as_the_readings_determine_it(tmp_path, seed):
+    """A SCARA turns about z alone: at any height of its reflectors the tracker may stand so that all agrees."""
+    generator = np.random.default_rng(seed)
+    links = ({"a_mm": 325.0, "range_deg": [-120, 120]}, {"a_mm": 225.0, "alpha_deg": 180, "range_deg": [-130, 130]})
+    wrist = ({"sliding": True, "range_mm": [0, 150]}, {"range_deg": [-170, 170]})
+    robot = from_dh([*links, *wrist], name="scara")
+    low, high = robot.drive_range.T
+    driven = low + (high - low) * generator.random((60, 4))
+    places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, -80.0)}
+    errors = {"dq1": 2e-3, "dq2": -1e-3}
+    notes = _taken(
+        tmp_path, _seen_by_a_tracker(robot, driven, places, errors, generator), robot, frame="register"
+    ).notes
+    for name, place in places.items():
+        (note,) = (one for one in notes if one.startswith(f"reflector {name} "))
+        found = re.fullmatch(rf"reflector {name} found at \((.*), (.*), \?\) mm .*, to about (.*) mm, (.*)", note)
+        assert found and "along z is one number with that of the instrument" in found[4]
+        off = np.hypot(float(found[1]) - place[0], float(found[2]) - place[1])
+        assert off < 3.0 * float(found[3]) < 10.0
+    known = {"targets": {"one": places["one"]}}
+    notes = _taken(
+        tmp_path, _seen_by_a_tracker(robot, driven, places, errors, generator), robot, frame="register", **known
+    ).notes
+    (note,) = (one for one in notes if one.startswith("reflector "))
+    numbers = re.fullmatch(r"reflector two found at \((.*), (.*), (.*)\) mm on the platform, to about (.*) mm", note)
+    off = np.linalg.norm(np.array(numbers.groups()[:3], dtype=float) - places["two"])
+    assert off < 3.0 * float(numbers[4]) < 10.0
+
+
+def test_the_place_on_a_platform_that_never_turns_is_an_assumption(tmp_path):
+    robot, generator = Rrru3(), np.random.default_rng(1)
+    driven = robot.inverse(generator.uniform((-150.0, -150.0, 550.0), (150.0, 150.0, 700.0), (40, 3)))
+    places = {"one": (40.0, 10.0, -35.0), "two": (-60.0, 25.0, -80.0)}
+    table = _seen_by_a_tracker(robot, driven, places, {}, generator)
+    notes = _taken(tmp_path, table, robot, frame="register").notes
+    told = [one for one in notes if one.startswith("reflector ")]
+    assert len(told) == 2 and all("assumed at" in one and "does not determine it" in one for one in told)

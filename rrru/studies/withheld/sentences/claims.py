@@ -96,7 +96,10 @@ _READ = {
     "no commanded positions": r"no commanded positions: computed from .*",
     "no such column": r"no column (?P<column>\w+): .*",
     "registered": r"measured positions registered to the commanded ones at (?P<points>\d+) points: .*",
-    "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform",
+    "a reflector was found": r"reflector (?P<name>\w+) found at \((?P<place>[^)]*)\) mm on the platform, "
+    r"to about (?P<about>\S+) mm(, its place along .* never turns)?",
+    "a reflector is assumed": r"reflector (?P<name>\w+) assumed at \((?P<place>[^)]*)\) mm on the platform, "
+    r"the mean of all at the tool: a platform that never turns does not determine it",
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",

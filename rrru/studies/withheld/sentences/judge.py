@@ -21,8 +21,8 @@ STRONG = 1.5
 _SURE = 0.9
 # what a file's error may be of the estimate's, and a stated remainder of the true one
 _AS_GOOD, _REMAINDER = 1.1, 0.1
-# of a noise; of the places of reflectors in mm, and of angles that are read
-_NEAR_NOISE, _NEAR_PLACE_MM, _NEAR_TURN_RAD = 0.15, 5.0, 0.03
+# of a noise, and of angles that are read; how often a stated precision a place may be off
+_NEAR_NOISE, _NEAR_TURN_RAD, _MOST_ERRORS = 0.15, 0.03, 3.0
 # least share of the largest error about a place that is called the worst
 _WORST = 0.5
 # what errors of the links can make of a zero
@@ -347,11 +347,12 @@ def _detectable(stated, truth, facts):
 
 
 def _reflector(stated, truth, _facts):
-    """A reflector's place, of a robot that is not calibrated yet, within some mm."""
+    """A reflector's place, as far as it is stated, within three times what it may be off by."""
     if stated["name"] not in truth.places:
         return None
-    place = np.array(stated["place"].split(", "), dtype=float)
-    return np.linalg.norm(place - truth.places[stated["name"]]) <= _NEAR_PLACE_MM
+    place = np.array(stated["place"].replace("?", "nan").split(", "), dtype=float)
+    off = np.nan_to_num(place - truth.places[stated["name"]])
+    return np.linalg.norm(off) <= _MOST_ERRORS * float(stated["about"])
 
 
 def _outliers(_stated, _truth, _facts):
@@ -447,6 +448,7 @@ _JUDGES = {
     "no such column": _missing,
     "registered": _registered,
     "a reflector was found": _reflector,
+    "a reflector is assumed": _undecided,
     "orientations are turned": _turned,
     "zeros are lost": _zeros_lost,
     "points are outliers": _outliers,
