@@ -1,6 +1,7 @@
 """Ingest of a measured campaign: an instrument's CSV or parquet file becomes a measurement table or is refused."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +14,10 @@ from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error
+from rrru.campaign.ingest.gross_file import ORDINARY_SHARE
 from rrru.campaign.ingest.guess import guess_columns
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
-from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting
+from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
 from rrru.campaign.ingest.problems import Problems
 from rrru.campaign.ingest.registration import Registration
 from rrru.campaign.ingest.sent import sent_to
@@ -63,6 +65,12 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         check_measured(at_tool(sheet, mounted))
         sheet.problems.refuse()
         residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
+        if registration.rms_mm > ORDINARY_SHARE * mechanism.size_mm:
+            percent = 100.0 * registration.rms_mm / mechanism.size_mm
+            share = f"{registration.rms_mm:.3g} mm rms, {percent:.1f} % of the robot's size"
+            notes.append(
+                f"the nominal robot misses by {share}, more than links are usually off: see that `robot` is right"
+            )
         notes += [
             f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
             "rigid motion that is left is fitted with the calibration"
@@ -175,7 +183,8 @@ def _table(
     frame, drives = at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
     wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
-    notes = [*doubts(frame[~wrong], sheet.mechanism), *beyond_ranges(values, sheet.mechanism)]
+    places = partial(places_instead, sheet)
+    notes = [*doubts(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
     outlier = outliers(frame, digit_mm) | wrong
     told = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:

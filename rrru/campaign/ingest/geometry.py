@@ -13,6 +13,8 @@ DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
 # ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ. A
 # hundredth of it is strange enough for a note.
 _FRAME_SHARE, _STRANGE_SHARE = 0.05, 0.01
+# what leaves less than this share of a distance explains it
+_SMALL_SHARE = 0.2
 # Margin beyond the farthest reachable point, where an outlier may still lie.
 _REACH_MARGIN = 1.1
 _MOST, _MANY = 0.9, 0.5
@@ -58,13 +60,15 @@ def check_sizes(sheet, offset_mm=0.0):
     """Note measured positions in another unit than the commanded ones; whether both have the same.
 
     Their spreads are compared, which are the same in every frame. offset_mm (n, 3): of what is measured from the tool.
+    A reflector on a platform that turns may move far less or more than the tool where nobody states its place.
     """
+    low, high = (0.5, 2.0) if _place_stated(sheet) else (0.05, 20.0)
     known = (sheet.frame[[*COMMAND, *MEASURED]].notna()).all(axis=1).to_numpy()
     if not known.any():
         return False
     command = _spread((rows.command(sheet.frame) + offset_mm)[known])
     measured = _spread(rows.measured(sheet.frame)[known])
-    if command == 0.0 or 0.5 <= measured / command <= 2.0:
+    if command == 0.0 or low <= measured / command <= high:
         return True
     ratio, seems = measured / command, ""
     if not set(COMMAND) <= set(sheet.found):
@@ -76,8 +80,20 @@ def check_sizes(sheet, offset_mm=0.0):
     value = (
         f"measured positions that spread over {measured:.6g} mm while the commanded ones spread over {command:.6g} mm"
     )
-    sheet.note("size", MEASURED, f"{value} (ratio {ratio:.4g})", f"a ratio of 0.5 to 2: both in the same unit{seems}")
+    sheet.note(
+        "size",
+        MEASURED,
+        f"{value} (ratio {ratio:.4g})",
+        f"a ratio of {low:g} to {high:g}: both in the same unit{seems}",
+    )
     return False
+
+
+def _place_stated(sheet):
+    """Whether the place of all that is measured is stated, or moves as the tool does."""
+    if not sheet.mechanism.orients or "target" not in sheet.frame:
+        return True
+    return set(sheet.frame["target"].astype(str)) <= set(dict(sheet.spec.targets))
 
 
 def check_measured(sheet):
@@ -105,18 +121,23 @@ def check_measured(sheet):
         sheet.note("reach of measured", MEASURED, position_text(measured[i]), allowed, known.index[i])
 
 
-def doubts(frame, mechanism):
-    """What is strange about measured positions in the robot's frame: far off in all, or one row late or early."""
+def doubts(frame, mechanism, places_instead):
+    """What is strange about measured positions in the robot's frame: far off in all, or one row late or early.
+
+    places_instead: of targets or tool, in words, from the distance in mm that they may leave.
+    """
     command, measured, run = rows.command(frame), rows.measured(frame), frame["run"].to_numpy()
     off, notes = np.median(np.linalg.norm(measured - command, axis=1)), []
     for first, second, word in ((measured[1:], command[:-1], "before"), (measured[:-1], command[1:], "after")):
         shifted = np.linalg.norm(first - second, axis=1)[run[1:] == run[:-1]]
-        if off > 1.0 and np.median(shifted) < 0.2 * off:
+        if off > 1.0 and np.median(shifted) < _SMALL_SHARE * off:
             fit = f"measured positions fit the command of the row {word} theirs to {np.median(shifted):.3g} mm"
             notes.append(f"{fit} in the median, their own to {off:.3g} mm: the rows may be shifted")
     if off > _STRANGE_SHARE * mechanism.size_mm:
         far = f"measured positions are {off:.4g} mm from the commanded ones in the median"
-        notes.append(f"{far}: see that unit, frame and rows belong together")
+        places = places_instead(_SMALL_SHARE * off)
+        fit = f"; {places} would fit to less than {100.0 * _SMALL_SHARE:.0f} % of that" if places else ""
+        notes.append(f"{far}: see that unit, frame and rows belong together{fit}")
     return notes
 
 

@@ -1,6 +1,6 @@
 """What to write into the configuration, or to mend in a file, against gross mistakes, in words."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -67,15 +67,18 @@ def _commands_are_right(file: GrossFile, mistakes: Mistakes) -> bool:
 
 def _of_targets(file: GrossFile, found: Hypothesis) -> str:
     """The key `targets` with the places that were found of those that are stated, or where the tool is."""
-    if not any(file.names):
-        return f"a tool at {position_text(found.place_mm[0])}"
     stated = np.isfinite(file.place_mm).all(axis=1)
-    places = ", ".join(
-        f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]"
-        for name, place, known in zip(file.names, found.place_mm, stated, strict=True)
-        if known
+    return place_words(
+        {name: found.place_mm[k] for k, name in enumerate(file.names) if stated[k] or not any(file.names)}
     )
-    return f"targets: {{{places}}}"
+
+
+def place_words(places: Mapping[str, np.ndarray]) -> str:
+    """The key `targets` with places (3,) in mm by name, or where the tool is, whose name is empty."""
+    if "" in places:
+        return f"a tool at {position_text(places[''])}"
+    each = (f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]" for name, place in places.items())
+    return f"targets: {{{', '.join(each)}}}"
 
 
 def _of_axes(file: GrossFile, rotation: np.ndarray) -> str:

@@ -20,13 +20,11 @@ import pandas as pd
 from scipy.special import logsumexp
 
 from rrru.campaign.ingest.gross_advice import advice
-from rrru.campaign.ingest.gross_file import EXPLAINED_SHARE, GrossFile, Hypothesis
+from rrru.campaign.ingest.gross_file import EXPLAINED_SHARE, ORDINARY_SHARE, GrossFile, Hypothesis
 from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.robots.robot import Robot
 
-# a smaller rms, as a share of the robot's size, is one of ordinary errors of its geometry; assumed
-_ORDINARY_SHARE = 2e-3
 # what more than this share of the robot's size is left of, with the zeros of the drives fitted, is of another robot:
 # links are not built wrong by a fiftieth; assumed
 _FOREIGN_SHARE = 2e-2
@@ -81,7 +79,7 @@ def find_gross_error(
     if file is None or len(file) < _LEAST_ROWS:
         return None
     file = replace(file, agreed=agreed)
-    search, ordinary_mm = _Search(file), _ORDINARY_SHARE * robot.size_mm
+    search, ordinary_mm = _Search(file), ORDINARY_SHARE * robot.size_mm
     as_is = search.best
     if as_is.rms_mm <= ordinary_mm:
         return None
@@ -158,10 +156,17 @@ class _Search:
 
 
 def _foreign(file: GrossFile, as_is: Hypothesis, best: Hypothesis) -> GrossError | None:
-    """The GrossError of a file that is far from the robot whatever the zeros of its drives; None of others."""
+    """The GrossError of a file that is far from the robot whatever the zeros of its drives; None of others.
+
+    Zeros, as any mistake, explain a file only where they leave little of it: they fit the links of another robot, too.
+    """
     size = file.robot.size_mm
-    limit_mm = min(_FOREIGN_SHARE * size, max(_FOREIGN_SPREAD_SHARE * file.spread_mm(), _ORDINARY_SHARE * size))
-    if file.share_in_range() >= _LEAST_IN_RANGE and min(as_is.rms_mm, file.with_zeros().rms_mm) <= limit_mm:
-        return None
+    limit_mm = min(_FOREIGN_SHARE * size, max(_FOREIGN_SPREAD_SHARE * file.spread_mm(), ORDINARY_SHARE * size))
+    if file.share_in_range() >= _LEAST_IN_RANGE:
+        if as_is.rms_mm <= limit_mm:
+            return None
+        limit_mm = min(limit_mm, EXPLAINED_SHARE * size)
+        if file.with_zeros().rms_mm <= limit_mm:
+            return None
     nearest = f" ({advice(file, best)})" if best.mistakes.count and np.isfinite(best.rms_mm) else ""
     return GrossError(best.mistakes, as_is.rms_mm, best.rms_mm, nearest, limit_mm)

@@ -24,6 +24,8 @@ from rrru.robots.walk import Poses
 
 # a mistake explains a file where what it leaves is less than this share of the robot's size; assumed
 EXPLAINED_SHARE = 5e-3
+# a smaller rms, as a share of the robot's size, is one of ordinary errors of its geometry; assumed
+ORDINARY_SHARE = 2e-3
 # rows that decide: enough for the rms of every hypothesis within some percent; and for which are worth a look
 _MOST_ROWS, _MOST_SCREENED = 120, 40
 # share of the rows at which the nominal robot has to have a pose for a hypothesis to count

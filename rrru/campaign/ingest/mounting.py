@@ -12,8 +12,9 @@ from rrru.campaign import measurements as rows
 from rrru.campaign.driven_path import stops
 from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
+from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.mastering import LARGE, lost_zeros
-from rrru.campaign.ingest.sheet import TURNS, position_text
+from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.robots.readings import Readings
 
@@ -21,6 +22,8 @@ from rrru.robots.readings import Readings
 _UNNAMED = "tool"
 # orientations that differ by less are the same
 _NEVER_TURNS = 1e-6
+# places explain what zeros of the drives do where they leave at most so many times as much
+_AS_GOOD, _FAR_BETTER = 2.0, 0.5
 # cosine from which on an axis is one of the body's
 _ALONG = 0.9999
 # rows that tell which zeros are lost; the calibration fits what is found to all of them
@@ -77,7 +80,9 @@ def mounting(sheet):
     zeros = _zeros(sheet, frames, command) if told else np.zeros(len(sheet.drives))
     if zeros.any():
         poses = sheet.mechanism.solve(sheet.actuators(command) + zeros, command)
-        notes += _in_words(sheet.mechanism.parts, zeros)
+        left_mm = frames.framed(poses).off_mm
+        _refuse_places(sheet, left_mm)
+        notes += _in_words(sheet, zeros, left_mm)
     elif not named:
         return None
     rotation, place = frames.fitted(poses)
@@ -124,16 +129,47 @@ def _zeros(sheet, frames, command):
     return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, told.framed)
 
 
-def _in_words(parts, zeros):
-    """Notes on zeros (K,) of the drives that are far off."""
+def _refuse_places(sheet, left_mm):
+    """Raise IngestError where other places leave far less than the left_mm of lost zeros."""
+    if places := places_instead(sheet, _FAR_BETTER * left_mm):
+        value = f"measured positions that lost zeros of the drives bring to {left_mm:.3g} mm from the nominal robot"
+        allowed = f"at most {_FAR_BETTER * left_mm:.2g} mm; {places} brings them there, frame: register may do so, too"
+        sheet.refuse_now(MEASURED, value, allowed)
+
+
+def places_instead(sheet, most_mm):
+    """The key `targets`, or the place of the tool, that brings the nominal robot to what is measured in its own frame.
+
+    Places in words; empty where the median distance that they leave is more than most_mm.
+    """
+    frame, poses = sheet.frame, sheet.poses
+    if sheet.spec.frame != "robot":
+        return ""
+    names = frame["target"].astype(str).to_numpy() if "target" in frame else np.full(len(frame), "")
+    own = np.einsum("nji,nj->ni", poses.turn, rows.measured(frame) - poses.position_mm)
+    known = np.isfinite(own).all(axis=1) & ~np.isin(names, sheet.spec.world_targets)
+    places = {name: np.median(own[known & (names == name)], axis=0) for name in dict.fromkeys(names[known].tolist())}
+    off = [np.linalg.norm(own[known & (names == name)] - place, axis=1) for name, place in places.items()]
+    if not places or not np.median(np.concatenate(off)) <= most_mm:
+        return ""
+    return place_words(places)
+
+
+def _in_words(sheet, zeros, left_mm):
+    """Notes on zeros (K,) of the drives that are far off, with which the nominal robot is left_mm off in the median."""
+    parts = sheet.mechanism.parts
     shares = np.abs(zeros) / [LARGE[unit] for unit in parts.units]
     worst = int(shares.argmax())
     if shares[worst] < 1.0:
         return ()
     drive = parts.drives[worst]
     most = f"{np.degrees(zeros[worst]):.3g} degrees" if drive.unit == "rad" else f"{zeros[worst]:.3g} mm"
-    found = "found with the frame, fitted by the calibration"
-    return (f"zeros of {int((shares >= 1.0).sum())} drives are lost, by {most} at {drive.site}: {found}",)
+    count = int((shares >= 1.0).sum())
+    lost = f"zeros of {count} drives are" if count > 1 else "the zero of 1 drive is"
+    found = f"found with the frame, fitted by the calibration, {left_mm:.2g} mm remain in the median"
+    places = places_instead(sheet, _AS_GOOD * left_mm)
+    others = f"{places}, or `robot` is another one" if places else "`robot` is another one or a stated place is wrong"
+    return (f"{lost} lost, by {most} at {drive.site}: {found}; if the drives are referenced, {others}",)
 
 
 def check_turned(sheet):

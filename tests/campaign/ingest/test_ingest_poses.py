@@ -293,3 +293,74 @@ def test_the_place_on_a_platform_that_never_turns_is_an_assumption(tmp_path):
     notes = _taken(tmp_path, table, robot, frame="register").notes
     told = [one for one in notes if one.startswith("reflector ")]
     assert len(told) == 2 and all("assumed at" in one and "does not determine it" in one for one in told)
+
+
+def _scara_of(first_mm, second_mm):
+    links = (
+        {"a_mm": first_mm, "range_deg": [-120, 120]},
+        {"a_mm": second_mm, "alpha_deg": 180, "range_deg": [-130, 130]},
+    )
+    return from_dh([*links, {"sliding": True, "range_mm": [0, 150]}, {"range_deg": [-170, 170]}], name="scara")
+
+
+def _in_the_robots_frame(robot, place, generator):
+    """A file of a SCARA's flange, or of a target at a place, read in the robot's frame."""
+    low, high = robot.drive_range.T
+    driven = low + (high - low) * generator.random((60, 4))
+    seen = robot.solve(driven, robot.guess(driven)).point(np.asarray(place))
+    seen = seen + 0.02 * generator.standard_normal(seen.shape)
+    joints = pd.DataFrame(dict(zip(robot.parts.columns, driven.T, strict=True)))
+    return joints.assign(trajectory="poses", **dict(zip(_POINTS, seen.T, strict=True)))
+
+
+def test_a_wrong_height_in_the_robots_frame_is_named(tmp_path):
+    """Along z a SCARA's tool, its slide's zero and the frame are one number: it is said which would fit."""
+    robot = _scara_of(325.0, 225.0)
+    off = 0.03 * robot.size_mm
+    table = _in_the_robots_frame(robot, (0.0, 0.0, off), np.random.default_rng(3))
+    (note,) = (one for one in _taken(tmp_path, table, robot).notes if "see that unit, frame and rows" in one)
+    place = re.search(r"; a tool at \((.*), (.*), (.*)\) mm would fit to less than 20 % of that", note)
+    np.testing.assert_allclose(np.array(place.groups(), dtype=float), (0.0, 0.0, off), atol=0.02)
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0, 50.0), (15.0, -30.0, 40.0)])
+def test_a_wrong_place_on_a_platform_that_never_turns_is_named_beside_lost_zeros(off, tmp_path):
+    """Zeros of three drives can do much of what a shift does: the shift, which does it all, is what to write."""
+    robot, generator, stated = Rrru3(), np.random.default_rng(3), (60.0, 5.0, 30.0)
+    true = np.add(stated, off)
+    point = np.array([0.0, 0.0, 620.0]) + generator.uniform(-80.0, 80.0, (60, 3))
+    driven = robot.inverse(point)
+    table = pd.DataFrame(dict(zip(robot.parts.columns, driven.T, strict=True))).assign(trajectory="poses", target="a")
+    seen = robot.solve(driven, point).point(true) + 0.02 * generator.standard_normal((60, 3))
+    table = table.assign(**dict(zip(_POINTS, seen.T, strict=True)))
+    try:
+        words = " ".join(_taken(tmp_path, table, robot, targets={"a": stated}).notes)
+    except IngestError as error:
+        words = str(error)
+    place = re.search(r"targets: \{a: \[(.*), (.*), (.*)\]\}", words)
+    np.testing.assert_allclose(np.array(place.groups(), dtype=float), true, atol=0.1)
+
+
+def test_a_robot_that_is_far_off_is_doubted(tmp_path):
+    """Links that are 1 % longer than the description says are no gross mistake, but strange enough for a note."""
+    robot, longer, generator = _scara_of(325.0, 225.0), _scara_of(330.0, 228.0), np.random.default_rng(3)
+    for made, count in ((longer, 1), (robot, 0)):
+        table = _in_the_robots_frame(made, (0.0, 0.0, 0.0), generator)
+        moved = _FRAME.apply(table[_POINTS].to_numpy()) + _SHIFT
+        table = table.assign(**dict(zip(_POINTS, moved.T, strict=True)))
+        notes = _taken(tmp_path, table, robot, frame="register").notes
+        doubted = [one for one in notes if one.endswith("see that `robot` is right")]
+        lost = [one for one in notes if "lost" in one and "if the drives are referenced, `robot` is another one" in one]
+        assert len(doubted) + len(lost) >= count and bool(doubted or lost) == bool(count)
+
+
+def test_a_reflector_that_moves_far_less_than_the_tool_is_no_wrong_unit(arm, driven, tmp_path):
+    """An instrument's own frame is the reason, and `frame: register` what to write."""
+    poses = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1)))
+    wrist = poses.point(np.zeros(3))
+    still = wrist[:1] + 0.2 * (wrist - wrist[:1])
+    table = pd.DataFrame(dict(zip(arm.parts.columns, driven.T, strict=True)))
+    moved = dict(zip(_POINTS, (_FRAME.apply(still) + _SHIFT).T, strict=True))
+    with pytest.raises(IngestError) as error:
+        _taken(tmp_path, table.assign(trajectory="poses", target="a", **moved), arm)
+    assert "both in the same unit" not in str(error.value)

@@ -101,7 +101,9 @@ _READ = {
     "a reflector is assumed": r"reflector (?P<name>\w+) assumed at \((?P<place>[^)]*)\) mm on the platform, "
     r"the mean of all at the tool: a platform that never turns does not determine it",
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
-    "zeros are lost": rf"zeros of (?P<count>\d+) drives are lost, by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
+    "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
+    rf"by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
+    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_X} % of the robot's size, more than .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",

@@ -451,6 +451,7 @@ _JUDGES = {
     "a reflector is assumed": _undecided,
     "orientations are turned": _turned,
     "zeros are lost": _zeros_lost,
+    "far from ordinary errors": _outliers,
     "points are outliers": _outliers,
     "stale readings": _outliers,
     "undeclared columns": _outliers,

@@ -163,7 +163,7 @@ def _in_degrees(handed, own, _generator):
 def _other_robot(handed, own, generator):
     """The robot's file is that of another robot of its kind."""
     other = KINDS[own.robot_kind](generator)
-    return replace(handed, nominal=other, words=("robot",))
+    return replace(handed, nominal=other, words=("does not fit the robot",))
 
 
 def _frame(handed, own, generator):

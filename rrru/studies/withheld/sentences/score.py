@@ -20,6 +20,13 @@ _WORDS = {True: "true", False: "false", None: "undecided"}
 _BESIDE = ", beside something unexplained"
 _OF_NUMBERS = "interval of a number: calibration"
 _LONGEST = 400
+# sentences with which a file is accepted that say that something may be wrong with it
+_WARNINGS = (
+    "may be shifted",
+    "see that unit, frame and rows belong together",
+    "if the drives are referenced",
+    "see that `robot` is right",
+)
 COLUMNS = ["check", "robot", "truth", "statement", "kind", "text", "result"]
 
 
@@ -85,7 +92,7 @@ def _of_mistake(number, settings, folder):
     if not mistakes.shows(name, own, handed):
         return own.name, name, [(f"mistake named: {name}", "does not show in the file", None)]
     became, words = mistakes.read(own, handed, folder)
-    warned = "may be shifted" in words or "see that unit, frame and rows belong together" in words
+    warned = any(warning in words for warning in _WARNINGS)
     wanted = f" [wanted: {', '.join(handed.words)}]"
     right = became != "traceback" and mistakes.named(handed, words)
     right = None if not right and mistakes.is_mirrored(own, handed, words) else right
