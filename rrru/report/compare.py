@@ -9,6 +9,7 @@ from scipy.stats import chi2
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
+from rrru.estimation.intervals import QUANTILE_95
 from rrru.fit.campaign_fit import CalibrationSettings
 from rrru.store import facts, tables
 
@@ -124,9 +125,10 @@ def difference(first, second, calibration):
     together = np.hypot(*error)
     square = float(step[known] @ np.linalg.solve(covariance, step[known])) if known.any() else 0.0
     frame = pd.DataFrame({"parameter": values[0].index, "unit": values[0]["unit"].to_numpy()})
-    for side, value, own in zip("ab", values, error, strict=True):
-        frame[side], frame[f"{side}_error"] = value["value"].to_numpy(), own
-    frame = frame.assign(difference=step, in_errors=step / together)
+    numbers = (("a", values[0]["value"], error[0]), ("b", values[1]["value"], error[1]), ("difference", step, together))
+    for name, value, own in numbers:
+        frame[name] = np.asarray(value)
+        frame[f"{name}_low"], frame[f"{name}_high"] = (frame[name] + sign * QUANTILE_95 * own for sign in (-1, 1))
     freedom = int(known.sum())
     return Difference(frame, square, freedom, float(chi2.sf(square, freedom)) if freedom else 1.0)
 

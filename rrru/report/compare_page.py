@@ -93,13 +93,16 @@ def _chapter(first, second):
 
 def _numbers(found, shared):
     """Whether the fitted numbers differ."""
-    known = found.rows.dropna(subset=["in_errors"])
+    known = found.rows.dropna()
     if known.empty:
-        return "The fitted numbers cannot be compared: none has a standard error on both sides."
-    largest = known.loc[known["in_errors"].abs().idxmax()]
+        return "The fitted numbers cannot be compared: none has a 95 % interval on both sides."
+    width = known["difference_high"] - known["difference_low"]
+    largest = known.loc[(known["difference"].abs() / width).idxmax()]
     square = f"chi-square {cells.short(found.chi_square)} with {found.freedom} numbers"
     measure = f"{square}, by chance with probability {_chance(found.chance)}"
-    most = f"most {largest['parameter']}, by {abs(largest['in_errors']):.1f} standard errors"
+    ends = [cells.short(largest[f"difference_{end}"]) for end in ("low", "high")]
+    size = f"{cells.short(largest['difference'])} {largest['unit']} (95 %: {ends[0]} to {ends[1]})"
+    most = f"most {largest['parameter']}, by {size}"
     said = "differ by more than their errors" if found.chance < _LEVEL else "do not differ beyond their errors"
     beside = f" Both share {shared} measured points, so that the true chi-square is no smaller." if shared else ""
     return f"The fitted numbers {said} ({measure}; {most}).{beside}"
@@ -157,7 +160,7 @@ def _points(judged, calibration, shared):
     return (
         f"The points: {listed}, of the set {calibration!r}. Each is foretold by the other campaign's calibration, "
         "which has not seen it, and by its own campaign's, fitted again without the trajectory, run or stretch of it."
-        f"{same} Chance is counted over the runs. Standard errors hold if the model lacks nothing: where effects are "
+        f"{same} Chance is counted over the runs. Intervals hold if the model lacks nothing: where effects are "
         "named, fitted numbers may differ for these."
     )
 

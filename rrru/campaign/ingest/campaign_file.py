@@ -13,8 +13,8 @@ from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
 from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
-from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error
-from rrru.campaign.ingest.gross_file import ORDINARY_SHARE
+from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
+from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
 from rrru.campaign.ingest.in_robot_frame import at_tool, outliers, register_sheet
 from rrru.campaign.ingest.mounting import Mounting, check_turned, mounting, places_instead
@@ -55,14 +55,14 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
     same = check_sizes(sheet, mounted.offset_mm if mounted else 0.0)
     # where reflectors sit is looked at in a file without problems only: without their offsets nothing is too far off
     if same and spec.frame == "robot" and (mounted or "target" not in sheet.frame):
-        check_measured(at_tool(sheet, mounted))
+        check_measured(at_tool(sheet, mounted), lambda: frame_advice(_gross_file(sheet)))
         check_turned(sheet)
     sheet.problems.refuse()
     registration = register_sheet(sheet, mounted, digit_mm) if spec.frame == "register" else None
     if registration:
         moved = vector_columns("measured", registration.apply(measured(sheet.frame)))
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
-        check_measured(at_tool(sheet, mounted))
+        check_measured(at_tool(sheet, mounted), lambda: "rows that belong to each other")
         sheet.problems.refuse()
         residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
         if registration.rms_mm > ORDINARY_SHARE * mechanism.size_mm:
@@ -154,6 +154,11 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
         allowed += "its description, the columns of its drives (`columns`) and the measured rows belong to each other"
     concerned = sheet.drives if driven and not gross.mistakes.of_readings else MEASURED
     sheet.refuse_now(concerned, value, allowed)
+
+
+def _gross_file(sheet: Sheet) -> GrossFile | None:
+    """The columns of a sheet as gross mistakes are looked for in them."""
+    return GrossFile.of(sheet.frame, sheet.spec, sheet.mechanism, sheet.found, unit_stated=True)
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

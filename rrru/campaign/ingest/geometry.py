@@ -96,8 +96,11 @@ def _place_stated(sheet):
     return set(sheet.frame["target"].astype(str)) <= set(dict(sheet.spec.targets))
 
 
-def check_measured(sheet):
-    """Note measured positions, in the robot's frame, beyond its reach or altogether elsewhere than commanded."""
+def check_measured(sheet, frame_advice):
+    """Note measured positions, in the robot's frame, beyond its reach or altogether elsewhere than commanded.
+
+    frame_advice: without arguments to what to write where all are elsewhere, in words.
+    """
     known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
     command, measured = rows.command(known), rows.measured(known)
     limit, off = frame_limit(sheet.mechanism), np.linalg.norm(measured - command, axis=1)
@@ -106,7 +109,7 @@ def check_measured(sheet):
         value = (
             f"measured positions {np.median(off):.6g} mm from the commanded ones in the median, {along} along x, y, z"
         )
-        advice = _axes_advice(measured, command, limit) or "frame: register turns another frame into the robot frame"
+        advice = " or ".join(filter(None, (_axes_advice(measured, command, limit), frame_advice())))
         sheet.note("frame", MEASURED, value, f"at most {limit:g} mm; {advice}")
         return
     for number, at in known.groupby("run").indices.items():

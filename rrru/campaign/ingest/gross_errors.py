@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 from scipy.special import logsumexp
 
-from rrru.campaign.ingest.gross_advice import advice
+from rrru.campaign.ingest.gross_advice import advice, of_drives
 from rrru.campaign.ingest.gross_file import EXPLAINED_SHARE, ORDINARY_SHARE, GrossFile, Hypothesis
 from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.spec import IngestSpec
@@ -98,6 +98,24 @@ def find_gross_error(
         words = " or ".join(advice(file, one) for one in named)
         return GrossError(named[0].mistakes, as_is.rms_mm, named[0].rms_mm, words)
     return _foreign(file, as_is, search.best)
+
+
+def frame_advice(file: GrossFile | None) -> str:
+    """What may bring positions that are far off in the robot's own frame to where they belong, in words.
+
+    Orders and signs of the drives that do so in this frame, and the instrument's own frame where a registration leaves
+    little. A gantry whose drives are exchanged moves as one whose frame is turned.
+    """
+    register = "frame: register turns another frame into the robot frame"
+    if file is None or len(file) < _LEAST_ROWS:
+        return register
+    limit_mm = EXPLAINED_SHARE * file.robot.size_mm
+    alike = (one for one in file.given.further(()) if one.count and not (one.free or one.mirrored or one.shift))
+    found = [one for one in dict.fromkeys(alike) if file.off_in_robot_frame(one) <= limit_mm]
+    texts, left_mm = [" and ".join(of_drives(file, one)) for one in found], file.hypothesis(file.given).rms_mm
+    if left_mm <= limit_mm:
+        texts.append(register)
+    return " or ".join(texts) or f"frame: register would leave {left_mm:.3g} mm rms: see that `robot` is right"
 
 
 class _Search:

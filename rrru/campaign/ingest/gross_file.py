@@ -248,6 +248,14 @@ class GrossFile:
         moves = _LEAST_SPREAD < self._spread(readings) / self.robot.size_mm < _MOST_SPREAD
         return readings if moves else None
 
+    def off_in_robot_frame(self, mistakes: Mistakes) -> float:
+        """Median distance in mm that some Mistakes leave where the instrument's frame is the robot's; inf for none."""
+        readings = self.readings(mistakes)
+        if readings is None or not np.isfinite(place := readings.place_mm[readings.target]).all():
+            return np.inf
+        model = readings.body_mm + np.einsum("nij,nj->ni", readings.body_turn, place)
+        return float(np.median(np.linalg.norm(readings.measured_mm - model, axis=1)))
+
     def bodies(self, mistakes: Mistakes) -> np.ndarray:
         """Positions (m, 3) of what carries the targets in the rows that decide, NaN where there are none."""
         return self._bodies(mistakes, self.chosen)[0]

@@ -304,9 +304,9 @@ def _scara_of(first_mm, second_mm):
 
 
 def _in_the_robots_frame(robot, place, generator):
-    """A file of a SCARA's flange, or of a target at a place, read in the robot's frame."""
+    """A file of a target at a place, read in the robot's frame."""
     low, high = robot.drive_range.T
-    driven = low + (high - low) * generator.random((60, 4))
+    driven = low + (high - low) * generator.random((60, len(low)))
     seen = robot.solve(driven, robot.guess(driven)).point(np.asarray(place))
     seen = seen + 0.02 * generator.standard_normal(seen.shape)
     joints = pd.DataFrame(dict(zip(robot.parts.columns, driven.T, strict=True)))
@@ -364,3 +364,17 @@ def test_a_reflector_that_moves_far_less_than_the_tool_is_no_wrong_unit(arm, dri
     with pytest.raises(IngestError) as error:
         _taken(tmp_path, table.assign(trajectory="poses", target="a", **moved), arm)
     assert "both in the same unit" not in str(error.value)
+
+
+@pytest.mark.parametrize("moved", [1, 2])
+def test_drives_of_a_gantry_in_another_order_are_named_in_the_robots_frame(moved, tmp_path):
+    """They do what another frame does, so that a registration would explain them as well."""
+    slide = {"sliding": True, "alpha_deg": 90}
+    rows_of = ({**slide, "theta_deg": 90, "range_mm": [0, 900]}, {**slide, "theta_deg": 90, "range_mm": [100, 700]})
+    robot = from_dh([*rows_of, {"sliding": True, "range_mm": [-50, 350]}], name="gantry")
+    table = _in_the_robots_frame(robot, (0.0, 0.0, 0.0), np.random.default_rng(2))
+    columns = [*robot.parts.columns]
+    with pytest.raises(IngestError) as error:
+        _taken(tmp_path, table.rename(columns=dict(zip(columns, np.roll(columns, moved), strict=True))), robot)
+    right = ", ".join(np.roll(columns, -moved))
+    assert f" or order: [{right}] or frame: register" in str(error.value)

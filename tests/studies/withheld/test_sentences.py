@@ -127,8 +127,8 @@ _CASES = [
     ("registered", ({"points": "124"}, {}, _FACTS), ({"points": "250"}, {}, _FACTS)),
     (
         "a reflector was found",
-        ({"name": "a", "place": "60.3, -0.5, 41"}, {}, _FACTS),
-        ({"name": "a", "place": "60.3, -0.5, 91"}, {}, _FACTS),
+        ({"name": "a", "place": "60.3, -0.5, ?", "about": "0.4"}, {}, _FACTS),
+        ({"name": "a", "place": "60.3, -0.5, 43", "about": "0.4"}, {}, _FACTS),
     ),
     ("orientations are turned", ({"value": "0.002"}, {}, _FACTS), ({"value": "1.57"}, {}, _FACTS)),
     (
@@ -217,6 +217,7 @@ _CASES = [
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
+    "a reflector is assumed",
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),
     *(f"interval of a share: {kind}" for kind in ("covariance", "sampling", "calibration")),
 }
@@ -229,6 +230,7 @@ _ALWAYS = {"no commanded positions": True} | dict.fromkeys(
             "the mass is not as stated",
             "the base is tilted",
             "the noise is smaller",
+            "far from ordinary errors",
             "points are outliers",
             "stale readings",
         ),

@@ -161,9 +161,9 @@ def _in_degrees(handed, own, _generator):
 
 
 def _other_robot(handed, own, generator):
-    """The robot's file is that of another robot of its kind."""
+    """The robot's file is that of another robot of its kind, which lost zeros of the drives may do as well."""
     other = KINDS[own.robot_kind](generator)
-    return replace(handed, nominal=other, words=("does not fit the robot",))
+    return replace(handed, nominal=other, words=("does not fit the robot|`robot` is another one|`robot` is right",))
 
 
 def _frame(handed, own, generator):
