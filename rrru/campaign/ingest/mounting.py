@@ -37,7 +37,8 @@ class Mounting:
     """names (n,) of the reflectors, None where the tool itself is read; place_mm (n, 3): theirs on the platform, or in
     the robot's frame where on_world (n,) says so; offset_mm (n, 3): where they are as seen from the commanded position,
     in the robot's frame, with the zeros that its drives were found to have; turn (3, 3): from the platform to what is
-    read as its orientation; strays (n,): rows that are no reading of that reflector; notes: what was found.
+    read as its orientation; strays (n,): rows that are no reading of that reflector; zeros_lost: whether zeros of the
+    drives were found; notes: what was found.
     """
 
     names: np.ndarray | None
@@ -46,6 +47,7 @@ class Mounting:
     offset_mm: np.ndarray
     turn: np.ndarray
     strays: np.ndarray
+    zeros_lost: bool
     notes: tuple
 
     @property
@@ -101,7 +103,9 @@ def mounting(sheet):
             turn = np.eye(3)
     seen_from = poses.point(np.asarray(sheet.mechanism.tool_mm)) if not zeros.any() else command
     offset = frames.carriers(poses).point(place) - seen_from
-    return Mounting(frames.names if named else None, place, frames.on_world, offset, turn, ~frames.right, notes)
+    return Mounting(
+        frames.names if named else None, place, frames.on_world, offset, turn, ~frames.right, bool(zeros.any()), notes
+    )
 
 
 def _frames(sheet, named):
