@@ -187,7 +187,7 @@ def _causes(facts):
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
-            said.append(f"Beside that {share} is systematic and like no effect of the library.")
+            said.append(f"Another {share} is systematic and like no effect of the library.")
         else:
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."

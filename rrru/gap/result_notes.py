@@ -14,7 +14,8 @@ REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
 
 
 def zero_notes(estimate, robot):
-    """Sentences on drives whose zeros are far off, such as "joint 4: zero is off by 2 degrees (95 %: 1.98 to 2.02)".
+    """Sentences on drives whose zeros are far off, such as "joint 4: zero, or the part that it moves, is off by 2
+    degrees (95 %: 1.98 to 2.02)".
 
     estimate: of the robot's geometric errors. A zero that is one number with a frame, or with the place of what is
     read, is off together with that, and one whose variance comes from the priors is not determined.
@@ -37,7 +38,7 @@ def zero_notes(estimate, robot):
         elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
             yield f"{drive.site}: zero is not determined by the readings, its most probable offset is {size}"
         else:
-            yield f"{drive.site}: zero is off by {size}"
+            yield f"{drive.site}: zero, or the part that it moves, is off by {size}"
 
 
 def _sized(value, ends, unit):

@@ -22,7 +22,7 @@ TEMPERATURE = "temperature_c"
 def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
     """Columns of a campaign file, and HELD_OUT and PLACE; rows in the order driven, the targets of each together.
 
-    The set's section says which columns are what: joints, {actuator column: theirs}, in joint_unit, absent where they
+    The set's section says which columns are what: joints, {actuator column: theirs}, in angle_unit, absent where they
     are called like ours; readings, {target: {position, unit, rotation, sequence, rotation_unit}}; temperature, in
     degrees Celsius; held_out. The number of the row stands for the time. Targets that were not seen are left out.
     Raises ConfigError for a column that is not there or not of numbers, for a blank joint of a row with readings, and
@@ -32,7 +32,7 @@ def sheet(series: Series, raw: pd.DataFrame) -> pd.DataFrame:
     common = {"trajectory": "poses", "time_s": np.arange(len(raw), dtype=float), HELD_OUT: _held_out(series, raw)}
     joints = joint_columns(series, raw)
     for ours, theirs in joints.items():
-        scale = 1.0 if ours.endswith("_mm") else RAD[section.get("joint_unit", "rad")]
+        scale = 1.0 if ours.endswith("_mm") else RAD[section.get("angle_unit", "rad")]
         common[ours] = scale * _numbers(series, raw, "joints", theirs)
     if "temperature" in section:
         common[TEMPERATURE] = _numbers(series, raw, "temperature", section["temperature"])

@@ -31,7 +31,7 @@ def section(**changes):
     return {
         "files": "arm/log_*.csv",
         "robot": "arm",
-        "joint_unit": "deg",
+        "angle_unit": "deg",
         "joints": {f"q{k}_rad": f"J{k}" for k in range(1, 7)},
         "readings": {"tcp": {"position": ["X", "Y", "Z"]} | angles},
     } | changes

@@ -40,7 +40,7 @@ def studied(tmp_path_factory):
 def test_compliance_and_lost_zero_of_a_strange_arm_are_named(studied):
     row = arm_tables.tables(studied)["real_verdicts"].iloc[0]
     assert row["effects"] == "drive_compliance" and row["probability"] > 0.8
-    assert "joint 4: zero is off by 2" in row["notes"]
+    assert "joint 4: zero, or the part that it moves, is off by 2" in row["notes"]
     assert row["held_out_rms_mm"] < 0.03 < row["held_out_b_rms_mm"]
     assert row["predicted_share"] == pytest.approx(row["held_out_share"], abs=0.05)
 
@@ -109,7 +109,7 @@ def test_orientations_have_to_fit_the_positions(tmp_path):
 
 
 def test_wrong_units_and_rows_that_come_twice_are_refused_by_the_files_names(tmp_path):
-    _refused(tmp_path, r"log_x\.csv, .*angle_unit: deg", error=IngestError, joint_unit="rad")
+    _refused(tmp_path, r"log_x\.csv, .*angle_unit: deg", error=IngestError, angle_unit="rad")
     raw = simulated_arm.log(30)
     # a few would be stale readings, which are left out
     for row in (7, 9, 11, 13):

@@ -289,8 +289,8 @@ def test_sentences_are_told_apart():
     assert {claim.stated["effect"] for claim in sizes} == {"encoder_eccentricity"}
     zero = _page(
         notes=[
-            "joint 7: zero is off by 0.527 degrees (95 %: 0.518 to 0.536)",
-            "q7: zero is off by -0.50 mm (95 %: -0.52 to -0.48)",
+            "joint 7: zero, or the part that it moves, is off by 0.527 degrees (95 %: 0.518 to 0.536)",
+            "q7: zero, or the part that it moves, is off by -0.50 mm (95 %: -0.52 to -0.48)",
             "q6: zero and the place of the target are not separately identifiable, combined they equal a "
             "zero offset of 1.0 degrees (95 %: 0.9 to 1.1)",
         ]

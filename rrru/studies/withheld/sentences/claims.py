@@ -48,7 +48,7 @@ _SENTENCES = {
     "shares are not determined": r"The gap is too small relative to the noise: their shares .*",
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
     "shares overlap": r"These shares overlap.*",
-    "something is unexplained": rf"(?:Beside that|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
+    "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
     "probability of this answer": rf"Probability of this answer: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
@@ -61,7 +61,7 @@ _SENTENCES = {
 }
 # kinds of notes of the diagnosis and of what a corrected file cannot hold
 _NOTES = {
-    "a zero is off": rf"(?P<site>[^:]+): zero is off by {_X} (?P<unit>degrees|mm) "
+    "a zero is off": rf"(?P<site>[^:]+): zero, or the part that it moves, is off by {_X} (?P<unit>degrees|mm) "
     rf"\(95 %: (?P<low>{_NUMBER}) to (?P<high>{_NUMBER})\)",
     "a zero is confounded": r"(?P<site>[^:]+): zero and .* are not separately identifiable, .*",
     "a zero is not determined": r"(?P<site>[^:]+): zero is not determined by the readings, .*",
@@ -103,7 +103,7 @@ _READ = {
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
     rf"by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
-    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_X} % of the robot's size, more than .*",
+    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_Y} % of the robot's size, more than .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",

@@ -166,11 +166,12 @@ def _next_nothing(_stated, truth, facts):
 
 
 def _zero(stated, truth, _facts):
-    """The zero of a drive is off by that."""
+    """The zero of a drive, or with it the part that it moves, is off by that."""
     if stated["site"] not in truth.zeros:
         return None
     scale = np.degrees(1.0) if stated["unit"] == "degrees" else 1.0
-    off = abs(float(stated["value"]) - scale * truth.zeros[stated["site"]])
+    true = truth.zeros[stated["site"]], truth.geometry.get(f"d{stated['site']}", np.inf)
+    off = min(abs(float(stated["value"]) - scale * one) for one in true)
     links = scale * _OF_LINKS[{"degrees": "rad"}.get(stated["unit"], "mm")]
     return off <= _ERRORS * _error(stated["low"], stated["high"]) + links
 

@@ -87,7 +87,9 @@ def truth_of(draw, run, folder, gap):
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
     library = gap.library(case.mechanism)
+    # with the laws as they were fitted: all readings together might have more orders of a drive error function
     whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
+    whole = replace(whole, library=whole.library | case.library)
     count = len(exact)
     before = whole.left(State(attribution.calibrated.deviations, {}))[:count]
     after = whole.standing(attribution.state).left(attribution.state)[:count]
