@@ -1,4 +1,4 @@
-"""Drive error function: every drive errs by a rough function of its own value.
+"""Drive error function: every drive, or one alone, errs by a rough function of its own value.
 
 An encoder's scale, its mounting, teeth, pitch and bearings together make an error that repeats at every value of the
 drive but follows no single wave:
@@ -12,7 +12,8 @@ to about b per turn, rougher ones ever weaker. Of some b the likelihood chooses.
 finding. A gear's sharp orders are `transmission_error` and `transmission_orders`: where few waves do, these need fewer
 numbers and win. A campaign of few readings has the lower orders only.
 
-Assumptions: it depends on the drive's value only, not on load or sense of motion; one size for all drives of a kind.
+Assumptions: it depends on the drive's value only, not on load or sense of motion; one size for all drives of a kind
+that err.
 
 Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The sizes are assumed: 20 arc seconds are
 1e-4 rad, and a slide of ordinary precision is within 0.02 mm.
@@ -54,7 +55,14 @@ def _of_orders(robot, orders):
     )
     per_unit = _per_unit(robot)
     none = np.zeros(len(parameters), dtype=int)
-    coordinates = Coordinates(spectra[0], none, none > 0, lambda values, _: values, spectra=spectra, broad=True)
+    coordinates = Coordinates(
+        spectra[0],
+        np.array([p.leg for p in parameters]),
+        none > 0,
+        lambda values, _: values,
+        spectra=spectra,
+        broad=True,
+    )
 
     def functions(motion):
         """By drive the functions (n, 2 orders) of its value that a unit of each of its coordinates adds."""

@@ -12,6 +12,7 @@ import pandas as pd
 
 from rrru.estimation.intervals import QUANTILE_95
 from rrru.gap.details import value_steps
+from rrru.gap.terms import spread
 
 # places of a drive's range: a wave of 200 a turn still has three and more
 _PLACES = 721
@@ -56,7 +57,7 @@ def _of_drive(case, fit, term, drive):
 
 
 def _linear(case, fit, term, at):
-    """Error (n,) of a drive minus its mean, and its slopes (n, c), of a law that is linear in its c coefficients.
+    """Error (n,) of a drive minus its mean, and its slopes (n, k) by a term's free numbers; the law is linear in them.
 
     at: the Motion at n places of the drive's range, and the drive's number.
     """
@@ -66,7 +67,8 @@ def _linear(case, fit, term, at):
     slopes = np.zeros((len(motion), ends[-1]))
     own = slice(ends[drive], ends[drive + 1])
     slopes[:, own] = made[drive] - made[drive].mean(axis=0)
-    return slopes @ fit.state.effects[term.effect, term.shape], slopes
+    free = slopes @ spread(case.library[term.effect].coordinates, term.legs)
+    return slopes @ fit.state.effects[term.effect, term.shape], free
 
 
 def _by_steps(case, fit, term, at):

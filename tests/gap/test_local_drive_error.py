@@ -65,6 +65,7 @@ def test_a_local_error_of_one_encoder_is_its_error_function(measured):
     known = MeasuredRobot(robot, Masses(0.0, 0.0, 0.0), _NOISE_MM, noise_rad=_NOISE_RAD)
     found = diagnose(frame, known, GapSettings(), details=False)
     assert found.verdict["effects"] == "drive_error_function" and found.verdict["probability"] > 0.9
+    assert found.verdict["leg"] == _LEG + 1
     assert found.verdict["gap_after_rms_mm"] < 0.4 * found.verdict["gap_rms_mm"]
     # the function of that drive is the hill, up to a constant and a slope, which a length and others stand for
     case, state = found.attribution.case, found.state
