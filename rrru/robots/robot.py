@@ -30,7 +30,8 @@ class Robot(ABC):
     name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.robots.legs.Legs`;
     parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
     parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
-    angle_arm_mm: the length that makes angles comparable with lengths; up (3,): away from the ground.
+    angle_arm_mm: the length that makes angles comparable with lengths; size_mm: how far its tool can be from the
+    origin, at most; up (3,): away from the ground.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Robot(ABC):
     parts: Parts
     directions: np.ndarray
     angle_arm_mm: float
+    size_mm: float
     TRACKED: str
     RICHEST: str
     SEARCHED: str
