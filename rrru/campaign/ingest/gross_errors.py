@@ -115,7 +115,9 @@ def frame_advice(file: GrossFile | None) -> str:
     texts, left_mm = [" and ".join(of_drives(file, one)) for one in found], file.hypothesis(file.given).rms_mm
     if left_mm <= limit_mm:
         texts.append(register)
-    return " or ".join(texts) or f"frame: register would leave {left_mm:.3g} mm rms: see that `robot` is right"
+    if np.isfinite(left_mm) and not texts:
+        texts.append(f"frame: register would leave {left_mm:.3g} mm rms: see that `robot` is right")
+    return " or ".join(texts) or "see that `robot` and the columns of its drives are right"
 
 
 class _Search:
