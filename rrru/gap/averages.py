@@ -28,9 +28,12 @@ class Average:
     moment: np.ndarray
 
     @classmethod
-    def over(cls, gram, moment, index, size):
-        """Of the columns index (z,) with prior sizes (z,) of a Gram matrix (K, K) and moments (K,)."""
-        kept = np.setdiff1d(np.arange(len(moment)), index)
+    def over(cls, gram, moment, index, size, apart=()):
+        """Of the columns index (z,) with prior sizes (z,) of a Gram matrix (K, K) and moments (K,).
+
+        apart: numbers of columns that are not kept, besides, as no other term of a set has them.
+        """
+        kept = np.setdiff1d(np.arange(len(moment)), np.union1d(index, np.asarray(apart, dtype=int)))
         factor = _factor(gram, index, size)
         both = size[:, None] * np.column_stack([gram[index[:, None], kept], moment[index]])
         half = solve_triangular(factor, both, lower=True, check_finite=False)

@@ -250,7 +250,9 @@ class ModelEvidence:
         def make():
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
-            return Average.over(gram, moment, prior.index, prior.at(strength))
+            # drives on which the law does not act by this term: no set has a law twice
+            others = self._whitened.layout[0][term.effect, term.shape, EACH]
+            return Average.over(gram, moment, prior.index, prior.at(strength), others)
 
         return self._averages.of((term, float(strength), int(level)), make)
 
