@@ -31,7 +31,7 @@ class Average:
     def over(cls, gram, moment, index, size, apart=()):
         """Of the columns index (z,) with prior sizes (z,) of a Gram matrix (K, K) and moments (K,).
 
-        apart: numbers of columns that are not kept, besides, as no other term of a set has them.
+        apart: numbers of further columns to leave out, which no other term of a set has.
         """
         kept = np.setdiff1d(np.arange(len(moment)), np.union1d(index, np.asarray(apart, dtype=int)))
         factor = _factor(gram, index, size)

@@ -54,7 +54,7 @@ def _row(part, kind, squares, probability, total):
 
 def _drawn(attribution, generator, draws):
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
-    share of the noise that the calibration takes up.
+    share of the noise that the calibration absorbs.
     """
     case, evidence, beliefs = attribution.case, attribution.evidence, attribution.posterior
     linear = evidence.linear
@@ -85,7 +85,7 @@ def _drawn(attribution, generator, draws):
 class _LeftByCalibration:
     """What a calibration of columns (m, 3, p) leaves of numbers at those of the m readings that count.
 
-    taken: share of the noise that it takes up there.
+    taken: share of the noise that it absorbs there.
     """
 
     def __init__(self, columns, counted):

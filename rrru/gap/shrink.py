@@ -16,7 +16,7 @@ class ShrinkStep:
     """The gap after some effects are added, at those of m readings that count.
 
     squares_mm2 (m,): of the gap at each reading, less noise. For b draws: picks (b, m), readings resampled from all;
-    shown_mm2 (m,): what the residuals show of the squares; moved_mm2 (b, m): what drawn numbers make of them beside it.
+    shown_mm2 (m,): their part from the residuals; moved_mm2 (b, m): their part from drawn numbers.
     """
 
     added: str

@@ -159,12 +159,13 @@ def _gross_file(sheet: Sheet) -> GrossFile | None:
 
 
 def _doubts_of_robot(sheet: Sheet) -> Iterator[str]:
-    """A note where the nominal robot is farther off than robots usually are, however the instrument stands."""
+    """A note where the nominal robot misses by more than its parts' errors usually make, wherever the instrument is."""
     file, size = _gross_file(sheet), sheet.mechanism.size_mm
     rms_mm = 0.0 if file is None or not len(file) else file.hypothesis(file.given).rms_mm
     if ORDINARY_SHARE * size < rms_mm < np.inf:
-        share = f"{rms_mm:.3g} mm rms, {100.0 * rms_mm / size:.1f} % of the robot's size"
-        yield f"the nominal robot misses by {share}, more than links are usually off: see that `robot` is right"
+        share = f"{rms_mm:.3g} mm rms, {100.0 * rms_mm / size:.1f} % of the robot's size of {size:.4g} mm"
+        usual = f"errors of its parts are usually below {100.0 * ORDINARY_SHARE:g} %"
+        yield f"the nominal robot misses by {share}, {usual}: see that `robot` is right"
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:

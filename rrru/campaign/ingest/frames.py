@@ -76,9 +76,9 @@ class Frames:
                 break
         return rotation, place
 
-    def framed(self, poses):
-        """The Framed of Poses (n), of the rows that tell something."""
-        rotation, place = self.fitted(poses)
+    def framed(self, poses, fitted=None):
+        """The Framed of Poses (n), of the rows that determine something; fitted: what `fitted` gives of them."""
+        rotation, place = fitted or self.fitted(poses)
         model, turned, rows = self.carriers(poses).point(place), self.seen_mm @ rotation.T, self.telling
         shift = np.median(model[rows] - turned[rows], axis=0) if self.registered else 0.0
         unknown = tuple(dict.fromkeys(self.names[~self.known & rows].tolist()))

@@ -80,19 +80,20 @@ def mounting(sheet):
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
     frames, notes = _frames(sheet, named)
     zeros = _zeros(sheet, frames, command) if told else np.zeros(len(sheet.drives))
+    if not (named or zeros.any()):
+        return None
     if zeros.any():
         poses = sheet.mechanism.solve(sheet.actuators(command) + zeros, command)
-        left_mm = frames.framed(poses).off_mm
+    rotation, place = fitted = frames.fitted(poses)
+    left_mm = frames.framed(poses, fitted).off_mm
+    if zeros.any():
         _refuse_places(sheet, left_mm)
         notes += _in_words(sheet, zeros, left_mm)
-    elif not named:
-        return None
-    rotation, place = frames.fitted(poses)
     free = ~frames.known & ~frames.on_world
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
         # a platform that never turns does not tell them from the frame's shift: they lie about the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
-    turn, notes = np.eye(3), notes + (_found(sheet, frames, place, poses) if named else ())
+    turn, notes = np.eye(3), notes + (_found(sheet, frames, place, _precision(frames, poses, left_mm)) if named else ())
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
         if registered:
@@ -142,21 +143,23 @@ def _refuse_places(sheet, left_mm):
 
 
 def places_instead(sheet, most_mm):
-    """The key `targets`, or the place of the tool, that brings the nominal robot to what is measured in its own frame.
+    """The key `targets`, or the place of the tool, with which the nominal robot agrees with readings in its own frame.
 
-    Places in words; empty where the median distance that they leave is more than most_mm.
+    In words; empty where a median distance of more than most_mm remains.
     """
     frame, poses = sheet.frame, sheet.poses
     if sheet.spec.frame != "robot":
         return ""
-    names = frame["target"].astype(str).to_numpy() if "target" in frame else np.full(len(frame), "")
-    own = np.einsum("nji,nj->ni", poses.turn, rows.measured(frame) - poses.position_mm)
-    known = np.isfinite(own).all(axis=1) & ~np.isin(names, sheet.spec.world_targets)
-    places = {name: np.median(own[known & (names == name)], axis=0) for name in dict.fromkeys(names[known].tolist())}
-    off = [np.linalg.norm(own[known & (names == name)] - place, axis=1) for name, place in places.items()]
-    if not places or not np.median(np.concatenate(off)) <= most_mm:
+    seen, names = rows.measured(frame), np.full(len(frame), "")
+    if "target" in frame:
+        names = frame["target"].astype(str).to_numpy()
+    open_places, right = np.full(seen.shape, np.nan), np.isfinite(seen).all(axis=1) & poses.closed
+    frames = Frames(seen, names, open_places, np.isin(names, sheet.spec.world_targets), right, registered=False)
+    if not frames.telling.any():
         return ""
-    return place_words(places)
+    found, names = frames.framed(poses), names[frames.telling]
+    places = {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
+    return place_words(places) if found.off_mm <= most_mm else ""
 
 
 def _in_words(sheet, zeros, left_mm):
@@ -201,16 +204,15 @@ def _known(sheet, names):
     return np.array([stated.get(name, nowhere) for name in names], dtype=float)
 
 
-def _found(sheet, frames, place, poses):
-    """Notes on the places (n, 3) that were found, from Poses (n)."""
-    axes, errors = _precision(frames, poses)
-    result = []
+def _found(sheet, frames, place, precision):
+    """Notes on the places (n, 3) that were found; precision: see `_precision`."""
+    (axes, errors), result = precision, []
     for name in dict.fromkeys(frames.names.tolist()):
         if name in sheet.spec.targets:
             continue
         k = int(np.argmax(frames.names == name))
         if frames.on_world[k]:
-            result.append(f"reflector {name} found at {position_text(place[k])} beside the robot")
+            result.append(f"reflector {name} found at {position_text(place[k])}, fixed to the world")
         elif not np.isfinite(errors).any():
             at = f"reflector {name} assumed at {position_text(place[k])} on the platform, the mean of all at the tool"
             result.append(f"{at}: a platform that never turns does not determine it")
@@ -219,13 +221,12 @@ def _found(sheet, frames, place, poses):
     return tuple(result)
 
 
-def _precision(frames, poses):
+def _precision(frames, poses, residual):
     """Axes (3, 3) of the platform, in columns, and how far (3,) along each of them a place that was found may be off.
 
-    A residual of the nominal robot's size may be what moves a place, however many readings there are. Endless along
-    axes on which the readings do not determine the places.
+    The nominal robot's own errors make the residual in mm and may move a place by as much, however many readings there
+    are. Infinite along axes on which the readings do not determine the places.
     """
-    residual = frames.framed(poses).off_mm
     if not frames.registered or (frames.known & frames.telling).any():
         return np.eye(3), np.full(3, residual)
     axes, turned = axes_by_turning(poses.turn)
@@ -242,7 +243,9 @@ def _place_text(place, axes, errors):
     for axis in still:
         largest = int(np.abs(axis).argmax())
         along = "xyz"[largest] if largest in of_body else f"({', '.join(f'{value:.3g}' for value in axis)})"
-        result += f", its place along {along} is one number with that of the instrument: this axis never turns"
+        result += (
+            f", its place along {along} is not separately identifiable from the instrument's: this axis never turns"
+        )
     return result
 
 

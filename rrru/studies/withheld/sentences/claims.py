@@ -103,7 +103,7 @@ _READ = {
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
     rf"by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
-    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_Y} % of the robot's size, more than .*",
+    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_Y} % of the robot's size of .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
     "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",
