@@ -1,5 +1,6 @@
 """The diagnosis of one campaign's gap on one page: where it lies, what causes it, and how far it shrinks."""
 
+import re
 from textwrap import wrap
 
 import numpy as np
@@ -27,15 +28,17 @@ _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
 _NAMED_RUNS, _NUMBERED_RUNS = 9, 30
 _KINDS = {"held_out": "held-out", "resimulated": "resimulated"}
+# stands for a space at which no line may end
+_JOINT = "\N{NO-BREAK SPACE}"
 
 
 @style.printed
 def gap(tables, options):
     """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; parts that
-    imitate each other do not add up to 1. (a) Where: measured minus calibrated sim at the points from above and from
-    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour. (c) How far it
-    shrinks: gap on runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d)
+    are confounded do not add up to 1. (a) Where: measured minus calibrated sim at the points from above and from
+    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour. (c) Remaining
+    gap: on runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d)
     Residual of every point.
     """
     campaign, frames = options["campaign"], {}
@@ -127,7 +130,9 @@ def _headline(verdict, words):
     facts += [f"confusable with {_named(verdict['confusable_with'])}"] if verdict["confusable_with"] else []
     follow = wrap("; ".join(facts), _WIDE)
     follow += wrap(f"next: {verdict['next_runs']}", _WIDE) if verdict["next_runs"] else []
-    return wrap(first, int(0.8 * _WIDE)), follow
+    # no line ends within an interval
+    joined = re.sub(r"\([^)]*\)", lambda found: found[0].replace(" ", _JOINT), first)
+    return [line.replace(_JOINT, " ") for line in wrap(joined, int(0.8 * _WIDE))], follow
 
 
 def _write(axes, headline):
@@ -196,7 +201,7 @@ def _shrink(axes, shrink, verdict):
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
     axes.set(xlim=(0.0, most), ylim=(len(names) - 0.5, -0.5))
     axes.set(xlabel=f"{_KINDS[kind]} gap, rms (mm)", ylabel="trajectory")
-    axes.set_title("(c) how far it shrinks")
+    axes.set_title("(c) remaining gap")
     axes.grid(True, axis="x")
 
 
@@ -254,4 +259,6 @@ def _share(row, words=""):
     if not np.isfinite(shares[0]):
         return "–"
     value, low, high = (f"{100.0 * share:.0f}".replace("-", "\N{MINUS SIGN}") for share in shares)
+    if not np.isfinite(shares).all():
+        return f"{value} %{words}"
     return f"{value} %{words} ({'95 %: ' if words else ''}{low} to {high})"
