@@ -37,7 +37,8 @@ def gap(tables, options):
     """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; parts that
     are confounded do not add up to 1. (a) Where: measured minus calibrated sim at the points from above and from
-    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour. (c) Remaining
+    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour, those that
+    cannot be told apart hatched. (c) Remaining
     gap: on runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d)
     Residual of every point.
     """
@@ -123,7 +124,7 @@ def _headline(verdict, words):
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
     sure = _probability(verdict["probability"], "= ", " ")
-    first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
+    first = f"{name} (p {sure} of exactly this): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")
     facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst spot {place} mm"]
     facts += [f"{verdict['dropped_points']} outliers left out"] if verdict["dropped_points"] else []
@@ -163,8 +164,11 @@ def _causes(axes, causes, verdict, words):
     """Probability of every effect; those of the verdict in colour, with their legs."""
     rows = np.arange(len(causes)) + 0.5 * causes["apart"].to_numpy()
     chosen = causes["effect"].isin(verdict["effects"].split("+")).to_numpy()
+    alike = (causes["decision"] == "group").to_numpy()
     value = causes["probability"].to_numpy()
+    hatched = {"facecolor": "white", "edgecolor": style.BLUE, "hatch": "/////", "linewidth": 0.6}
     axes.barh(rows, value, height=0.72, color=np.where(chosen, style.BLUE, "#bbbbbb"))
+    axes.barh(rows[alike], value[alike], height=0.72, **hatched)
     for row, named, cause in zip(rows, chosen, causes.to_dict("records"), strict=True):
         probability, legs = cause["probability"], _leg(cause["legs"], **words)
         text = _probability(probability) + (f", {legs}" if legs and probability >= _NAMED_FROM else "")
@@ -172,7 +176,7 @@ def _causes(axes, causes, verdict, words):
             text = "not tested"
         inside = probability >= _INSIDE_FROM
         look = {"ha": "right" if inside else "left", "va": "center", "fontsize": 7.0, "in_layout": False}
-        colour = "white" if inside and named else "black"
+        colour = "white" if inside and named and cause["decision"] != "group" else "black"
         axes.text(probability + (-0.015 if inside else 0.015), row, text, color=colour, **look)
     axes.set_yticks(rows, [_named(name) for name in causes["effect"]])
     axes.set(xlim=(0.0, 1.0), ylim=(rows[-1] + 0.6, -0.6), xlabel="probability", ylabel="effect")

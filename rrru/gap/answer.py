@@ -50,6 +50,8 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "leg": verdict["leg"] or None,
         "where": verdict["where"],
         "confusable_with": [name for name in verdict["confusable_with"].split(", ") if name],
+        "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
+        "searches_apart": verdict["searches_apart"],
         **_row(verdict, _VERDICT + _NOISE),
         "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
         "budget": budget,
@@ -157,6 +159,16 @@ def _effect(name, tables, budget, drives):
     }
 
 
+def _group(names, tables, budget):
+    """Facts of causes that cannot be told apart."""
+    each = tables["gap_attribute"].set_index("effect")["probability"]
+    shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
+    probabilities = [_clipped(float(each[name])) for name in names]
+    # they exclude each other, or nearly so
+    together = {"probability": _clipped(sum(probabilities)), "share": sum(shares.get(name, 0.0) for name in names)}
+    return {"names": names, "probabilities": probabilities, **together}
+
+
 def _no_answer(facts):
     """Why nothing is said of causes."""
     return f"No cause is named: {facts['no_answer']}."
@@ -177,7 +189,11 @@ def _missed(facts):
 def _causes(facts):
     """What makes the gap, and how sure that is."""
     told = _shares_told(facts)
-    said = [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(facts["effects"])]
+    groups = {group["names"][0]: group for group in facts["groups"]}
+    single = [effect for effect in facts["effects"] if effect["name"] not in groups and not _is_small(effect, facts)]
+    said = [_by_share(facts, groups)] if told and len(facts["effects"]) > 1 else []
+    said += [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(single)]
+    said += [_of_group(group, told) for group in groups.values()]
     if not told and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
@@ -192,9 +208,49 @@ def _causes(facts):
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
             )
-    if said:
-        said.append(f"Probability of this answer: {probability(facts['probability'])}.")
-    return said
+    return [*said, *_sure(facts, groups)] if said else []
+
+
+def _is_small(effect, facts):
+    """Whether an effect's part of the gap is too small for a sentence."""
+    small = (effect["rms_mm"] or 0.0) < OPTIONS.min_cause_per_noise * facts["noise_rms_mm"]
+    return effect["share"] is not None and (small or effect["share"] < OPTIONS.min_cause_share)
+
+
+def _by_share(facts, groups):
+    """All causes in a line, each with its share, the small ones counted."""
+    listed, small = [], 0
+    for effect in facts["effects"]:
+        if group := groups.get(effect["name"]):
+            listed.append((group["share"], " or ".join(map(readable, group["names"]))))
+        elif _is_small(effect, facts):
+            small += 1
+        else:
+            listed.append((effect["share"] or 0.0, readable(effect["name"])))
+    words = [f"{name} {percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
+    words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
+    return f"Causes by their share of the gap: {', '.join(words)}."
+
+
+def _of_group(group, told):
+    """Causes of which one acts, and which these data cannot tell apart."""
+    names = [readable(name) for name in group["names"]]
+    each = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
+    share = f"; together they make {percent(group['share'])} of the gap" if told else ""
+    return (
+        f"One of these acts, and these data cannot tell which: {each} (probability that one does: "
+        f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."
+    )
+
+
+def _sure(facts, groups):
+    """How probable each cause is, and the answer as a whole."""
+    each = [one for one in facts["effects"] if one["name"] not in groups]
+    exactly = probability(facts["probability"])
+    if not each:
+        return [f"Probability of this answer: {exactly}."]
+    listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in each)
+    return [f"Probability that it acts: {listed}. Probability of exactly this answer: {exactly}."]
 
 
 def _shares_told(facts):

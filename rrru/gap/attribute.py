@@ -12,12 +12,13 @@ from rrru.gap.calibrate import calibrate, origin
 from rrru.gap.case import Case
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.heldout import HeldOut
+from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.identify import with_seen
 from rrru.gap.model_fit import EffectModel, ModelFit, fit_model
+from rrru.gap.model_space import ModelSpace
 from rrru.gap.options import OPTIONS
 from rrru.gap.orders import with_orders
-from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.search import Hypothesis, search
+from rrru.gap.posterior import Posterior
 from rrru.gap.spectra import with_spectra
 from rrru.gap.state import State
 from rrru.gap.terms import each_leg
@@ -166,8 +167,8 @@ def with_effects(attribution, effects):
     if known is None:
         terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
         found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
-        levels = attribution.evidence.levels
-        found[levels], strengths[levels] = attribution.evidence.independent(terms, levels)
+        for each in attribution.evidence.levels:
+            found[each], strengths[each] = attribution.evidence.over_all_strengths(terms, each)
         # what an unknown function explains with them is a discrepancy without it
         known = Hypothesis(terms, found, strengths), int(found.argmax())
     hypothesis, level = known
@@ -233,21 +234,28 @@ def _rounds(case, calibrated, prior, stated):
     calibrated = state = fit.state
     evidence = case.evidence(linear)
     small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * case.noise_mm
+    hypothesis = None
     for _ in range(OPTIONS.max_search_rounds):
-        decisive = evidence.on_library()
-        beliefs = posterior(decisive, search(decisive), prior)
-        hypothesis, level = beliefs.best()
-        if not hypothesis.terms:
-            break
-        shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
-        unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
-        # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the way
-        # there or a law's shape is still to be fitted
-        settled = unknown and small and not shaped
-        # laws get their chance before an unknown function takes what their linear fit leaves
-        named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
-        tried, its_level = named or (hypothesis, level)
-        if frozenset(hypothesis.terms) in seen or (settled and (tried is hypothesis or not tried.terms)):
+        space = ModelSpace(evidence.on_library(), prior)
+        searches = [space.search(hypothesis.terms if hypothesis else ())]
+        while True:
+            beliefs = space.posterior(searches)
+            hypothesis, level = beliefs.best()
+            shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
+            unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
+            # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the
+            # way there or a law's shape is still to be fitted
+            settled = unknown and small and not shaped
+            # laws get their chance before an unknown function takes what their linear fit leaves
+            named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
+            tried, its_level = named or (hypothesis, level)
+            ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
+            ended |= settled and (tried is hypothesis or not tried.terms)
+            if len(searches) > 1 or not ended:
+                break
+            # an answer stands once a search from the other end has found nothing better
+            searches.append(space.search(space.fullest()))
+        if ended:
             break
         seen.add(frozenset(hypothesis.terms))
         # what a dropped effect has done to the others' numbers can hold a fit back
@@ -263,6 +271,12 @@ def _rounds(case, calibrated, prior, stated):
             break
         fit, state, (case, linear, source) = found, found.state, seen_there
         evidence = case.evidence(linear)
+    else:
+        space = ModelSpace(evidence.on_library(), prior)
+        searches = [space.search(hypothesis.terms)]
+    if len(searches) == 1:
+        searches.append(space.search(space.fullest()))
+    beliefs = space.posterior(searches)
     hypothesis, level = beliefs.best()
     result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
     # estimate and hypothesis are of one set, whether the rounds have ended or gone round

@@ -24,7 +24,7 @@ _EMPTY = {"legs": "", "log_evidence": np.nan}
 _EMPTY |= dict.fromkeys(("heldout_gain", "heldout_gain_low", "heldout_gain_high"), np.nan) | {"note": ""}
 
 
-def details_of(attribution, steps, residual_mm, generator, draws):
+def details_of(attribution, verdict, steps, residual_mm, generator, draws):
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
     case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
     exact = case.residual(attribution.state) if attribution.state.effects else None
@@ -32,15 +32,15 @@ def details_of(attribution, steps, residual_mm, generator, draws):
     return {
         "gap_locate": locate(case, residual_mm, linear.drive, generator, draws),
         "gap_identifiability": identify(case, linear),
-        "gap_attribute": _attribute_rows(attribution),
+        "gap_attribute": _attribute_rows(attribution, verdict),
         "gap_sets": _set_rows(attribution),
         "gap_shrink": shrink_table(case, steps, exact),
         "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
     }
 
 
-def _attribute_rows(attribution):
-    """Rows of `gap_attribute`: every effect of the library, none and unexplained."""
+def _attribute_rows(attribution, verdict):
+    """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
     beliefs, case = attribution.posterior, attribution.case
     result = [_effect_row(attribution, name) for name in case.effects]
     result += [
@@ -51,7 +51,9 @@ def _attribute_rows(attribution):
     note = _looks_like(beliefs) if unknown > OPTIONS.min_unexplained_probability else ""
     result.append({"effect": "none", "probability": none, **_EMPTY})
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY, "note": note})
-    return pd.DataFrame(result)
+    rows = pd.DataFrame(result)
+    rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
+    return rows
 
 
 def where(attribution, effects):

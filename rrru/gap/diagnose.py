@@ -19,15 +19,15 @@ from rrru.gap.drive_functions import drive_functions
 from rrru.gap.left_out import left_out, left_out_note
 from rrru.gap.locate import worst_spot
 from rrru.gap.make_case import make_case
+from rrru.gap.model_space import explore
 from rrru.gap.options import OPTIONS
-from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.result_notes import fit_notes, noise_notes, weight_doubts, weight_notes, zero_notes
-from rrru.gap.search import search
+from rrru.gap.posterior import Posterior
+from rrru.gap.result_notes import fit_notes, noise_notes, posterior_notes, weight_doubts, weight_notes, zero_notes
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
 from rrru.gap.validity import why_no_answer
-from rrru.gap.verdict import Verdict, certain_beside_unexplained, decide, without_answer
+from rrru.gap.verdict import Verdict, decide, without_answer
 from rrru.robots.drive_words import drive_words
 from rrru.robots.dynamics import Masses
 from rrru.robots.robot import Robot
@@ -106,7 +106,7 @@ def diagnose(
     tables["gap_parameters"] = parameter_rows(attribution)
     tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
     if details:
-        tables |= details_of(attribution, steps, residual, generator, settings.draws)
+        tables |= details_of(attribution, verdict, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, attribution.state, attribution)
 
 
@@ -122,6 +122,7 @@ def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataF
     """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
     case = attribution.case
     yield from fit_notes(attribution)
+    yield from posterior_notes(attribution.posterior)
     if case.count < OPTIONS.min_used_share * len(case.used):
         yield left_out_note(excluded, case.count, len(case.used))
     if few := few_readings(case):
@@ -158,6 +159,8 @@ def _row(
         "leg": verdict.leg,
         "where": where(attribution, verdict.effects),
         "confusable_with": ", ".join(verdict.confusable_with),
+        "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
+        "searches_apart": attribution.posterior.apart,
         "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),
         "gap_rms_mm": steps[0].gap_rms_mm,
         "gap_after_rms_mm": steps[-1].gap_rms_mm,
@@ -189,14 +192,13 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
     """
     ruled_out: set[str] = set()
     while True:
-        known, ordered = _likely(attribution)
-        verdict = decide(attribution, {term.effect: share for term, share in ordered})
-        same = known.hypothesis.effects == frozenset(verdict.effects)
-        fitted = known if same else with_effects(attribution, verdict.effects)
+        verdict = decide(attribution.posterior, attribution.case.effects)
+        fitted = with_effects(attribution, verdict.effects)
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
-            return verdict, with_effects(fitted, verdict.effects), ordered if same else order_by_share(fitted)
+            ordered = order_by_share(fitted)
+            return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
 
@@ -213,23 +215,13 @@ def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], pri
     if rest.height > beliefs.height - OPTIONS.negligible_nats:
         return rest
     evidence = attribution.evidence.on_library()
-    return posterior(evidence, search(evidence, without=ruled_out), prior)
+    return explore(evidence, prior, ruled_out)
 
 
 def _without_effects(attribution: Attribution, prior: Prior) -> Attribution:
     """The attribution of the calibration alone, with a posterior that has no effect of the library."""
     names = set(attribution.case.effects)
     return with_effects(attribution.believing(_without(attribution, names, names, prior)), ())
-
-
-def _likely(attribution: Attribution) -> tuple[Attribution, tuple]:
-    """The attribution of the best hypothesis, or of what acts beside the unexplained, and its terms with their shares.
-
-    What else the best hypothesis holds there may be a part of what is unexplained, and spoils what is predicted.
-    """
-    if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
-        attribution = with_effects(attribution, tuple(certain_beside_unexplained(attribution.posterior)))
-    return attribution, order_by_share(attribution)
 
 
 def _gains(attribution: Attribution) -> dict[str, float]:

@@ -159,7 +159,7 @@ class ModelEvidence:
 
     def _order(self, made, terms):
         """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
-        ends = np.cumsum([0, *(len(prior.index) for prior in self._priors_of(made))])
+        ends = np.cumsum([0, *(len(prior.index) for prior in self.priors_of(made))])
         numbers = {key: np.arange(*ends[k : k + 2]) for k, key in enumerate(self._keys(made))}
         return np.concatenate([numbers[key] for key in self._keys(terms)])
 
@@ -167,7 +167,7 @@ class ModelEvidence:
         """Keys of the priors of terms and after them of their shapes."""
         return *terms, *(term.effect for term in terms if term.effect in self.linear.shape_columns)
 
-    def _priors_of(self, terms):
+    def priors_of(self, terms):
         """Priors of terms and after them of their shapes."""
         count = len(terms)
         keys = self._keys(terms)
@@ -185,7 +185,7 @@ class ModelEvidence:
 
     def _bare(self, terms, grams):
         """The Projected problem of terms without the weight."""
-        return Projected.of(self._priors_of(terms), len(terms), grams)
+        return Projected.of(self.priors_of(terms), len(terms), grams)
 
     def _blocks(self, terms):
         """`_by_weight` of the terms that give way, by their number."""
@@ -222,6 +222,31 @@ class ModelEvidence:
         values = [self._beside(terms[broad], strength, problem, rows, levels) for strength in grids[broad]]
         values = [value.reshape(len(levels), *map(len, others)) for value in values]
         return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
+
+    @_on_complete
+    def columns_beside(self, terms, strengths, level):
+        """All columns once the broad term of a set has been averaged over, and the problem of the set's others.
+
+        Gram matrix (k, k) and moments (k,) of all columns but the broad term's; place (K,): where each column is in
+        them, -1 for those that are gone; the Projected problem at the level (an index), and the prior deviations of its
+        coefficients at the strengths; both None where there is nothing else.
+        """
+        broad = self._broadest(terms)
+        gram, moment, _ = self._whitened.gram(level)
+        place, rest = np.arange(len(moment)), tuple(terms)
+        strengths = np.asarray(strengths, dtype=float)
+        if broad is not None:
+            average = self._average(terms[broad], strengths[broad], level)
+            place = np.full(len(moment), -1)
+            place[average.kept] = np.arange(len(average.kept))
+            gram, moment, rest = average.gram, average.moment, (*terms[:broad], *terms[broad + 1 :])
+            strengths = np.delete(strengths, broad)
+        if not rest:
+            return gram, moment, place, None, None
+        problem = self.projected(rest, [level])
+        if broad is not None:
+            problem = problem.on(*(part[None] for part in average.rest(problem.index)))
+        return gram, moment, place, problem, problem.scale(strengths[None])[0]
 
     def _broadest(self, terms):
         """Number of the term of the most coefficients if these are many, None where no term has."""
@@ -269,24 +294,29 @@ class ModelEvidence:
         return Latest(OPTIONS.max_cached_results)
 
     @_on_complete
-    def independent(self, terms, levels):
-        """Log evidence (l,) of many terms at levels (indices), and their best strengths (l, terms).
+    def over_all_strengths(self, terms, level, start=None):
+        """Log evidence of a set of terms at a level (an index) averaged over their strengths, and the best (terms,).
 
-        Averaged over each strength about the others' best, as if they were independent of each other.
+        Of one term or two over all combinations; of more over each strength about the others' best, as if they were
+        independent of each other. start (terms,): strengths to begin from.
         """
-        evidence, best = np.empty(len(levels)), np.ones((len(levels), len(terms)))
-        for row, level in enumerate(levels):
-            losses = np.zeros(len(terms))
-            for _ in range(OPTIONS.prior_scale_sweeps):
-                for k, term in enumerate(terms):
-                    # what is tried comes last: the others' part stands
-                    others = *terms[:k], *terms[k + 1 :]
-                    grids = *([strength] for strength in np.delete(best[row], k)), STRENGTHS
-                    value, _ = self.over_strengths((*others, term), grids, [level])
-                    best[row, k], highest = STRENGTHS[value[0].argmax()], value.max()
-                    losses[k] = averaged(value, 1)[0] - highest
-            evidence[row] = highest + losses.sum()
-        return evidence, best
+        if len(terms) <= OPTIONS.max_jointly_averaged_effects:
+            value, grid = self.over_strengths(terms, levels=[level])
+            return averaged(value, len(terms))[0], grid[value[0].argmax()]
+        best = np.ones(len(terms)) if start is None else np.array(start, dtype=float)
+        losses = np.zeros(len(terms))
+        for _ in range(OPTIONS.prior_scale_sweeps):
+            before = best.copy()
+            for k, term in enumerate(terms):
+                # what is tried comes last: the others' part stands
+                others = *terms[:k], *terms[k + 1 :]
+                grids = *([strength] for strength in np.delete(best, k)), STRENGTHS
+                value, _ = self.over_strengths((*others, term), grids, [level])
+                best[k], highest = STRENGTHS[value[0].argmax()], value.max()
+                losses[k] = averaged(value, 1)[0] - highest
+            if (best == before).all():
+                break
+        return highest + losses.sum(), best
 
     @_on_complete
     def scales(self, terms, strengths):

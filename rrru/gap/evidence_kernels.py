@@ -269,6 +269,31 @@ def log_evidence_and_correction(gram, moment, scale, positive):
     return result, corrections
 
 
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive):
+    """Log evidence (b, m) of each of several blocks of columns alone, at m prior deviations.
+
+    gram (k, k) less across (k, x) times its transpose, and moment (k,): of all columns; numbers (n,): columns of the
+    blocks one after another, which end at ends (b + 1,), 0 first; scale (m, n), positive (n,): as in `log_evidence`.
+    """
+    result = np.empty((len(ends) - 1, len(scale)))
+    for b in range(len(ends) - 1):
+        first, size = ends[b], ends[b + 1] - ends[b]
+        own, target = np.empty((1, size, size)), np.empty((1, size))
+        for r in range(size):
+            i = numbers[first + r]
+            target[0, r] = moment[i]
+            for c in range(r + 1):
+                j = numbers[first + c]
+                entry = gram[i, j]
+                for q in range(across.shape[1]):
+                    entry -= across[i, q] * across[j, q]
+                own[0, r, c] = own[0, c, r] = entry
+        deviation, kinds = scale[:, first : first + size].copy(), positive[first : first + size]
+        result[b] = log_evidence_and_correction(own, target, deviation, kinds)[0][0]
+    return result
+
+
 def log_evidence(gram, moment, scale, positive):
     """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
 

@@ -74,22 +74,23 @@ class DiagnosisOptions:
     discrepancy_white_share: float = 0.01
 
     # --- search over sets of effects and their evidence ---
-    # sets so far below the best smaller one end the search for larger ones: odds of 160,000 to 1
-    max_loss_of_larger_sets_nats: float = 12.0
-    # a set so far below the best one at its level is tried at no other level: e^-30 is 1e-13
-    max_loss_at_best_level_nats: float = 30.0
-    # sets of each size that larger ones grow from; assumed
-    max_sets_per_size: int = 4
-    # sets of up to so many effects are averaged over all combinations of prior scales: 8^3 of them
-    max_jointly_averaged_effects: int = 3
+    # sets this far below the best are not worth an evaluation: e^-6 is 0.0025
+    window_nats: float = 6.0
+    # a set so far below the best at one level is tried at no other: e^-15 is 3e-7
+    hopeless_nats: float = 15.0
+    # a set of a smaller share of the probability has no neighbours that matter; assumed
+    min_expanded_probability: float = 0.01
+    # a note says so where probabilities by searches from different starts differ by more; assumed
+    max_searches_apart: float = 0.05
+    # sets whose neighbours are evaluated in one search; bounds the time
+    max_expanded_sets: int = 80
+    # neighbours that are evaluated whatever they seem worth, for each term taken out, and at most of a set; assumed
+    min_neighbours: int = 2
+    max_neighbours: int = 40
+    # sets of up to so many effects are averaged over all combinations of prior scales: 8^2 of them
+    max_jointly_averaged_effects: int = 2
     # effects of a set at most; assumed, bounds the time
     max_effects: int = 12
-    # a set grows with prior scales within this of its best ones, natural logarithm: the neighbours on the grid
-    max_log_scale_distance: float = 1.3
-    # rounds in which each effect of the best set is taken out or replaced; assumed
-    max_replacement_rounds: int = 3
-    # sets of a larger size whose evidence is computed in full; assumed
-    max_evaluated_sets_per_size: int = 8
     # sweeps in which each of many prior scales is found given the others; assumed
     prior_scale_sweeps: int = 2
     # results of each kind in the cache of the evidence; bounds the memory
@@ -125,10 +126,14 @@ class DiagnosisOptions:
     max_none_probability: float = 0.2
     # rivals less probable than this share of the verdict's probability are not named; the usual 5 %
     min_rival_probability_ratio: float = 0.05
-    # with something unexplained an effect is named from this probability on, given that; assumed
-    min_probability_given_unexplained: float = 0.9
-    # with something unexplained effects are named where they explain this share of the gap together; assumed
-    min_share_with_unexplained: float = 0.5
+    # a cause, or a group, is named from this probability on: a false name costs as much as 2.3 missed ones; assumed
+    min_named_probability: float = 0.7
+    # causes of less probability are excluded; the usual 5 %
+    min_possible_probability: float = 0.05
+    # causes of a group act together less often than this share of what independent ones do; assumed
+    max_joint_probability_ratio: float = 0.5
+    # a longer list of causes that cannot be told apart says nothing; assumed
+    max_group_size: int = 3
     # something unexplained is more probable than not
     min_unexplained_probability: float = 0.5
     # a best answer that leaves so many times the noise is not of the robot that was measured: an arm without an effect
@@ -202,6 +207,9 @@ class DiagnosisOptions:
     max_listed_numbers: int = 3
     # a share of the gap that is worth a sentence; assumed
     min_mentioned_share: float = 0.05
+    # a cause of a smaller share of the gap, or of a smaller size over the noise, is in the table only; assumed
+    min_cause_share: float = 0.01
+    min_cause_per_noise: float = 0.3
     # random error gets a sentence where it is more probable than not
     min_scatter_probability: float = 0.5
     # a share beyond this is none: confounded effects add up to a little more than the whole; assumed

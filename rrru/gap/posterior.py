@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import comb
 
 import numpy as np
 
 from rrru.gap.evidence_kernels import log_sum_exp
+from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.options import OPTIONS
 from rrru.gap.terms import EACH, SAME, variants
 from rrru.gap.unknown import UNKNOWN
@@ -14,17 +14,53 @@ from rrru.gap.whitened import levels_of
 
 
 @dataclass(frozen=True)
-class Posterior:
-    """Hypotheses with logarithms (h, levels) of their weights up to a constant, and where they count as unexplained."""
+class Weighed:
+    """A Hypothesis with the logarithms (levels,) of its weights, and at which levels something is unexplained."""
 
-    hypotheses: tuple
+    hypothesis: Hypothesis
     log_weights: np.ndarray
     unexplained: np.ndarray
 
     @cached_property
+    def height(self):
+        """Logarithm of the sum of its weights."""
+        return float(log_sum_exp(self.log_weights))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Hypotheses with logarithms (h, levels) of their weights up to a constant, and where they count as unexplained.
+
+    apart: largest difference of a cause's probability between searches from different starts; expanded: probability of
+    the sets all of whose neighbours have been looked at.
+    """
+
+    hypotheses: tuple
+    log_weights: np.ndarray
+    unexplained: np.ndarray
+    apart: float = 0.0
+    expanded: float = 1.0
+
+    @classmethod
+    def of(cls, weighed, apart=0.0, expanded=1.0):
+        """Of a list of Weighed hypotheses: single effects, and sets that are not negligible.
+
+        Single effects stay, however improbable: tables show what each does alone.
+        """
+        least = max(one.height for one in weighed) - OPTIONS.negligible_nats
+        kept = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]
+        weights, flags = (np.array([getattr(one, name) for one in kept]) for name in ("log_weights", "unexplained"))
+        return cls(tuple(one.hypothesis for one in kept), weights, flags, apart, expanded)
+
+    @property
+    def total(self):
+        """Logarithm of the sum of all weights, up to the constant."""
+        return float(log_sum_exp(self.log_weights.ravel()))
+
+    @cached_property
     def weights(self):
         """Weights (h, levels) that sum to one."""
-        return np.exp(self.log_weights - log_sum_exp(self.log_weights.ravel()))
+        return np.exp(self.log_weights - self.total)
 
     def best(self):
         """The hypothesis of highest weight and its level (an index)."""
@@ -49,11 +85,19 @@ class Posterior:
         """Probability that an effect acts."""
         return float(self.weights[self._holding(effect)].sum())
 
+    def any_of(self, effects):
+        """Probability that at least one of some effects acts."""
+        return float(self.weights[np.any([self._holding(effect) for effect in effects], axis=0)].sum())
+
+    def both(self, first, second):
+        """Probability that two effects act together."""
+        return float(self.weights[self._holding(first) & self._holding(second)].sum())
+
     def without(self, effect):
         """The posterior with an effect ruled out."""
         keep = ~self._holding(effect)
         kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
-        return Posterior(kept, self.log_weights[keep], self.unexplained[keep])
+        return Posterior(kept, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
 
     @property
     def height(self):
@@ -94,27 +138,15 @@ class Posterior:
         return np.array([effect in h.effects for h in self.hypotheses])
 
 
-def posterior(evidence, hypotheses, prior):
-    """Posterior of the hypotheses that `rrru.gap.search.search` has found."""
-    log_prior = _LogPrior(evidence.library, prior)
-    log_weight = np.array([h.evidence + log_prior.terms(h.terms) for h in hypotheses])
-    # single effects stay, however improbable: tables show what each does alone
-    single = np.array([len(h.terms) <= 1 for h in hypotheses])
-    worth = single | (log_weight.max(axis=1) > log_weight.max() - OPTIONS.negligible_nats)
-    kept = tuple(h for h, fine in zip(hypotheses, worth, strict=True) if fine)
-    log_weight = log_weight[worth]
-    unexplained, levels = np.zeros(log_weight.shape, dtype=bool), levels_of(evidence.noise)
-    for row, hypothesis in enumerate(kept):
-        tolerated = prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
-        unexplained[row] = tolerated < np.maximum(levels, evidence.explained(hypothesis, set(UNKNOWN)))
-        log_weight[row] += log_prior.levels(unexplained[row])
-    return Posterior(kept, log_weight, unexplained)
+class Weigher:
+    """From the evidence of hypotheses to the logarithms of their weights, by the Prior.
 
+    evidence: the ModelEvidence that hypotheses are of.
+    """
 
-class _LogPrior:
-    """Logarithms of prior probabilities under a library."""
-
-    def __init__(self, library, prior):
+    def __init__(self, evidence, prior):
+        library = evidence.library
+        self._evidence, self._levels = evidence, levels_of(evidence.noise)
         self._prior, self._effects = prior, {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)
@@ -124,10 +156,20 @@ class _LogPrior:
             weights = coordinates.weights or np.full(len(coordinates.shapes), 1.0 / len(coordinates.shapes))
             self._effects[name] = np.log(weights) - np.log(len(kinds)) + coordinates.log_prior
 
+    def weighed(self, hypothesis, least=-np.inf):
+        """The Weighed hypothesis; least: below this log weight nothing is looked at for what it leaves unexplained."""
+        evidence, log_weights = self._evidence, hypothesis.evidence + self.terms(hypothesis.terms)
+        if not log_weights.max() > least:
+            unexplained = np.ones(len(log_weights), dtype=bool)
+        else:
+            tolerated = self._prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
+            unexplained = tolerated < np.maximum(self._levels, evidence.explained(hypothesis, set(UNKNOWN)))
+        return Weighed(hypothesis, log_weights + self._of_levels(unexplained), unexplained)
+
     def terms(self, terms):
-        """Of a set of terms, alike for all sets of one size."""
+        """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
         known = [term for term in terms if term.effect not in UNKNOWN]
-        total = self._prior.log_count(len(known)) - np.log(comb(len(self._effects), len(known)))
+        total = self._prior.log_set(len(known), len(self._effects))
         total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
         for term in known:
             total += self._effects[term.effect][term.shape]
@@ -135,7 +177,7 @@ class _LogPrior:
                 total -= np.log(self._legs[term.effect])
         return total
 
-    def levels(self, unexplained):
+    def _of_levels(self, unexplained):
         """Of the discrepancy's levels (levels,): half of what is not unexplained is none at all."""
         if unexplained.all():
             # its unknown function has paid for it

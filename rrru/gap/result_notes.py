@@ -119,6 +119,15 @@ def noise_notes(case, stated_mm, contradicted):
         yield f"{found}: the instrument is better"
 
 
+def posterior_notes(beliefs):
+    """A sentence on a Posterior that depends on where its search began."""
+    if beliefs.apart > OPTIONS.max_searches_apart:
+        yield (
+            f"the search over sets of effects has not settled: two searches give probabilities that differ by up to "
+            f"{beliefs.apart:.2f}"
+        )
+
+
 def fit_notes(attribution):
     """Sentences on a fit that did not converge."""
     end, terms = attribution.fit.estimate.end, attribution.fit.terms

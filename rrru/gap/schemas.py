@@ -19,12 +19,16 @@ values are of 3-D distances.
 campaign
 effects                str    names joined by + in the order of their share; none; unexplained where the library does
     not hold it
-probability            float  of this whole verdict, 0 to 1; 1 where there is no answer
+probability            float  that exactly these effects act, or that these and something unexplained do, 0 to 1; 1
+    where there is no answer. gap_attribute has that of each effect
 leg                    int    the one leg or drive at fault, from 1 on; 0 for all or none
 where                  str    where the effects act, in words: a site, or the first and last of several; empty where
     nothing acts
-confusable_with        str    effects that this campaign cannot tell from the verdict, joined by a comma; empty where
-    none
+confusable_with        str    what else may act, joined by a comma: effects, unexplained and none that are not in the
+    verdict and have a probability above 0.05; empty where none
+groups                 str    effects that this campaign cannot tell apart, of which one acts, the most probable first,
+    which stands in effects: joined by |, groups by a semicolon; empty where none
+searches_apart         float  largest difference of a cause's probability between searches from different starts, 0 to 1
 noise_rms_mm
 gap_rms_mm             float  what the calibrated sim gets wrong, noise taken out
 gap_after_rms_mm       float  the same, expected of the corrected sim on held-out runs
@@ -117,6 +121,8 @@ Probability of each effect as a cause of the gap, none and unexplained included.
 campaign
 effect                 str    name in the library or of the user's, none or unexplained
 probability            float  that it is at work, 0 to 1; several may be at once
+decision               str    named: from a probability of 0.7 on; group: one of several that cannot be told apart, one
+    of which is as probable; possible: above 0.05; excluded {named, group, possible, excluded}
 legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
     make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm

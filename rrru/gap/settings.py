@@ -1,6 +1,7 @@
 """What a diagnosis is told: which effects may act, what is known of them, beliefs, seed."""
 
 from dataclasses import dataclass, field, replace
+from math import comb
 
 import numpy as np
 
@@ -15,15 +16,28 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class Prior:
-    """Beliefs before the data: probabilities of zero, one, two and three effects, and of something unexplained besides.
+    """Beliefs before the data: a mixture of robots with few effects and of robots as they are, with many small ones.
 
-    Each effect more is as much rarer as the third is after the second. tolerance: share of what a set explains up to
-    which a remaining discrepancy still counts as the laws' own inaccuracy.
+    counts: of robots with few, probabilities of zero, one, two and three effects; each effect more is as much rarer as
+    the third is after the second. each: of robots as they are, the probability that an effect acts, for each alike and
+    whatever else acts; share: of robots as they are. unexplained: probability of something unexplained besides.
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    inaccuracy.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
     unexplained: float = 0.1
     tolerance: float = 0.04
+    each: float = 0.1
+    share: float = 0.5
+
+    def log_set(self, count, library):
+        """Logarithm of the probability of one set of so many effects of a library of so many."""
+        few = self.log_count(count) - np.log(comb(library, count))
+        as_they_are = count * np.log(self.each) + (library - count) * np.log1p(-self.each)
+        with np.errstate(divide="ignore"):
+            log_few, log_as_they_are = np.log([1.0 - self.share, self.share])
+        return float(np.logaddexp(log_few + few, log_as_they_are + as_they_are))
 
     def log_count(self, count):
         """Logarithm of the probability of so many effects."""

@@ -1,4 +1,14 @@
-"""The answer in one line: which effects, how sure, which leg, and what could be mistaken for it."""
+"""The decision of a diagnosis: which causes are named, which cannot be told apart, and which leg is at fault.
+
+A decision is not a probability. A cause is named where it acts with a probability of at least
+`OPTIONS.min_named_probability`: naming a cause that does not act then costs as much as missing this many
+
+    p / (1 - p)
+
+that do. Causes none of which is that probable, but one of which acts with that probability, form a group; they exclude
+each other, since each explains what the others would. The most probable one of a group stands for it wherever a model
+is needed.
+"""
 
 from dataclasses import dataclass
 
@@ -6,20 +16,34 @@ from rrru.gap.options import OPTIONS
 from rrru.gap.terms import per_leg
 
 _NONE = (frozenset(), False)
+# decisions on a cause, as the tables have them
+NAMED, GROUPED, POSSIBLE, EXCLUDED = "named", "group", "possible", "excluded"
+
+
+@dataclass(frozen=True)
+class Group:
+    """Causes that these data cannot tell apart, the most probable first, and the probability that one of them acts."""
+
+    names: tuple
+    probability: float
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """effects: names in order of share, () for none; unexplained: something is left that no effect explains;
-    probability of both together; leg: 1 to 3 where one leg alone is at fault, else 0; rivals: other answers that the
-    data leave open, each (names, unexplained, probability); no_answer: why the fit allows none, else empty.
+    """effects: names in order of share, () for none, of a group the most probable one; unexplained: something is left
+    that no effect explains; probability: that exactly these act; leg: the one that is at fault, from 1 on, else 0;
+    possible: what else may act, "unexplained" and "none" among it, the most probable first; rivals: other answers that
+    the data leave open, each (names, unexplained, probability); groups: of causes that cannot be told apart; no_answer:
+    why the fit allows none, else empty.
     """
 
     effects: tuple
     unexplained: bool
     probability: float
     leg: int
+    possible: tuple
     rivals: tuple
+    groups: tuple = ()
     no_answer: str = ""
 
     @property
@@ -29,21 +53,21 @@ class Verdict:
 
     @property
     def confusable_with(self):
-        """Effects, "unexplained" and "none" in a rival but not in the verdict, most probable first."""
-        names = []
-        for effects, unexplained, _ in self.rivals:
-            others = [name for name in sorted(effects) if name not in self.effects]
-            if unexplained and not self.unexplained:
-                others.append("unexplained")
-            if not effects and not unexplained:
-                others.append("none")
-            names.extend(name for name in others if name not in names)
-        return tuple(names)
+        """What these data cannot tell from the answer: other causes of its groups, and what is possible besides."""
+        grouped = [name for group in self.groups for name in group.names[1:]]
+        return tuple(dict.fromkeys([*grouped, *self.possible]))
+
+    def decision(self, name):
+        """The decision on a cause: NAMED, GROUPED, POSSIBLE or EXCLUDED."""
+        if any(name in group.names for group in self.groups):
+            return GROUPED
+        chosen = name in self.effects or (name == "unexplained" and self.unexplained) or name == self.label
+        return NAMED if chosen else POSSIBLE if name in self.possible else EXCLUDED
 
 
 def without_answer(why):
     """The Verdict on a fit that describes its readings too badly for any answer, see `rrru.gap.validity`."""
-    return Verdict((), True, 1.0, 0, (), why)
+    return Verdict((), True, 1.0, 0, (), (), (), why)
 
 
 def label(effects, unexplained):
@@ -51,73 +75,81 @@ def label(effects, unexplained):
     return "+".join((*effects, *(("unexplained",) if unexplained else ()))) or "none"
 
 
-def decide(attribution, shares):
-    """Verdict of an attribution; shares: effect to the share of the gap that it explains, for the order.
+def decide(beliefs, library):
+    """Verdict of a Posterior; library: the effects that may be named, by name.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Beside something unexplained effects are named only where they act with a probability of 0.9 each and
-    explain half of the gap together, a law of many coefficients by itself; else they are what could be mistaken for a
-    part of it.
+    matter. Something is unexplained where that is more probable than not.
     """
-    beliefs = attribution.posterior
-    unknown, sets = beliefs.probability_unexplained, beliefs.sets()
-    known = {key: p for key, p in sets.items() if not key[1]}
-    best = max(known, key=known.get, default=_NONE)
-    if known.get(_NONE, 0.0) > OPTIONS.max_none_probability:
-        best = _NONE
-    unexplained = known.get(_NONE, 0.0) <= OPTIONS.max_none_probability and unknown > known.get(best, 0.0)
-    if unexplained:
-        library = attribution.case.library
-        broad = {name for name in shares if name in library and library[name].coordinates.broad}
-        effects, probability, rivals = _beside_unexplained(sets, unknown, shares, broad)
+    sets, unknown = beliefs.sets(), beliefs.probability_unexplained
+    none = sets.get(_NONE, 0.0)
+    each = {name: beliefs.marginal(name) for name in library}
+    order = sorted(each, key=lambda name: (-each[name], name))
+    groups = ()
+    if none > OPTIONS.max_none_probability:
+        effects, unexplained = (), False
     else:
-        effects, probability = best[0], known[best]
-        rivals = {key: p for key, p in known.items() if key != best} | {(frozenset(), True): unknown}
-    ordered = sorted(rivals.items(), key=lambda rival: (-rival[1], sorted(rival[0][0])))
+        effects = tuple(name for name in order if each[name] >= OPTIONS.min_named_probability)
+        groups = _groups(beliefs, [name for name in order if name not in effects], each)
+        effects += tuple(group.names[0] for group in groups)
+        unexplained = unknown > OPTIONS.min_unexplained_probability
+        if not (effects or unexplained):
+            # something acts, and no cause is probable enough: the most probable answer that has one
+            answers = {key: p for key, p in sets.items() if key != _NONE}
+            best = max(answers, key=answers.get)
+            effects, unexplained = tuple(sorted(best[0])), best[1]
+    chosen = frozenset(effects), unexplained
+    # beside something unexplained more may act, which that may be
+    answers = {key for key in sets if key == chosen or (unexplained and key[1] and key[0] >= chosen[0])}
+    probability = sum(p for key, p in sets.items() if key in answers)
+    open_ones = {name: p for name, p in each.items() if name not in effects} | {"none": none, "unexplained": unknown}
+    taken = {"unexplained"} if unexplained else set() if effects else {"none"}
+    least = OPTIONS.min_possible_probability
+    possible = sorted((-p, name) for name, p in open_ones.items() if p > least and name not in taken)
+    rivals = [(*key, p) for key, p in sets.items() if key not in answers]
     return Verdict(
-        tuple(sorted(effects, key=lambda name: (-shares.get(name, 0.0), name))),
+        effects,
         unexplained,
         float(min(probability, 1.0)),
-        _leg(beliefs, effects, attribution.case.library),
-        tuple((*key, p) for key, p in ordered if p > OPTIONS.min_rival_probability_ratio * probability),
+        _leg(beliefs, effects, library),
+        tuple(name for _, name in possible),
+        tuple(rival for rival in rivals if rival[2] > OPTIONS.min_rival_probability_ratio * probability),
+        groups,
     )
 
 
-def _beside_unexplained(sets, unknown, shares, broad):
-    """Effects to name beside something unexplained, the probability of that, rivals' by (names, unexplained).
+def _groups(beliefs, names, each):
+    """Groups among names that are not named, the most probable first: those that exclude each other.
 
-    broad: names of laws of many coefficients.
+    each: probability of each name.
     """
-    within = {effects: p for (effects, flag), p in sets.items() if flag}
-    # a law of many coefficients takes a part of whatever acts: it has to explain that much by itself
-    named = frozenset(
-        name
-        for name in _certain(within, unknown)
-        if name not in broad or shares.get(name, 0.0) >= OPTIONS.min_share_with_unexplained
-    )
-    if sum(shares.get(name, 0.0) for name in named) < OPTIONS.min_share_with_unexplained:
-        named = frozenset()
-    # what imitates a part of the unknown, and what would do without it
-    rivals = {(effects, True): p for effects, p in within.items() if effects != named}
-    rivals |= {key: p for key, p in sets.items() if not key[1]}
-    return named, sum(p for effects, p in within.items() if named <= effects), rivals
+    left, found = [name for name in names if each[name] > OPTIONS.min_possible_probability], []
+    while left:
+        members = [left[0]]
+        for name in left[1:]:
+            if len(members) < OPTIONS.max_group_size and all(_exclude(beliefs, each, name, one) for one in members):
+                members.append(name)
+        together = beliefs.any_of(members)
+        # as few as make it probable enough
+        while len(members) > 2 and beliefs.any_of(members[:-1]) >= OPTIONS.min_sure_probability:
+            members.pop()
+            together = beliefs.any_of(members)
+        if len(members) > 1 and together >= OPTIONS.min_named_probability:
+            found.append(Group(tuple(members), float(together)))
+            left = [name for name in left if name not in members]
+        else:
+            left = left[1:]
+    return tuple(found)
 
 
-def certain_beside_unexplained(beliefs):
-    """Effects, as a set, that act with a probability of 0.9 each if something acts that no effect explains."""
-    within = {effects: p for (effects, flag), p in beliefs.sets().items() if flag}
-    return _certain(within, beliefs.probability_unexplained)
-
-
-def _certain(within, unknown):
-    """Effects that make up 0.9 of the probability of something unexplained, from that of sets with it."""
-    acting = {name: sum(p for effects, p in within.items() if name in effects) for name in frozenset().union(*within)}
-    return frozenset(name for name, p in acting.items() if p > OPTIONS.min_probability_given_unexplained * unknown)
+def _exclude(beliefs, each, first, second):
+    """Whether two causes act together much less often than if they had nothing to do with each other."""
+    return beliefs.both(first, second) < OPTIONS.max_joint_probability_ratio * each[first] * each[second]
 
 
 def _leg(beliefs, effects, library):
     """The one leg that all effects with legs of their own name, 0 where there is none."""
     likely = [beliefs.legs(name) for name in effects if per_leg(library[name])]
-    best = {max(legs, key=legs.get) for legs in likely}
+    best = {max(legs, key=legs.get) for legs in likely if legs}
     leg = best.pop() if len(best) == 1 else 0
     return leg if isinstance(leg, int) else 0

@@ -15,7 +15,7 @@ from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
 from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
-from rrru.gap.search import Hypothesis
+from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.state import Linear
 from rrru.gap.terms import Term
 from rrru.gap.whitened import LEVELS
@@ -248,9 +248,9 @@ def test_alone_it_is_averaged_over_all_strengths_and_levels():
     assert found.shape == (len(LEVELS), len(STRENGTHS)) and grid[:, 0].tolist() == STRENGTHS.tolist()
     expected = [Dense.of(evidence, (ROUGH,), (strength,)).likelihood for strength in STRENGTHS]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
-    alone, best = evidence.independent((ROUGH,), [0])
+    alone, best = evidence.over_all_strengths((ROUGH,), 0)
     np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(STRENGTHS)), rtol=1e-8)
-    assert best[0, 0] == STRENGTHS[np.argmax(expected)]
+    assert best[0] == STRENGTHS[np.argmax(expected)]
 
 
 @pytest.mark.parametrize("terms", _SETS[:-2], ids=lambda terms: "+".join(term.effect for term in terms))

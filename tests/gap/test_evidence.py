@@ -96,9 +96,9 @@ def test_scores_equal_a_dense_marginal_likelihood(level, legs):
     found, grid = evidence.over_strengths((term,))
     np.testing.assert_allclose(grid[:, 0], STRENGTHS)
     np.testing.assert_allclose(found[level], expected, rtol=1e-8)
-    alone, best = evidence.independent((term,), [level])
+    alone, best = evidence.over_all_strengths((term,), level)
     np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(STRENGTHS)), rtol=1e-8)
-    assert best[0, 0] == STRENGTHS[np.argmax(expected)]
+    assert best[0] == STRENGTHS[np.argmax(expected)]
     np.testing.assert_allclose(evidence.none[level], _marginal(evidence, None, None, level), rtol=1e-8)
 
 

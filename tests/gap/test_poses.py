@@ -13,9 +13,8 @@ from rrru.gap.advise import advise
 from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.model_fit import fit_model
+from rrru.gap.model_space import explore
 from rrru.gap.options import OPTIONS
-from rrru.gap.posterior import posterior
-from rrru.gap.search import search
 from rrru.gap.settings import Prior
 from rrru.gap.state import State
 from rrru.gap.verdict import decide
@@ -99,9 +98,9 @@ def between():
     case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = posterior(evidence, search(evidence), Prior())
+    beliefs = explore(evidence, Prior())
     found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
-    verdict = decide(found, {})
+    verdict = decide(beliefs, library)
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return advise(found, verdict, MASSES)
 

@@ -1,14 +1,16 @@
 """Terms, priors and probabilities on made-up evidence; the verdict on made-up posteriors."""
 
+from math import comb
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 from scipy.special import logsumexp
 
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.posterior import Posterior, posterior
-from rrru.gap.search import Hypothesis
+from rrru.gap.hypothesis import Hypothesis
+from rrru.gap.posterior import Posterior, Weigher
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.terms import EACH, SAME, Term, per_leg, spread, variants
 from rrru.gap.verdict import decide, label
@@ -29,6 +31,12 @@ def _stub(explained=0.0, library=EFFECTS):
         explained=lambda h, effects: explained if h.effects & set(effects) else 0.0,
         noise=NoiseModel.white(NOISE_MM),
     )
+
+
+def posterior(evidence, hypotheses, prior):
+    """Posterior of hypotheses."""
+    weigher = Weigher(evidence, prior)
+    return Posterior.of([weigher.weighed(one) for one in hypotheses])
 
 
 def _arm():
@@ -77,12 +85,23 @@ def test_a_terms_numbers_spread_over_its_legs(name):
     assert one.sum() == 3 and sorted(coordinates.legs[one > 0]) == [1, 2, 3]
 
 
+@pytest.mark.parametrize(("few", "share"), [(1.0, 0.0), (0.5, 0.5), (0.0, 1.0)])
+def test_the_prior_of_a_set_is_a_mixture_of_few_effects_and_of_each_by_itself(few, share):
+    """Summed over all sets of a library of twelve effects it is one, and each part is what it says."""
+    prior = Prior((0.3, 0.55, 0.13, 0.02), each=0.1, share=share)
+    size = 12
+    by_count = np.array([comb(size, count) * np.exp(prior.log_set(count, size)) for count in range(size + 1)])
+    counts = np.array([0.3, 0.55, 0.13, *(0.02 * (2 / 13) ** k for k in range(size - 2))])
+    binomial = stats.binom.pmf(np.arange(size + 1), size, 0.1)
+    np.testing.assert_allclose(by_count, few * counts + share * binomial, rtol=1e-9)
+
+
 @pytest.mark.parametrize("arm", [False, True])
 def test_without_data_the_probabilities_are_the_prior(arm):
     """All hypotheses of up to two effects alike: counts and the unexplained share come back, alike for all effects and
     pairs, however many legs there are.
     """
-    prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1), _arm() if arm else EFFECTS
+    prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1, share=0.0), _arm() if arm else EFFECTS
     every = [_hypothesis(*terms) for size in range(3) for terms in _all(size, library)]
     beliefs = posterior(_stub(1.5, library), every, prior)
     assert beliefs.weights.sum() == pytest.approx(1.0)
@@ -151,63 +170,98 @@ def test_improbable_pairs_are_forgotten_and_single_effects_stay():
     assert [len(h.terms) for h in beliefs.hypotheses] == [0, 1] and beliefs.weights.sum() == pytest.approx(1.0)
 
 
-def _decided(*entries, shares=None):
+def _decided(*entries):
     """Verdict of (terms, probability, unexplained) entries, each a hypothesis of its own."""
     hypotheses = tuple(_hypothesis(*terms) for terms, _, _ in entries)
     weights, unexplained = np.zeros((len(entries), 2)), np.tile([False, True], (len(entries), 1))
     for row, (_, probability, flag) in enumerate(entries):
         weights[row, int(flag)] = probability
-    return decide(
-        SimpleNamespace(
-            posterior=Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained),
-            case=SimpleNamespace(library=EFFECTS),
-        ),
-        shares or {},
-    )
+    return decide(Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained), EFFECTS)
 
 
 LAG, PLAY, TILT, HEAT = (Term(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
 
 
 def test_nothing_is_decided_where_nothing_is_most_probable():
-    verdict = _decided(((), 0.8, False), ((LAG,), 0.15, False), ((), 0.05, True))
+    verdict = _decided(((), 0.78, False), ((LAG,), 0.15, False), ((), 0.07, True))
     assert (verdict.label, verdict.effects, verdict.leg, verdict.unexplained) == ("none", (), 0, False)
-    assert verdict.probability == pytest.approx(0.8)
+    assert verdict.probability == pytest.approx(0.78)
     assert verdict.confusable_with == ("servo_lag", "unexplained")
+    decisions = {name: verdict.decision(name) for name in ("none", "servo_lag", "unexplained", "backlash")}
+    assert decisions == {"none": "named", "servo_lag": "possible", "unexplained": "possible", "backlash": "excluded"}
 
 
-def test_the_most_probable_set_is_named_in_the_order_of_its_shares():
+def test_what_probably_acts_is_named_and_the_probability_is_that_of_exactly_this():
     verdict = _decided(
-        ((LAG, PLAY), 0.7, False), ((PLAY,), 0.26, False), ((), 0.01, False), shares={"servo_lag": 0.2, "backlash": 0.7}
+        ((LAG, PLAY), 0.73, False), ((PLAY,), 0.24, False), ((), 0.01, False), ((PLAY, HEAT), 0.02, False)
     )
     assert verdict.label == "backlash+servo_lag" and verdict.confusable_with == ()
+    assert verdict.probability == pytest.approx(0.73)
     assert [names for names, _, _ in verdict.rivals] == [frozenset({"backlash"})]
+    assert verdict.decision("thermal_growth") == "excluded" and verdict.decision("servo_lag") == "named"
+
+
+def test_a_name_needs_all_sets_together_and_not_one_that_is_probable():
+    """No set of it is the most probable one, and it acts in most of them."""
+    more = {(): 0.2, (LAG,): 0.2, (TILT,): 0.2, (LAG, TILT): 0.16}
+    verdict = _decided(*(((PLAY, *others), p, False) for others, p in more.items()), ((HEAT,), 0.24, False))
+    assert verdict.effects == ("backlash",) and verdict.probability == pytest.approx(0.2)
 
 
 def test_hypotheses_of_one_set_add_up():
     legs = [Term("servo_lag", 0, leg) for leg in (1, 2, 3)]
-    verdict = _decided(*(((leg,), 0.2, False) for leg in legs), ((PLAY,), 0.4, False))
-    assert (
-        verdict.label == "servo_lag"
-        and verdict.probability == pytest.approx(0.6)
-        and verdict.confusable_with == ("backlash",)
-    )
+    verdict = _decided(*(((leg,), 0.25, False) for leg in legs), ((PLAY,), 0.25, False))
+    assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.75)
+    assert verdict.confusable_with == ("backlash",) and verdict.groups == ()
 
 
-def test_unexplained_wins_where_all_of_it_together_beats_the_best_set():
-    verdict = _decided(((), 0.2, True), ((LAG,), 0.2, True), ((PLAY,), 0.25, False), ((TILT,), 0.35, False))
-    assert verdict.label == "unexplained" and verdict.probability == pytest.approx(0.4)
-    assert verdict.confusable_with == ("axis_tilt", "backlash", "servo_lag")
+def test_what_is_unexplained_adds_up_over_sets():
+    verdict = _decided(((), 0.35, True), ((LAG,), 0.25, True), ((PLAY,), 0.15, False), ((TILT,), 0.25, False))
+    assert verdict.label == "unexplained" and verdict.probability == pytest.approx(0.6)
+    assert verdict.confusable_with == ("axis_tilt", "servo_lag", "backlash")
 
 
-@pytest.mark.parametrize(
-    ("probability", "share", "expected"),
-    [(0.95, 0.6, "servo_lag+unexplained"), (0.7, 0.6, "unexplained"), (0.95, 0.3, "unexplained")],
-)
-def test_an_effect_is_named_beside_the_unexplained_only_where_sure_and_large(probability, share, expected):
-    verdict = _decided(((LAG,), probability, True), ((), 1.0 - probability, True), shares={"servo_lag": share})
+@pytest.mark.parametrize(("probability", "expected"), [(0.75, "servo_lag+unexplained"), (0.6, "unexplained")])
+def test_beside_the_unexplained_the_same_rule_holds(probability, expected):
+    verdict = _decided(((LAG,), probability, True), ((), 1.0 - probability, True))
     assert verdict.label == expected
     assert ("servo_lag" in verdict.confusable_with) is (expected == "unexplained")
+
+
+def test_causes_that_exclude_each_other_are_a_group():
+    verdict = _decided(((LAG, TILT), 0.55, False), ((LAG, PLAY), 0.43, False), ((LAG,), 0.02, False))
+    (group,) = verdict.groups
+    assert group.names == ("axis_tilt", "backlash") and group.probability == pytest.approx(0.98)
+    # the most probable one stands for it in the model
+    assert set(verdict.effects) == {"servo_lag", "axis_tilt"} and verdict.probability == pytest.approx(0.55)
+    decisions = [verdict.decision(name) for name in ("servo_lag", "axis_tilt", "backlash", "thermal_growth")]
+    assert decisions == ["named", "group", "group", "excluded"]
+    assert verdict.confusable_with == ("backlash",)
+
+
+def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():
+    """Two of 0.6 each, independent: neither is named with the other in one breath."""
+    verdict = _decided(
+        ((LAG, TILT, PLAY), 0.36, False), ((LAG, TILT), 0.24, False), ((LAG, PLAY), 0.24, False), ((LAG,), 0.16, False)
+    )
+    assert verdict.groups == () and verdict.effects == ("servo_lag",)
+    assert set(verdict.confusable_with) == {"axis_tilt", "backlash"}
+
+
+def test_a_group_has_as_few_causes_as_make_it_sure():
+    entries = [((TILT,), 0.5, False), ((PLAY,), 0.42, False), ((HEAT,), 0.08, False)]
+    assert _decided(*entries).groups[0].names == ("axis_tilt", "backlash")
+    entries = [((TILT,), 0.36, False), ((PLAY,), 0.34, False), ((HEAT,), 0.3, False)]
+    assert _decided(*entries).groups[0].names == ("axis_tilt", "backlash", "thermal_growth")
+
+
+def test_two_groups_stand_beside_each_other():
+    one, other = [(TILT,), (PLAY,)], [(HEAT,), (LAG,)]
+    entries = [((*a, *b), 0.25, False) for a in one for b in other]
+    assert {frozenset(group.names) for group in _decided(*entries).groups} == {
+        frozenset({"axis_tilt", "backlash"}),
+        frozenset({"thermal_growth", "servo_lag"}),
+    }
 
 
 @pytest.mark.parametrize(

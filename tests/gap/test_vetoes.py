@@ -12,9 +12,8 @@ from rrru.gap.attribute import Attribution
 from rrru.gap.calibrate import calibrate
 from rrru.gap.evidence import ModelEvidence
 from rrru.gap.model_fit import fit_model
+from rrru.gap.model_space import explore
 from rrru.gap.options import OPTIONS
-from rrru.gap.posterior import posterior
-from rrru.gap.search import search
 from rrru.gap.settings import Prior
 from rrru.gap.state import Linear
 from tests.gap.campaigns import EFFECTS, case_of, measure, strong
@@ -41,7 +40,7 @@ def _found(off, whole=True):
     data = own @ [1.0, -0.8] + NOISE_MM * generator.standard_normal(shape)
     linear = Linear(data, generator.normal(size=(*shape, 3)), columns, {}, {}, None)
     evidence = ModelEvidence(library, linear, np.ones(40, dtype=int), NoiseModel.white(NOISE_MM), smooth=False)
-    return SimpleNamespace(evidence=evidence, posterior=posterior(evidence, search(evidence), PRIOR))
+    return SimpleNamespace(evidence=evidence, posterior=explore(evidence, PRIOR))
 
 
 def test_where_every_likely_set_holds_it_others_are_looked_for():
@@ -62,7 +61,7 @@ def test_where_a_likely_set_does_without_it_nothing_is_searched(monkeypatch):
     beliefs = found.posterior
     kept = beliefs.without("whole")
     assert kept.height > beliefs.height - OPTIONS.negligible_nats and kept.best()[0].effects == {"first", "second"}
-    monkeypatch.setattr(diagnose, "search", lambda *_, **__: pytest.fail("searched"))
+    monkeypatch.setattr(diagnose, "explore", lambda *_, **__: pytest.fail("searched"))
     rest = diagnose._without(found, {"whole"}, {"whole"}, PRIOR)
     assert rest.best() == kept.best() and rest.marginal("whole") == 0.0
     assert rest.weights.sum() == pytest.approx(1.0)
@@ -87,7 +86,7 @@ def attribution():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     decisive = evidence.on_library()
-    beliefs = posterior(decisive, search(decisive), PRIOR)
+    beliefs = explore(decisive, PRIOR)
     return Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
 
 

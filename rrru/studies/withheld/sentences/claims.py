@@ -49,7 +49,11 @@ _SENTENCES = {
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
     "shares overlap": r"These shares overlap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
-    "probability of this answer": rf"Probability of this answer: {_P}\.",
+    "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
+    "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "
+    rf"\(probability that one does: {_P}\).*",
+    "probability of this answer": rf"(?:Probability that it acts: (?P<each>.*)\. )?Probability of (?:exactly )?this "
+    rf"answer: {_P}\.",
     "it does not repeat": rf"(?:{_SHARE}|Some of it) does not repeat from pass to pass.*",
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
     "what is left with it": rf"Add (?:it|them) to the simulator and {_X} mm is left on runs .*; the noise is {_Y} mm\.",
@@ -142,6 +146,11 @@ def _inside(text, stated):
         result.append(Claim("place of a cause", text, stated))
     if "share" in stated and "name" in stated:
         result.append(Claim("share of a cause", text, stated))
+    for one in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
+        result.append(Claim("probability of a cause", text, one.groupdict()))
+    if "listed" in stated and "share" in text.split(":")[0]:
+        names = (re.sub(r" \d+ %$", "", one) for one in stated["listed"].split(", "))
+        result += [Claim("a cause by its share", text, {"name": name}) for name in names if not name[0].isdigit()]
     if "probability" in stated:
         result.append(Claim("probability", text, stated))
     if "names" in stated and text.startswith(("These data", "Parts of")):

@@ -94,6 +94,27 @@ def _cause(stated, truth, _facts):
     return stated["name"].replace(" ", "_") in truth.effects
 
 
+def _one_of(names, truth):
+    """At least one of some names, as words, acts."""
+    return any(name.replace(" ", "_") in truth.effects for name in names)
+
+
+def _group(stated, truth, _facts):
+    """One of the causes of a group acts."""
+    return _one_of(re.findall(r"([a-z ]+?) (?:more than |less than )?[\d.]+(?:, |$)", stated["listed"]), truth)
+
+
+def _by_its_share(stated, truth, _facts):
+    """A cause of the line of all causes acts, or one of its group."""
+    return _one_of(stated["name"].split(" or "), truth)
+
+
+def _probability_of_cause(stated, truth, _facts):
+    """A cause that is said to be as good as certain acts; a smaller probability claims nothing."""
+    sure = stated["probability"].startswith("more") or float(stated["probability"].split()[-1]) >= _SURE
+    return _one_of([stated["name"]], truth) if sure else None
+
+
 def _place(stated, truth, facts):
     """It acts where the sentence says."""
     name = stated["name"].replace(" ", "_")
@@ -409,6 +430,10 @@ _JUDGES = {
     "the effects are confounded": _undecided,
     "shares overlap": _overlap,
     "something is unexplained": _unexplained,
+    "causes by share": _undecided,
+    "a cause by its share": _by_its_share,
+    "a group of causes": _group,
+    "probability of a cause": _probability_of_cause,
     "probability of this answer": _probability,
     "it does not repeat": _scatter,
     "it is random error": _scatter,

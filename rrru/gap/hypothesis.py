@@ -1,0 +1,32 @@
+"""A set of terms that may be what acts, and how well it explains the data."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of terms with its log evidence (levels,) and the best strengths (levels, terms).
+
+    Levels at which it has not been computed have -inf.
+    """
+
+    terms: tuple
+    evidence: np.ndarray
+    strengths: np.ndarray
+
+    @cached_property
+    def effects(self):
+        """Names of the effects, as a set."""
+        return frozenset(term.effect for term in self.terms)
+
+    @cached_property
+    def level(self):
+        """The level of the highest evidence, an index."""
+        return int(self.evidence.argmax())
+
+    def strengths_of(self, terms, level):
+        """Strengths of some of its terms at a level (an index)."""
+        return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
