@@ -28,7 +28,7 @@ from scipy.stats import multivariate_normal
 from rrru.errors import FitError
 from rrru.estimation.discrepancy import Discrepancy
 from rrru.estimation.estimate import Estimate, triangle_of, with_prior
-from rrru.estimation.problem import Problem, unweighted
+from rrru.estimation.problem import Problem, log_determinant
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -186,10 +186,7 @@ def _normalization(problem: Problem, values: FloatArray) -> tuple[int, float]:
     """Number of independent readings, and the log of the constant factor of their density but for (2 pi)^-1/2 each."""
     if isinstance(problem.observations, Eliminating):
         return problem.observations.normalization(values)
-    log = 0.0 if problem.whiten is unweighted else getattr(problem.whiten, "log_determinant", None)
-    if log is None:
-        raise FitError("the whitening states no log_determinant; allowed: one that does, as Whitening")
-    return problem.observations.residual(values).size, float(log)
+    return problem.observations.residual(values).size, log_determinant(problem.whiten)
 
 
 def _log_probability(mean: FloatArray, covariance: FloatArray, low: FloatArray, high: FloatArray) -> float:

@@ -149,7 +149,7 @@ def _bad_reading(tests, left, level):
     imitators = tests.imitators(BAD_READING, level.imitated_from, suspect or 0)
     share = p = estimate = error = np.nan
     if suspect is not None:
-        share = _share(tests, tests.bases[BAD_READING][suspect])
+        share = tests.explained_share(BAD_READING, suspect)
         p, estimate = left.p[suspect], left.difference_mm[suspect]
         error = estimate / left.ratio[suspect]
     verdict = _verdict(p, imitators, level.limit(tests, BAD_READING))
@@ -160,14 +160,8 @@ def _acting_on_all(tests, level):
     """The causes that act on all readings, a list."""
     answers = []
     for name, (_, unit) in tests.columns.items():
-        basis, p, imitators = tests.bases[name][0], float(tests.p(name)), tests.imitators(name, level.imitated_from)
+        p, imitators = float(tests.p(name)), tests.imitators(name, level.imitated_from)
         verdict = _verdict(p, imitators, level.limit(tests, name), lambda name=name: tests.p_without_any(name))
-        rank, share = basis.shape[1], _share(tests, basis)
+        rank, share = tests.added[name].rank, tests.explained_share(name)
         answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict))
     return answers
-
-
-def _share(tests, basis):
-    """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
-    left = tests.own_weighing.left(tests.result.residual_mm)
-    return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)
