@@ -41,11 +41,13 @@ _RANK_TOLERANCE = 1e-6
 class LinearizedModel:
     """What a problem's parameters explain of its N whitened readings, to first order about an estimate.
 
-    basis (N, r): orthonormal, of all that the parameters can change; log_density: log |W| - 1/2 log |A' A|.
+    basis (N, r): orthonormal, of all that the parameters can change; residual (N,): what they leave of the estimate's
+    whitened one; log_density: log |W| - 1/2 log |A' A|.
     """
 
     whiten: Whiten
     basis: FloatArray
+    residual: FloatArray
     log_density: float
 
     @classmethod
@@ -56,7 +58,9 @@ class LinearizedModel:
         """
         whiten = whiten or estimate.problem.whiten
         basis, triangle = np.linalg.qr(whiten(estimate.jacobian).reshape(-1, len(estimate.values)))
-        return cls(whiten, basis, log_determinant(whiten) - float(np.log(np.abs(np.diag(triangle))).sum()))
+        log_density = log_determinant(whiten) - float(np.log(np.abs(np.diag(triangle))).sum())
+        white = whiten(estimate.residual).ravel()
+        return cls(whiten, basis, white - basis @ (basis.T @ white), log_density)
 
     def remainder(self, readings: FloatArray) -> FloatArray:
         """Whitened readings (n, a, ...) less what the parameters explain of them, (N, ...)."""
@@ -79,8 +83,9 @@ class LinearizedModel:
     def with_columns(self, columns: FloatArray) -> Self:
         """The model that has the coefficients of columns (n, a, c) as parameters too."""
         added = self.add(columns)
-        basis = np.concatenate([self.basis, added.basis[0]], axis=1)
-        return replace(self, basis=basis, log_density=self.log_density - float(added.log_volume[0]))
+        (new,) = added.basis
+        basis, residual = np.concatenate([self.basis, new], axis=1), self.residual - new @ (new.T @ self.residual)
+        return replace(self, basis=basis, residual=residual, log_density=self.log_density - float(added.log_volume[0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,16 +115,15 @@ class AddedColumns:
         """Sums of squares (b, ...) that the blocks explain of whitened readings (N, ...)."""
         return np.asarray((np.tensordot(np.swapaxes(self.basis, 1, 2), white, axes=1) ** 2).sum(axis=1))
 
-    def unexplained(self, readings: FloatArray) -> FloatArray:
-        """Sums of squares (b,) that parameters and blocks leave of readings (n, a)."""
-        white = self.model.remainder(readings)
-        taken = self.basis @ (np.swapaxes(self.basis, 1, 2) @ white)[..., None]
-        return np.asarray(((white - taken[..., 0]) ** 2).sum(axis=1))
+    def unexplained(self) -> FloatArray:
+        """Sums of squares (b,) that the blocks leave of the model's residual."""
+        taken = self.basis @ (np.swapaxes(self.basis, 1, 2) @ self.model.residual)[..., None]
+        return np.asarray(((self.model.residual - taken[..., 0]) ** 2).sum(axis=1))
 
-    def estimates(self, readings: FloatArray, noise: float | None = None) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (b, c) for readings (n, a) and their standard errors; noise: by default that of what is left."""
-        sd = np.sqrt(self.unexplained(readings) / self.freedom)[:, None] if noise is None else noise
-        return self.inverse @ self.model.remainder(readings), sd * np.linalg.norm(self.inverse, axis=-1)
+    def estimates(self, noise: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Coefficients (b, c) of least squares and their standard errors; noise: by default that of what is left."""
+        sd = np.sqrt(self.unexplained() / self.freedom)[:, None] if noise is None else noise
+        return self.inverse @ self.model.residual, sd * np.linalg.norm(self.inverse, axis=-1)
 
     def test(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Each block's p value (b, ...) for readings (n, a, ...), and its log marginal likelihood (b, ...).

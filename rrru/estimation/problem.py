@@ -51,7 +51,7 @@ class WhiteNoise:
     def __call__(self, values: FloatArray) -> FloatArray:
         """Whitened values (n, a, ...)."""
         sd = np.asarray(self.sd)
-        return np.asarray(values / (sd.reshape(*sd.shape, *[1] * (values.ndim - 2)) if sd.ndim else sd))
+        return np.asarray(values / sd.reshape(*sd.shape, *[1] * (values.ndim - sd.ndim)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,6 +29,15 @@ _LIKELY_RATIOS = np.geomspace(0.125, 2.0, 9)
 _POWER, _DRAWS, _SEED = 0.9, 500, 1
 
 
+def noise_sds(residuals, ratios=_RATIOS):
+    """Standard deviations (n,) of ProbedHeights in proportion: by the firmware's ratio, then by others.
+
+    Heights alone have one ratio.
+    """
+    height = np.arange(len(residuals)) < len(residuals.height_mm)
+    return [1.0 / residuals.root_weight, *(np.where(height, ratio, 1.0) for ratio in ratios if not height.all())]
+
+
 @dataclass(frozen=True)
 class CauseTests:
     """The readings of a PrinterFit as a linear model about its answer, under every ratio of noises."""
@@ -41,39 +50,27 @@ class CauseTests:
         return cause_columns(self.result)
 
     @cached_property
-    def noise_sds(self):
-        """Standard deviations (n,) of the readings in proportion: by the firmware's ratio, then by the others."""
-        return [1.0 / self.result.residuals.root_weight, *self._noise_sds(_RATIOS)]
-
-    def _noise_sds(self, ratios):
-        """The same by some ratios; heights alone have none."""
-        height = np.arange(len(self._readings)) < len(self.result.residuals.height_mm)
-        return [] if height.all() else [np.where(height, ratio, 1.0) for ratio in ratios]
+    def _blocks(self):
+        """Columns (n, 1, k) of every cause by name, and (n, 1, 1, n) of a bad reading, a block for each."""
+        blocks = {name: columns[:, None] for name, (columns, _) in self.columns.items()}
+        return blocks | {BAD_READING: np.eye(len(self.result.residuals))[:, None, None]}
 
     @cached_property
     def _models(self):
         """LinearizedModels of all ratios by which a cause is judged, and by which a bad reading is."""
-        likely = self._noise_sds(_LIKELY_RATIOS) or self.noise_sds
-        return tuple([self.result.linearized(sd) for sd in sds] for sds in (self.noise_sds, likely))
+        likely = noise_sds(self.result.residuals, _LIKELY_RATIOS)
+        both = noise_sds(self.result.residuals), likely[len(likely) > 1 :]
+        return tuple([self.result.linearized(sd) for sd in sds] for sds in both)
 
-    @cached_property
-    def _readings(self):
-        """Readings (n, 1) in mm less those of the answer."""
-        return self.result.residual_mm[:, None]
-
-    def _columns(self, name):
-        """Columns (n, 1, k) of a cause; of a bad reading (n, 1, 1, n), a block for each."""
-        return np.eye(len(self._readings))[:, None, None] if name == BAD_READING else self.columns[name][0][:, None]
+    @property
+    def _own(self):
+        """The LinearizedModel of the firmware's ratio."""
+        return self._models[0][0]
 
     @cached_property
     def added(self):
         """AddedColumns of every cause by name, those of a bad reading last, under the firmware's ratio."""
-        return {name: self._models[0][0].add(self._columns(name)) for name in (*self.columns, BAD_READING)}
-
-    @cached_property
-    def _remainder(self):
-        """What the calibration leaves (n,) of the whitened readings, under the firmware's ratio."""
-        return self._models[0][0].remainder(self._readings)
+        return {name: self._own.add(block) for name, block in self._blocks.items()}
 
     def p(self, name, readings=None, beside=None):
         """Largest p over the ratios for a cause, (...) for readings (..., n), by default its own.
@@ -81,22 +78,23 @@ class CauseTests:
         Of a bad reading it is the mean (..., n), of every reading, times their number (Bonferroni). beside: columns
         (n, k) that are fitted too.
         """
-        readings = self._readings if readings is None else np.moveaxis(readings, -1, 0)[:, None]
-        bad = name == BAD_READING
+        readings = self.result.in_mm.residual if readings is None else np.moveaxis(readings, -1, 0)[:, None]
+        bad, block = name == BAD_READING, self._blocks[name]
         models = self._models[bad]
         if beside is not None:
             models = [one.with_columns(beside[:, None]) for one in models]
         if not bad:
-            return largest_p(models, self._columns(name), readings)[0]
-        return np.minimum(np.moveaxis(mean_p(models, self._columns(name), readings), 0, -1) * len(readings), 1.0)
+            return largest_p(models, block, readings)[0]
+        return np.minimum(np.moveaxis(mean_p(models, block, readings), 0, -1) * len(readings), 1.0)
 
     def p_without_any(self, name):
         """Largest p of a cause with any single reading left out."""
-        return float(np.max([self.p(name, beside=column[:, None]) for column in np.eye(len(self._readings))]))
+        return float(np.max([self.p(name, beside=column[:, None]) for column in np.eye(len(self.result.residuals))]))
 
     def explained_share(self, name, reading=0):
         """Share of the sum of squares left that a cause holds, under the firmware's ratio; reading: as below."""
-        return min(self.added[name].explained(self._remainder)[reading] / (self._remainder**2).sum(), 1.0)
+        explained = self.added[name].explained(self._own.residual)[reading]
+        return min(explained / (self._own.residual**2).sum(), 1.0)
 
     def imitators(self, name, share, reading=0):
         """Names of the other causes that hold a share of what a cause explains, under the firmware's ratio.
@@ -104,27 +102,23 @@ class CauseTests:
         reading: that of a bad reading.
         """
         basis = self.added[name].basis[reading]
-        explained = basis @ (basis.T @ self._remainder)
+        explained = basis @ (basis.T @ self._own.residual)
         held = {other: one.explained(explained).max() for other, one in self.added.items() if other != name}
         return tuple(other for other, part in held.items() if basis.size and part >= share * (explained @ explained))
 
     def always_imitated(self, name, share):
         """Whether another cause holds that share of everything that a cause can explain, under the firmware's ratio."""
         others = [self.added[other].basis[0] for other in self.columns if other != name]
-
-        def imitated(basis):
-            rank = basis.shape[1]
-            able = [other for other in others if other.shape[1] >= rank > 0]
-            return any(np.linalg.norm(other.T @ basis, -2) ** 2 >= share for other in able)
-
-        return all(imitated(basis) for basis in self.added[name].basis)
+        wide = [one for one in others if one.shape[1] >= self.added[name].rank > 0]
+        bases = self.added[name].basis
+        return all(any(np.linalg.norm(one.T @ basis, -2) ** 2 >= share for one in wide) for basis in bases)
 
     def estimate(self, name):
         """Number of a cause with a single column, and its standard error, under the firmware's ratio; else NaN."""
         added = self.added[name]
-        if not self.columns[name][0].shape[1] == added.rank == 1 or added.freedom < 1:
+        if self._blocks[name].shape[2] > 1 or not added.rank or added.freedom < 1:
             return np.nan, np.nan
-        return tuple(one.item() for one in added.estimates(self._readings))
+        return tuple(one.item() for one in added.estimates())
 
     def detectable_mm(self, name, limit):
         """Rms in mm over the readings of what the calibration does not absorb of a cause that shows, 9 times of 10.
@@ -132,7 +126,7 @@ class CauseTests:
         That is, has p below a limit. By simulation with the fit's noise in the firmware's ratio and causes in random
         directions; of a bad reading the error of a random one. NaN where no size does.
         """
-        generator, sd = np.random.default_rng(_SEED), self.noise_sds[0]
+        generator, sd = np.random.default_rng(_SEED), noise_sds(self.result.residuals)[0]
         noise = generator.normal(size=(_DRAWS, len(sd))) * self.result.fit.noise_mm * sd
         if name == BAD_READING:
             effect = generator.permuted(np.tile(np.eye(len(sd))[0], (_DRAWS, 1)), axis=1)

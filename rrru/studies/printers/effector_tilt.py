@@ -26,7 +26,7 @@ from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
 from rrru.studies.printers.cause_columns import arm_columns, lean_columns
-from rrru.studies.printers.cause_tests import CauseTests
+from rrru.studies.printers.cause_tests import noise_sds
 from rrru.studies.printers.printer_fit import PrinterFit
 
 # the difference of an arm's rods that readings have to show
@@ -113,11 +113,6 @@ class TiltTest:
         """Columns (heights, k) with zeros (n, k) for the distances."""
         return np.pad(columns, ((0, len(self.result.residuals) - len(columns)), (0, 0)))
 
-    @property
-    def _readings(self):
-        """Readings (n, 1) in mm less those of the answer."""
-        return self.result.residual_mm[:, None]
-
     @cached_property
     def _models(self):
         """LinearizedModels with all rivals, under all ratios of noises: of heights to distances, and by hand to probed.
@@ -127,7 +122,7 @@ class TiltTest:
         touched = (self.probe_mm == 0.0).all(axis=1)
         hands = _HAND if touched.any() and not touched.all() else (1.0,)
         by_hand = self._of_heights(touched[:, None])[:, 0]
-        sds = [sd * np.where(by_hand, hand, 1.0) for sd in CauseTests(self.result).noise_sds for hand in hands]
+        sds = [sd * np.where(by_hand, hand, 1.0) for sd in noise_sds(self.result.residuals) for hand in hands]
         own = sds.pop(len(hands) // 2)
         return [self.result.linearized(sd).with_columns(self.rivals[:, None]) for sd in (own, *sds)]
 
@@ -142,7 +137,7 @@ class TiltTest:
         if self.noise_mm is not None:
             return self.noise_mm
         freedom = self._own.freedom
-        return np.sqrt(self._own.unexplained(self._readings)[0] / freedom) if freedom > 0 else PROBE_MM
+        return np.sqrt(self._own.unexplained()[0] / freedom) if freedom > 0 else PROBE_MM
 
     @cached_property
     def most_noise(self):
@@ -160,7 +155,7 @@ class TiltTest:
     def _p(self, models, columns):
         """Largest p of columns (n, k) over models; NaN where their rank depends on the ratio."""
         ranks = {one.add(columns[:, None]).rank for one in models}
-        return float(largest_p(models, columns[:, None], self._readings)[0]) if len(ranks) == 1 else np.nan
+        return float(largest_p(models, columns[:, None], self.result.in_mm.residual)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
         """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
@@ -174,6 +169,6 @@ class TiltTest:
     def alone(self, arm):
         """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
         column = self.columns[:, [arm]]
-        size, error = self._models[0].add(column[:, None]).estimates(self._readings, self.noise)
+        size, error = self._models[0].add(column[:, None]).estimates(self.noise)
         beside = [one.with_columns(column[:, None]) for one in self._models]
         return abs(size.item()), error.item(), self._p(beside, np.delete(self.columns, arm, axis=1))

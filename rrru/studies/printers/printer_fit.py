@@ -39,19 +39,14 @@ class PrinterFit:
         return self.fit.observations
 
     @cached_property
-    def _in_mm(self):
-        """The Estimate of its readings in mm, without the firmware's weights."""
+    def in_mm(self):
+        """The Estimate of its readings (n, 1) in mm about the answer, without the firmware's weights."""
         unweighted = replace(self.residuals, height_weight=1.0)
         return self.fit.at(self.fit.deviations, "without weights", unweighted).estimate
 
-    @property
-    def residual_mm(self):
-        """Readings (n,) less those of the answer."""
-        return self._in_mm.residual[:, 0]
-
     def linearized(self, sd):
-        """The LinearizedModel of its readings in mm about the answer; sd (n,): of their noises, in proportion."""
-        return LinearizedModel.of(self._in_mm, WhiteNoise(sd[:, None]))
+        """The LinearizedModel of the same; sd (n,): standard deviations of the readings' noises, in proportion."""
+        return LinearizedModel.of(self.in_mm, WhiteNoise(sd[:, None]))
 
     @property
     def names(self):
