@@ -52,15 +52,13 @@ class LinearizedModel:
 
     @classmethod
     def of(cls, estimate: Estimate, whiten: Whiten | None = None) -> Self:
-        """About an Estimate whose readings determine every parameter; whiten: by default that of its problem.
+        """About an Estimate; whiten: by default that of its problem.
 
         Raises FitError where the whitening does not state its determinant.
         """
         whiten = whiten or estimate.problem.whiten
-        basis, triangle = np.linalg.qr(whiten(estimate.jacobian).reshape(-1, len(estimate.values)))
-        log_density = log_determinant(whiten) - float(np.log(np.abs(np.diag(triangle))).sum())
         white = whiten(estimate.residual).ravel()
-        return cls(whiten, basis, white - basis @ (basis.T @ white), log_density)
+        return cls(whiten, np.zeros((white.size, 0)), white, log_determinant(whiten)).with_columns(estimate.jacobian)
 
     def remainder(self, readings: FloatArray) -> FloatArray:
         """Whitened readings (n, a, ...) less what the parameters explain of them, (N, ...)."""
