@@ -1,4 +1,4 @@
-"""The measuring noise of a campaign where nobody has stated it, and single points that the instrument got wrong."""
+"""The measuring noise of a campaign where nobody has stated it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -7,8 +7,6 @@ from rrru.campaign import measurements as rows
 
 # degrees of freedom from which on repeated points tell the noise
 ENOUGH_REPEATS = 30
-# a point this many robust deviations from its neighbours on both sides is an outlier; no more than this share may be
-_OUTLYING, _MOST = 8.0, 0.1
 
 
 def along_runs(
@@ -83,29 +81,3 @@ def reading_series(measurements, readings=None):
     if readings is None:
         return number
     return np.concatenate([number, number.max() + number[readings.turned]])
-
-
-def isolated(residual_mm, run, floor_mm, kind=None):
-    """Points (n,) whose residual (n, 3) stands alone: far from the median of its neighbours in the run (n,).
-
-    floor_mm: noise per axis below which no jump counts, 0 where nobody knows it; kind (n,): numbers of the targets,
-    each of which may jump as it usually does. None where such jumps are frequent.
-    """
-    jump, worst = np.zeros(len(residual_mm)), np.zeros(len(residual_mm), dtype=bool)
-    for label in np.unique(run):
-        here = np.flatnonzero(run == label)
-        if len(here) < 5:
-            continue
-        padded = np.pad(residual_mm[here], ((2, 2), (0, 0)), mode="reflect")
-        around = np.stack([padded[k : k + len(here)] for k in (0, 1, 3, 4)])
-        far = np.abs(residual_mm[here] - np.median(around, axis=0)).max(axis=1)
-        # of neighbours the worst one alone: it may have pulled at the others' median
-        beside = np.pad(far, 2)
-        jump[here] = far
-        worst[here] = far >= np.max([beside[k : k + len(here)] for k in range(5)], axis=0)
-    # the median of the largest of three absolute normal numbers is 1.55 times their deviation
-    kind = np.zeros(len(jump), dtype=int) if kind is None else kind
-    usual = {one: np.median(jump[kind == one]) / 1.55 for one in np.unique(kind)}
-    scale = np.maximum([usual[one] for one in kind], 1.2 * floor_mm)
-    flagged = worst & (jump > _OUTLYING * scale)
-    return flagged if flagged.mean() <= _MOST else np.zeros(len(jump), dtype=bool)

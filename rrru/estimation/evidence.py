@@ -28,7 +28,7 @@ from scipy.stats import multivariate_normal
 from rrru.errors import FitError
 from rrru.estimation.discrepancy import Discrepancy
 from rrru.estimation.estimate import Estimate, triangle_of, with_prior
-from rrru.estimation.problem import Problem, unweighted
+from rrru.estimation.problem import log_determinant
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -108,7 +108,12 @@ class _LinearModel:
             raise FitError(f"flat priors of {', '.join(sorted(set(flat) - set(common)))}; allowed: proper priors")
         if self._problem.loss != "linear":
             raise FitError(f"a {self._problem.loss} loss has no likelihood; allowed: linear")
-        self._count, self._constant = _normalization(self._problem, self._values)
+        observations = self._problem.observations
+        if isinstance(observations, Eliminating):
+            self._count, self._constant = observations.normalization(self._values)
+        else:
+            self._count = observations.residual(self._values).size
+            self._constant = log_determinant(self._problem.whiten)
         if not noise_known and self._count - len(flat) < 1:
             raise FitError(f"{self._count} readings, {len(flat)} parameters without a prior: nothing tells the noise")
 
@@ -180,16 +185,6 @@ class _LinearModel:
         log += _log_probability(mean, covariance, *bounds)
         log -= _log_probability(parameters.mean, np.diag(np.where(flat, 0.0, scale * sd) ** 2), *bounds)
         return MarginalLikelihood(log, scale, size * scale, covariance)
-
-
-def _normalization(problem: Problem, values: FloatArray) -> tuple[int, float]:
-    """Number of independent readings, and the log of the constant factor of their density but for (2 pi)^-1/2 each."""
-    if isinstance(problem.observations, Eliminating):
-        return problem.observations.normalization(values)
-    log = 0.0 if problem.whiten is unweighted else getattr(problem.whiten, "log_determinant", None)
-    if log is None:
-        raise FitError("the whitening states no log_determinant; allowed: one that does, as Whitening")
-    return problem.observations.residual(values).size, float(log)
 
 
 def _log_probability(mean: FloatArray, covariance: FloatArray, low: FloatArray, high: FloatArray) -> float:

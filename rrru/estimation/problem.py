@@ -7,9 +7,11 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from rrru.errors import FitError
 from rrru.estimation.parameters import Parameters
 
 FloatArray = npt.NDArray[np.float64]
+Whiten = Callable[[FloatArray], FloatArray]
 
 
 class Observations(Protocol):
@@ -27,15 +29,29 @@ def unweighted(values: FloatArray) -> FloatArray:
     return values
 
 
-@dataclass(frozen=True)
-class WhiteNoise:
-    """Whitening of readings with independent errors of one standard deviation, in the readings' unit."""
+def log_determinant(whiten: Whiten) -> float:
+    """Logarithm of the determinant of a whitening; raises FitError where it does not state it."""
+    log = 0.0 if whiten is unweighted else getattr(whiten, "log_determinant", None)
+    if log is None:
+        raise FitError("the whitening states no log_determinant; allowed: one that does, as Whitening")
+    return float(log)
 
-    sd: float
+
+@dataclass(frozen=True, eq=False)
+class WhiteNoise:
+    """Whitening of readings with independent errors of standard deviations sd (n, a) in the readings' unit, or one."""
+
+    sd: float | FloatArray
+
+    @property
+    def log_determinant(self) -> float | None:
+        """Logarithm of the determinant of the map; None where one standard deviation is that of any number."""
+        return -float(np.log(self.sd).sum()) if np.ndim(self.sd) else None
 
     def __call__(self, values: FloatArray) -> FloatArray:
         """Whitened values (n, a, ...)."""
-        return values / self.sd
+        sd = np.asarray(self.sd)
+        return np.asarray(values / sd.reshape(*sd.shape, *[1] * (values.ndim - sd.ndim)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +67,6 @@ class Problem:
 
     observations: Observations
     parameters: Parameters
-    whiten: Callable[[FloatArray], FloatArray] = unweighted
+    whiten: Whiten = unweighted
     loss: str = "linear"
     loss_scale: float = 1.0

@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from rrru.campaign.outliers import robust_sd
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.explain import explain_end
@@ -31,8 +32,6 @@ _VANISHING_SD_MM = 1e-6
 _OPTIONS = SolverOptions(step_tolerance=1e-3, max_iterations=60)
 # noise of the best instruments
 _FINE_NOISE_MM = 0.01
-# median of the absolute value of a standard normal number
-_NORMAL_MEDIAN = 0.6745
 # influence psi(r) and its slope of the robust losses, from their squared residual z in units of the loss scale
 _SLOPES = {
     "soft_l1": lambda z: ((1.0 + z) ** -0.5, -0.5 * (1.0 + z) ** -1.5),
@@ -194,8 +193,7 @@ def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:
     identifiability, free = analyse(mechanism, jacobian), np.flatnonzero(~parameters.at_bound(estimate.values))
     freedom = max(residual.size - min(identifiability.rank, len(free)), 1)
     robust = estimate.problem.loss != "linear"
-    median, squares = np.median(np.abs(residual)), (residual**2).sum()
-    estimated = float(median / _NORMAL_MEDIAN if robust else np.sqrt(squares / freedom))
+    estimated = robust_sd(residual) if robust else float(np.sqrt((residual**2).sum() / freedom))
     noise, noise_from = estimated, "residuals"
     # three standard deviations of an estimated standard deviation
     if noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom)):

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from rrru.campaign.outliers import off_neighbours, robust_sd
 from rrru.errors import FitError
 from rrru.estimation.discrepancy import Discrepancy
 from rrru.estimation.estimate import Estimate
@@ -152,7 +153,7 @@ def fit_lengths(lengths: Lengths, starts: Iterable[FloatArray], used: BoolArray 
         return _fit(given, [start])
     robust = start
     for _ in range(_CAUCHY_ROUNDS):
-        size = _spread(given.residual(robust))
+        size = robust_sd(given.residual(robust))
         cauchy = replace(given, cauchy_mm=max(_CAUCHY_SD * size, _MIN_CAUCHY_MM))
         robust = _fit(cauchy, [robust], _COMPARISON).values
     return _screen(given, robust)
@@ -181,7 +182,7 @@ def _best_start(lengths: Lengths, starts: Iterable[FloatArray], screened: bool) 
     if screened:
         return _fit(few, starts, _COMPARISON).values
     fits = [_fit(few, [start], _COMPARISON) for start in starts]
-    return min(fits, key=lambda fit: _spread(fit.residual_mm[fit.used])).values
+    return min(fits, key=lambda fit: robust_sd(fit.residual_mm[fit.used])).values
 
 
 def _screen(lengths: Lengths, robust: FloatArray) -> LengthFit:
@@ -210,18 +211,13 @@ def standing_out(fit: LengthFit, limit: float) -> BoolArray:
     standard = np.where(checked, fit.residual_mm, 0.0) / np.sqrt(np.maximum(fit.redundancy, _MIN_REDUNDANCY))
     if not (used & checked).any():
         return ~used
-    size = np.abs(standard) / max(_spread(standard[used & checked]), 1e-12)
+    size = np.abs(standard) / robust_sd(standard[used & checked], floor=1e-12)
     if len(size) > 2 * _NEIGHBOURS:
         _, near = cKDTree(fit.places_mm).query(fit.places_mm, k=_NEIGHBOURS + 1)
-        local = np.abs(standard - np.median(standard[near[:, 1:]], axis=1))
-        size = np.minimum(size, local / max(_spread(local[used & checked]), 1e-12))
+        local = off_neighbours(standard, near[:, 1:])
+        size = np.minimum(size, local / robust_sd(local[used & checked], floor=1e-12))
     worst = np.where(used, size, 0.0).max(axis=1, keepdims=True)
     alike = used & (size > _AS_BAD * worst)
     new = (worst > limit) & (alike | (alike.sum(axis=1, keepdims=True) > 1))
     # no reading predicts a row that is out as a whole
     return np.asarray(new | (~used & ((size > limit) | ~used.any(axis=1, keepdims=True))))
-
-
-def _spread(residual: FloatArray) -> float:
-    """Standard deviation of normal noise with the same median absolute value."""
-    return float(np.median(np.abs(residual))) / 0.6745

@@ -13,14 +13,13 @@ import numba
 import numpy as np
 
 from rrru.campaign.driven_path import STEPS
+from rrru.campaign.outliers import NORMAL_MEDIAN
 from rrru.effects.protocol import PATH
 from rrru.gap.options import OPTIONS
 
 _ROUNDING = {"rad": OPTIONS.drive_rounding_rad, "mm": OPTIONS.drive_rounding_mm}
 # the next difference, over its deviation for white noise, of a motion with 4 points a period: sin(pi / 4)
 _FOUR_A_PERIOD = np.sqrt(0.5)
-# median absolute value of a standard normal number
-_MEDIAN_NORMAL = 0.6745
 
 
 def read_back_jitter(drive, run):
@@ -46,7 +45,7 @@ def _jitter_of_run(drive):
     sizes = []
     highest = min(OPTIONS.max_difference_order, len(drive) - OPTIONS.min_differences)
     for order in range(OPTIONS.min_difference_order, highest + 1):
-        size = np.median(np.abs(np.diff(drive, n=order, axis=0)), axis=0) / _MEDIAN_NORMAL
+        size = np.median(np.abs(np.diff(drive, n=order, axis=0)), axis=0) / NORMAL_MEDIAN
         sizes.append(size / np.sqrt(comb(2 * order, order)))
     result = np.zeros(drive.shape[1])
     for before, after in reversed([*pairwise(sizes)]):

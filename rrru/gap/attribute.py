@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.campaign import noise
+from rrru.campaign.outliers import isolated
 from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
 from rrru.gap.calibrate import calibrate, origin
@@ -144,7 +145,7 @@ def attribute(case, prior, stated=KNOWN):
         calibrated = calibrate(case)
         if stated == UNKNOWN_NOISE:
             # spikes would pass for noise
-            outliers = noise.isolated(case.residual(calibrated), case.series, 0.0, case.kind)
+            outliers = isolated(case.residual(calibrated), case.series, 0.0, case.kind)
             # what arrived from the other side than its neighbours is no outlier
             outliers &= case.complete(case.library)
             if outliers.any():
@@ -153,7 +154,7 @@ def attribute(case, prior, stated=KNOWN):
         case = case.standing(calibrated)
         attribution = _rounds(case, calibrated, prior, stated)
         found = attribution.case
-        outliers = noise.isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
+        outliers = isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
         if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
             break
         case = case.without(outliers)

@@ -10,7 +10,7 @@ import pytest
 from scipy.fft import dct
 from scipy.stats import multivariate_normal, norm
 
-from rrru.campaign.noise import isolated
+from rrru.campaign.outliers import isolated
 from rrru.errors import ConfigError
 from rrru.fit.campaign_noise import campaign_noise
 from rrru.gap import shrink

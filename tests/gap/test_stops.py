@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
-from rrru.campaign.noise import isolated
+from rrru.campaign.outliers import isolated
 from rrru.effects.library import find
 from rrru.estimation.noise_model import NoiseModel, alike
 from rrru.gap.calibrate import calibrate

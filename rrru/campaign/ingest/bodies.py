@@ -7,12 +7,12 @@ was never there. Of two that disagree nobody can tell which one is right: both a
 
 import numpy as np
 
+from rrru.campaign.outliers import MAX_ROBUST_SDS, robust_sd, unless_many
+
 # ASSUME no body bends by a millimetre, and reflectors are further apart than that
 _FAR_MM = 1.0
-# a distance this many robust deviations off is wrong
-_OUTLYING = 8.0
 # a body on which more than this share is off is none: its reflectors move against each other
-_MOST = 0.2
+_MAX_SHARE = 0.2
 
 
 def strays(position_mm, stop, names, on_world):
@@ -68,8 +68,7 @@ def _outlying(off):
     """Which distances (stops,) from what is usual, NaN where not known, are gross; none where many are."""
     if not np.isfinite(off).any():
         return np.zeros(len(off), dtype=bool)
-    wrong = off > max(_FAR_MM, _OUTLYING * 1.4826 * float(np.nanmedian(off)))
-    return wrong if wrong.mean() <= _MOST else np.zeros(len(off), dtype=bool)
+    return unless_many(off > max(_FAR_MM, MAX_ROBUST_SDS * robust_sd(off[np.isfinite(off)])), _MAX_SHARE)
 
 
 def _text(names, own, position, others, grid):

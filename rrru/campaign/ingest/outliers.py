@@ -6,11 +6,11 @@ forth: all of these are the robot's. A broken beam gives one to three points tha
 
 import numpy as np
 
+from rrru.campaign.outliers import MEDIAN_OF_LENGTH, robust_sd
+
 # Most consecutive bad points that are looked for; the running median's window must hold more good points than bad.
 _LONGEST = 3
 _WINDOW = 2 * _LONGEST + 1
-# from the median length of a vector of three independent normal numbers to one sigma per axis
-_MEDIAN_OF_CHI3 = 1.5382
 # ASSUME the robot's own single spikes stay below threshold x 0.1 mm; below threshold x 0.5 and x 0.75 mm where a loose
 # joint that flips and flips back looks like bad points: blocks of two or three, and a run's ends.
 _SPIKE_MM, _FLIP_MM, _END_MM = 0.1, 0.5, 0.75
@@ -104,7 +104,7 @@ def _inner_blocks(place, deviation, noise_mm, threshold):
         blocks = np.arange(1, len(place) - length)[:, None] + np.arange(length)
         nodes = np.stack([blocks[:, 0] - 2, blocks[:, 0] - 1, blocks[:, -1] + 1, blocks[:, -1] + 2])
         off = _off_curve(place, deviation, blocks, nodes)
-        limit = threshold * max(np.median(off) / _MEDIAN_OF_CHI3, floor)
+        limit = threshold * robust_sd(off, MEDIAN_OF_LENGTH, floor)
         least = np.where(off_median[blocks].min(axis=1) > threshold * floor, off.min(axis=1), 0.0)
         yield least.max(), limit, blocks[np.argmax(least)]
 

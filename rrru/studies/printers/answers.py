@@ -47,7 +47,7 @@ def answer(judged):
 def _readings(result):
     """How many there are, and what the calibration leaves of them."""
     residuals = result.residuals
-    parts = zip(("heights", "distances"), np.split(result.residual_mm, [len(residuals.height_mm)]), strict=True)
+    parts = zip(("heights", "distances"), np.split(result.in_mm.residual, [len(residuals.height_mm)]), strict=True)
     told = [f"{len(part)} {kind} (rms {np.sqrt((part**2).mean()):.3f} mm)" for kind, part in parts if len(part)]
     return f"the calibration leaves of {' and '.join(told)}"
 

@@ -20,14 +20,14 @@ from functools import cached_property
 import numpy as np
 from scipy import stats
 
+from rrru.estimation.f_test import largest_p
 from rrru.estimation.observations.with_columns import WithColumns
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
 from rrru.studies.printers.cause_columns import arm_columns, lean_columns
-from rrru.studies.printers.cause_tests import CauseTests
+from rrru.studies.printers.cause_tests import noise_sds
 from rrru.studies.printers.printer_fit import PrinterFit
-from rrru.studies.printers.weighing import largest_p
 
 # the difference of an arm's rods that readings have to show
 SHOWN_MM = 0.1
@@ -113,78 +113,62 @@ class TiltTest:
         """Columns (heights, k) with zeros (n, k) for the distances."""
         return np.pad(columns, ((0, len(self.result.residuals) - len(columns)), (0, 0)))
 
-    def _weighing(self, weight, hand):
-        """The fit with all rivals, by weight (n,) of the readings and noise by hand over that of the probe."""
+    @cached_property
+    def _models(self):
+        """LinearizedModels with all rivals, under all ratios of noises: of heights to distances, and by hand to probed.
+
+        The first has the firmware's ratio and the middle one of the hand's.
+        """
         touched = (self.probe_mm == 0.0).all(axis=1)
-        weight = weight / np.where(self._of_heights(touched[:, None])[:, 0], hand, 1.0)
-        return self.result.weighing(weight).beside(self.rivals)
+        hands = _HAND if touched.any() and not touched.all() else (1.0,)
+        by_hand = self._of_heights(touched[:, None])[:, 0]
+        sds = [sd * np.where(by_hand, hand, 1.0) for sd in noise_sds(self.result.residuals) for hand in hands]
+        own = sds.pop(len(hands) // 2)
+        return [self.result.linearized(sd).with_columns(self.rivals[:, None]) for sd in (own, *sds)]
 
     @cached_property
-    def _left(self):
-        """Sum of squares in mm^2 of what neither rivals nor tilt explain, and its freedom."""
-        free = self._own_weighing.beside(self.columns)
-        return (free.left(self.result.residual_mm) ** 2).sum(), len(self.result.residual_mm) - free.absorbed.shape[1]
+    def _own(self):
+        """AddedColumns of the tilt under the firmware's ratio and the middle one of the hand's."""
+        return self._models[0].add(self.columns[:, None])
 
     @cached_property
     def noise(self):
         """Noise in mm of a reading of weight 1: as given, of what neither rivals nor tilt explain, or a probe's."""
         if self.noise_mm is not None:
             return self.noise_mm
-        left, freedom = self._left
-        return np.sqrt(left / freedom) if freedom > 0 else PROBE_MM
+        freedom = self._own.freedom
+        return np.sqrt(self._own.unexplained()[0] / freedom) if freedom > 0 else PROBE_MM
 
     @cached_property
     def most_noise(self):
         """What the noise is below with a confidence of 95 %: few readings promise too little of it."""
-        left, freedom = self._left
-        given = self.noise_mm is not None or freedom < 1
-        return self.noise if given else np.sqrt(left / stats.chi2.ppf(1.0 - _CONFIDENCE, freedom))
-
-    @property
-    def _hands(self):
-        """Ratios of noises that are tried: of heights by hand to probed ones, where there are both."""
-        touched = (self.probe_mm == 0.0).all(axis=1)
-        return _HAND if touched.any() and not touched.all() else (1.0,)
-
-    @cached_property
-    def _weighings(self):
-        weights = [one.weight for one in CauseTests(self.result).weighings]
-        return [self._weighing(weight, hand) for weight in weights for hand in self._hands]
-
-    @cached_property
-    def _own_weighing(self):
-        """Under the firmware's ratio and the middle one of the hand's."""
-        hands = self._hands
-        return self._weighing(self.result.residuals.root_weight, hands[len(hands) // 2])
+        freedom = self._own.freedom
+        if self.noise_mm is not None or freedom < 1:
+            return self.noise
+        return self.noise * np.sqrt(freedom / stats.chi2.ppf(1.0 - _CONFIDENCE, freedom))
 
     @cached_property
     def p(self):
         """Probability that noise explains as much as unequal rods do; NaN without freedom."""
-        return self._p(self._weighings, self.columns)
+        return self._p(self._models, self.columns)
 
-    def _p(self, weighings, columns):
-        """Largest p of columns (n, k) over weighings; NaN where their rank depends on the ratio."""
-        bases = [(basis[None], volume) for basis, volume in (one.basis(columns) for one in weighings)]
-        ranks = {basis.shape for basis, _ in bases}
-        return float(largest_p(weighings, bases, self.result.residual_mm)[0]) if len(ranks) == 1 else np.nan
+    def _p(self, models, columns):
+        """Largest p of columns (n, k) over models; NaN where their rank depends on the ratio."""
+        ranks = {one.add(columns[:, None]).rank for one in models}
+        return float(largest_p(models, columns[:, None], self.result.in_mm.residual)[0]) if len(ranks) == 1 else np.nan
 
     def power(self, limit):
         """Probability that p is below a limit where one arm's rods differ by SHOWN_MM, of the arm that shows it worst.
 
         Under `most_noise`.
         """
-        own = self._own_weighing
-        rank = own.basis(self.columns)[0].shape[1]
-        freedom = len(self.columns) - own.absorbed.shape[1] - rank
-        if freedom < 1 or rank < self.columns.shape[1]:
+        if self._own.freedom < 1 or self._own.rank < self.columns.shape[1]:
             return 0.0
-        seen = (own.left(self.columns.T) ** 2).sum(axis=1) * (SHOWN_MM / self.most_noise) ** 2
-        return float(stats.ncf.sf(stats.f.isf(limit, rank, freedom), rank, freedom, seen).min())
+        return float(self._own.power(limit, SHOWN_MM * self.columns[:, None], self.most_noise).min())
 
     def alone(self, arm):
         """How much an arm's rods differ in mm if only they do, its standard error, and p of the other arms beside."""
-        column, own = self.columns[:, [arm]], self._own_weighing
-        seen = own.left(column[:, 0])
-        size = abs(seen @ own.left(self.result.residual_mm)) / (seen @ seen)
-        beside = [one.beside(column) for one in self._weighings]
-        return size, self.noise / np.sqrt(seen @ seen), self._p(beside, np.delete(self.columns, arm, axis=1))
+        column = self.columns[:, [arm]]
+        size, error = self._models[0].add(column[:, None]).estimates(self.noise)
+        beside = [one.with_columns(column[:, None]) for one in self._models]
+        return abs(size.item()), error.item(), self._p(beside, np.delete(self.columns, arm, axis=1))

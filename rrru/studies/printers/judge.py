@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from rrru.errors import FitError
-from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
+from rrru.studies.printers.cause_tests import CauseTests
 from rrru.studies.printers.printer_causes import FOUND, LeftOut, Level, causes, diagnosis, left_out, without
 from rrru.studies.printers.printer_fit import PrinterFit, fit_printer
 from rrru.studies.printers.saved_answers import reason
@@ -39,8 +39,7 @@ class Judged:
     @cached_property
     def suspect(self):
         """Number from 0 of the reading that noise hardly explains, None where there is none."""
-        passed = self.causes[0].p < self.level.limit(CauseTests(self.result), BAD_READING)
-        return self.left.suspect if passed else None
+        return self.left.suspect if self.causes[0].p < self.causes[0].limit else None
 
     @property
     def flagged(self):
@@ -64,7 +63,7 @@ def judge(printer, stopping_step, level):
     try:
         left = left_out(result)
         answers = causes(result, left, level)
-        tilt = tilt_answer(result, level.of_one_more(CauseTests(result)))
+        tilt = tilt_answer(result, level.limit(CauseTests(result), "effector_tilt", more=1))
     except (FitError, ValueError, np.linalg.LinAlgError) as error:
         raise FitError(f"{printer.name}: {error}", getattr(error, "result", None)) from None
     return Judged(result, left, answers, tilt, level, reason(result) if printer.calibrated else "")

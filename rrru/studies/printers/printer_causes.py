@@ -60,8 +60,8 @@ class Cause:
     """One possible cause of what a calibration leaves.
 
     freedom_used: numbers that it adds. explained_share: of the sum of squares left, under the firmware's ratio of
-    noises. p: that noise would explain as much; NaN without freedom. estimate,
-    standard_error: in `unit`, NaN but for causes with one number. imitated_by: causes that hold what it explains.
+    noises. p: that noise would explain as much; NaN without freedom. estimate, standard_error: in `unit`, NaN but for
+    causes with one number. imitated_by: causes that hold what it explains. limit: that p has to be below.
     """
 
     cause: str
@@ -73,6 +73,7 @@ class Cause:
     unit: str
     imitated_by: tuple
     verdict: str
+    limit: float
 
 
 @dataclass(frozen=True)
@@ -87,17 +88,13 @@ class Level:
     imitated_from: float
     pieces: int = 1
 
-    def limit(self, tests, name):
-        """P below which a cause passes: the level over the number of causes (Bonferroni).
+    def limit(self, tests, name, more=0):
+        """P below which a cause passes: the level over the number of causes (Bonferroni), and of more beside them.
 
         A cause of the machine is asked for over all pieces of evidence together, so that the level is divided by their
         number too; a bad reading is a matter of its own file.
         """
-        return self.level / (1 + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
-
-    def of_one_more(self, tests):
-        """The limit for one cause of the machine more than those, asked for beside them."""
-        return self.level / (2 + len(tests.columns)) / self.pieces
+        return self.level / (1 + more + len(tests.columns)) / (1 if name == BAD_READING else self.pieces)
 
 
 def causes(result, left, level):
@@ -107,13 +104,12 @@ def causes(result, left, level):
     these are looked at; one that is less striking has to stand out beside the most striking of them.
     """
     tests = CauseTests(result)
-    limit = level.limit(tests, BAD_READING)
     first, others = _bad_reading(tests, left, level), _acting_on_all(tests, level)
     leader = min(others, key=lambda one: np.nan_to_num(one.p, nan=1.0))
-    if first.p < limit and leader.p < first.p:
+    if first.p < first.limit and leader.p < first.p:
         p = float(np.min(tests.p(BAD_READING, beside=tests.columns[leader.cause][0])))
-        first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, limit))
-    elif first.p < limit:
+        first = replace(first, p=p, verdict=_verdict(p, first.imitated_by, first.limit))
+    elif first.p < first.limit:
         others = _acting_on_all(CauseTests(without(result, left.suspect)), level)
     # what imitates a cause that is seen cannot be ruled out either
     seen = [one for one in (first, *others) if one.verdict in (NOT_DECIDABLE, ONE_READING)]
@@ -149,25 +145,21 @@ def _bad_reading(tests, left, level):
     imitators = tests.imitators(BAD_READING, level.imitated_from, suspect or 0)
     share = p = estimate = error = np.nan
     if suspect is not None:
-        share = _share(tests, tests.bases[BAD_READING][suspect])
+        share = tests.explained_share(BAD_READING, suspect)
         p, estimate = left.p[suspect], left.difference_mm[suspect]
         error = estimate / left.ratio[suspect]
-    verdict = _verdict(p, imitators, level.limit(tests, BAD_READING))
-    return Cause(BAD_READING, 1, share, p, estimate, error, "mm", imitators, verdict)
+    limit = level.limit(tests, BAD_READING)
+    verdict = _verdict(p, imitators, limit)
+    return Cause(BAD_READING, 1, share, p, estimate, error, "mm", imitators, verdict, limit)
 
 
 def _acting_on_all(tests, level):
     """The causes that act on all readings, a list."""
     answers = []
     for name, (_, unit) in tests.columns.items():
-        basis, p, imitators = tests.bases[name][0], float(tests.p(name)), tests.imitators(name, level.imitated_from)
-        verdict = _verdict(p, imitators, level.limit(tests, name), lambda name=name: tests.p_without_any(name))
-        rank, share = basis.shape[1], _share(tests, basis)
-        answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict))
+        p, imitators = float(tests.p(name)), tests.imitators(name, level.imitated_from)
+        limit = level.limit(tests, name)
+        verdict = _verdict(p, imitators, limit, lambda name=name: tests.p_without_any(name))
+        rank, share = tests.added[name].rank, tests.explained_share(name)
+        answers.append(Cause(name, rank, share, p, *tests.estimate(name), unit, imitators, verdict, limit))
     return answers
-
-
-def _share(tests, basis):
-    """Share of the sum of squares left that a basis (n, r) holds, under the firmware's ratio."""
-    left = tests.own_weighing.left(tests.result.residual_mm)
-    return min(((left @ basis) ** 2).sum() / (left @ left), 1.0)

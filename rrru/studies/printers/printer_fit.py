@@ -1,19 +1,20 @@
 """Linear-delta printers calibrated from their readings, in the numbers of their firmware."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from scipy import special
 
 from rrru.errors import FitError
+from rrru.estimation.f_test import LinearizedModel
 from rrru.estimation.observations.probed_heights import ProbedHeights
+from rrru.estimation.problem import WhiteNoise
 from rrru.fit.calibration import Calibration, calibrate
 from rrru.fit.identifiability import analyse_columns, parameter_scale
 from rrru.studies.printers import steps
 from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, rounding, stop
 from rrru.studies.printers.printer import Printer
-from rrru.studies.printers.weighing import Weighing
 
 _CONFIDENCE = 0.95
 # heights of the dense probing
@@ -37,19 +38,15 @@ class PrinterFit:
         """Its ProbedHeights."""
         return self.fit.observations
 
-    @property
-    def residual_mm(self):
-        """Readings (n,) less those of the answer."""
-        return self.fit.residual_mm[:, 0] / self.residuals.root_weight
+    @cached_property
+    def in_mm(self):
+        """The Estimate of its readings (n, 1) in mm about the answer, without the firmware's weights."""
+        unweighted = replace(self.residuals, height_weight=1.0)
+        return self.fit.at(self.fit.deviations, "without weights", unweighted).estimate
 
-    @property
-    def columns(self):
-        """Change (n, p) of the readings by the deviations, with the residual's sign."""
-        return self.fit.estimate.jacobian[:, 0] / self.residuals.root_weight[:, None]
-
-    def weighing(self, weight):
-        """The Weighing of its readings by weights (n,), linearised at the answer."""
-        return Weighing.of(self.columns, weight)
+    def linearized(self, sd):
+        """The LinearizedModel of the same; sd (n,): standard deviations of the readings' noises, in proportion."""
+        return LinearizedModel.of(self.in_mm, WhiteNoise(sd[:, None]))
 
     @property
     def names(self):

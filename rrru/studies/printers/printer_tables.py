@@ -191,13 +191,10 @@ def _reading_rows(judged):
 
 def _cause_rows(judged):
     """Rows of `printer_causes`."""
-    result, level = judged.result, judged.level
+    result, imitated_from = judged.result, judged.level.imitated_from
     tests, rows = CauseTests(result), []
     for one in judged.causes:
-        limit = level.limit(tests, one.cause)
-        hopeless = not _decides(result.printer) or tests.always_imitated(one.cause, level.imitated_from)
-        detectable = np.nan if hopeless else tests.detectable_mm(one.cause, limit)
-        rows.append(
-            asdict(one) | {"limit": limit, "detectable_mm": detectable, "imitated_by": ", ".join(one.imitated_by)}
-        )
+        hopeless = not _decides(result.printer) or tests.always_imitated(one.cause, imitated_from)
+        detectable = np.nan if hopeless else tests.detectable_mm(one.cause, one.limit)
+        rows.append(asdict(one) | {"detectable_mm": detectable, "imitated_by": ", ".join(one.imitated_by)})
     return pd.DataFrame(rows).assign(printer=result.printer.name)

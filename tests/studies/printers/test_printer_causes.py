@@ -122,8 +122,7 @@ def test_noise_of_any_ratio_is_rarely_taken_for_a_cause(ratio):
     alarms.append((evidence.p("bad_reading", readings).min(axis=1) < limit).mean())
     assert max(alarms) < limit + 4.0 * np.sqrt(limit / draws)
     # the firmware's ratio alone would not do
-    first = evidence.own_weighing
-    naive = first.p(*first.single(), readings)[0].min(axis=-1) * 19 < limit
+    naive = evidence.added["bad_reading"].test(readings.T[:, None])[0].min(axis=0) * 19 < limit
     assert ratio < 1.0 or naive.mean() > 2.0 * limit
 
 
