@@ -23,6 +23,7 @@ from rrru.gap.evidence import ModelEvidence
 from rrru.gap.linearise import approach_responses, linearised
 from rrru.gap.options import OPTIONS
 from rrru.gap.unknown import UNKNOWN
+from rrru.kept import last_kept_of
 from rrru.robots.readings import lacking
 
 # name of the block of geometric errors
@@ -231,10 +232,17 @@ class Case:
         """What the weight of a state is off by, by name."""
         return dict.fromkeys(self.doubts, 0.0) | state.weight
 
+    @last_kept_of
+    def contributions(self, state):
+        """What each effect of a state, (name, shape), changes along the motion."""
+        return {key: state.contribution(self.library, key, self.motion) for key in state.effects}
+
+    @last_kept_of
     def contribution(self, state):
         """What the effects of a state change along the motion."""
-        return sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
+        return sum(self.contributions(state).values(), Contribution())
 
+    @last_kept_of
     def posed(self, state):
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         actuators, command = self.driven
