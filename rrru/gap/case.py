@@ -223,6 +223,11 @@ class Case:
         """Actuator values (N, K) and commanded positions (N, 3)."""
         return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
 
+    @cached_property
+    def _measured(self):
+        """Measured positions (N, 3)."""
+        return rows.measured(self.measurements)
+
     def sim(self, deviations):
         """Positions (N, 3) of the tool by the calibrated sim without effects."""
         actuators, command = self.driven
@@ -264,13 +269,13 @@ class Case:
         if self.readings is not None:
             return lacking(self.mechanism, self.readings, *self.posed(state))
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
-        return rows.measured(self.measurements) - model
+        return self._measured - model
 
     def by_other(self, robot, poses, twists):
         """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
         if self.readings is not None:
             return self.of_rows(lacking(robot, self.readings, poses, twists))
-        return self.of_rows(rows.measured(self.measurements) - robot.measured(poses, twists))
+        return self.of_rows(self._measured - robot.measured(poses, twists))
 
     def residual(self, state):
         """`left` of the used points (m, 3)."""
