@@ -26,6 +26,20 @@ def last_kept(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any
     return kept
 
 
+def last_kept_of(method: Callable[[_Owner, Any], _Answer]) -> Callable[[_Owner, Any], _Answer]:
+    """A method of one object that never changes, which keeps its answer for the last one."""
+    name = f"_last_{method.__name__}"
+
+    @wraps(method)
+    def kept(self: _Owner, asked: Any) -> _Answer:
+        last = self.__dict__.get(name)
+        if last is None or last[0] is not asked:
+            last = self.__dict__[name] = asked, method(self, asked)
+        return cast(_Answer, last[1])
+
+    return kept
+
+
 class Latest:
     """Answers by what was asked, so many of the last ones."""
 

@@ -162,7 +162,10 @@ class _Eliminated:
 
     def slopes(self, rotations: FloatArray) -> FloatArray:
         """Derivative (m, r, 3) of the residual by a small turn, exp(w) Q, of rotations (m, 3, 3)."""
-        generators = np.cross(_EYE[:, None, :], rotations.transpose(0, 2, 1)[:, None]).transpose(0, 1, 3, 2)
+        # cross products of the axes with the columns, written out: a general product takes ten times as long
+        generators = np.zeros((len(rotations), 3, 3, 3))
+        for axis, (row, other) in enumerate(((1, 2), (2, 0), (0, 1))):
+            generators[:, axis, row], generators[:, axis, other] = -rotations[:, other], rotations[:, row]
         return np.asarray(np.einsum("rk,mjk->mrj", self.rest, generators.reshape(len(rotations), 3, 9)))
 
 
@@ -243,16 +246,22 @@ def _descended(linear: _Eliminated, rotations: FloatArray, iterations: int) -> t
         normal, gradient = np.einsum("mri,mrj->mij", slopes, slopes), np.einsum("mri,mr->mi", slopes, residual)
         size = np.trace(normal, axis1=1, axis2=2)[:, None, None] * _EYE
         step = -np.linalg.solve(normal + (damping[:, None, None] + 1e-14) * size + 1e-300 * _EYE, gradient[..., None])
-        step = step[:, :, 0] * np.minimum(1.0, 1.0 / np.maximum(np.linalg.norm(step, axis=1), 1e-300))
+        step = step[:, :, 0]
+        step = step * np.minimum(1.0, 1.0 / np.maximum(_lengths(step), 1e-300))[:, None]
         trial = Rotation.from_rotvec(step).as_matrix() @ rotations
         moved = linear.residual(trial)
         lower = (after := (moved**2).sum(axis=1)) < cost
         rotations = np.where(lower[:, None, None], trial, rotations)
         residual, cost = np.where(lower[:, None], moved, residual), np.where(lower, after, cost)
         damping = np.where(lower, 0.1 * damping, np.maximum(10.0 * damping, 1e-6))
-        if np.linalg.norm(step, axis=1).max() < _TURN_TOLERANCE_RAD:
+        if _lengths(step).max() < _TURN_TOLERANCE_RAD:
             break
     return rotations, cost
+
+
+def _lengths(vectors: FloatArray) -> FloatArray:
+    """Lengths (m,) of vectors (m, 3)."""
+    return np.asarray(np.sqrt((vectors * vectors).sum(axis=1)))
 
 
 def _completed(readings: TargetReadings, linear: _Eliminated, rotation: FloatArray) -> TargetRegistration:

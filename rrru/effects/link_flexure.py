@@ -84,6 +84,7 @@ def _across_joints(joints):
     def tilted(motion, values):
         """Turns across the joints' axes under compliances (J,) in rad/(N mm)."""
         turns = values[:, None] * motion.across
-        return motion.at({joint: np.pad(turns[:, k], ((0, 0), (3, 0))) for k, joint in enumerate(joints)})
+        twists = np.concatenate([np.zeros_like(turns), turns], axis=2)
+        return motion.at({joint: twists[:, k] for k, joint in enumerate(joints)})
 
     return Effect("link_flexure", parameters, plain_coordinates(parameters, 1e-8), tilted, ("across",))

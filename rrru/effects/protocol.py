@@ -86,6 +86,11 @@ class Motion:
         """What `load_slopes` tells, made once."""
         return self.load_slopes()
 
+    @cached_property
+    def kept(self) -> dict[Any, Any]:
+        """What laws have made of this motion alone, so that it is made once."""
+        return {}
+
     def under(self, extra_kg: float, *lean_rad: float) -> "Motion":
         """The motion with so much more at the platform, of a base that leans about its level axes."""
         weights = np.array([extra_kg, *lean_rad, *(extra_kg * lean for lean in lean_rad)])
@@ -115,11 +120,14 @@ class Motion:
 
     def _at_values(self, drives: Iterable[Any], changes: np.ndarray) -> Contribution:
         """Contribution of changes (n, k) of the values of Drives."""
-        twists: dict[str, Any] = {}
+        numbers = self.robot.legs.site_numbers
+        result = np.zeros((len(changes), len(numbers), 6))
         for k, drive in enumerate(drives):
             for site, twist in drive.twists.items():
-                twists[site] = twists.get(site, 0.0) + np.multiply.outer(changes[:, k], twist)
-        return self.at(twists)
+                # most of a twist's six numbers are zero
+                for number in np.flatnonzero(twist):
+                    result[:, numbers[site], number] += changes[:, k] * twist[number]
+        return Contribution(result)
 
     def along(self, groups: Iterable[tuple[str, ...]], shifts_mm: np.ndarray) -> Contribution:
         """Contribution of shifts (n or 1, groups) in mm along the x of every site of each group."""

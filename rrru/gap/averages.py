@@ -14,6 +14,15 @@ import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 
+def beside(gram, index, apart=()):
+    """Numbers (k,) of the columns of a Gram matrix (K, K) beside columns index (z,), and their part of it (k, k).
+
+    apart: numbers of further columns to leave out, which no other term of a set has.
+    """
+    kept = np.setdiff1d(np.arange(len(gram)), np.union1d(index, np.asarray(apart, dtype=int)))
+    return kept, gram[kept[:, None], kept]
+
+
 @dataclass(frozen=True)
 class Average:
     """Average over the coefficients of one term at one size.
@@ -28,18 +37,18 @@ class Average:
     moment: np.ndarray
 
     @classmethod
-    def over(cls, gram, moment, index, size, apart=()):
+    def over(cls, gram, moment, index, size, others):
         """Of the columns index (z,) with prior sizes (z,) of a Gram matrix (K, K) and moments (K,).
 
-        apart: numbers of further columns to leave out, which no other term of a set has.
+        others: what is `beside` these.
         """
-        kept = np.setdiff1d(np.arange(len(moment)), np.union1d(index, np.asarray(apart, dtype=int)))
+        kept, rest = others
         factor = _factor(gram, index, size)
         both = size[:, None] * np.column_stack([gram[index[:, None], kept], moment[index]])
         half = solve_triangular(factor, both, lower=True, check_finite=False)
         evidence = 0.5 * half[:, -1] @ half[:, -1] - np.log(np.diag(factor)).sum()
         taken = half[:, :-1].T @ half
-        return cls(float(evidence), kept, gram[kept[:, None], kept] - taken[:, :-1], moment[kept] - taken[:, -1])
+        return cls(float(evidence), kept, rest - taken[:, :-1], moment[kept] - taken[:, -1])
 
     def rest(self, index):
         """Gram matrix (k, k) and moments (k,) of some of the other columns."""

@@ -23,6 +23,7 @@ from rrru.gap.evidence import ModelEvidence
 from rrru.gap.linearise import approach_responses, linearised
 from rrru.gap.options import OPTIONS
 from rrru.gap.unknown import UNKNOWN
+from rrru.kept import last_kept_of
 from rrru.robots.readings import lacking
 
 # name of the block of geometric errors
@@ -222,6 +223,11 @@ class Case:
         """Actuator values (N, K) and commanded positions (N, 3)."""
         return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
 
+    @cached_property
+    def _measured(self):
+        """Measured positions (N, 3)."""
+        return rows.measured(self.measurements)
+
     def sim(self, deviations):
         """Positions (N, 3) of the tool by the calibrated sim without effects."""
         actuators, command = self.driven
@@ -231,10 +237,17 @@ class Case:
         """What the weight of a state is off by, by name."""
         return dict.fromkeys(self.doubts, 0.0) | state.weight
 
+    @last_kept_of
+    def contributions(self, state):
+        """What each effect of a state, (name, shape), changes along the motion."""
+        return {key: state.contribution(self.library, key, self.motion) for key in state.effects}
+
+    @last_kept_of
     def contribution(self, state):
         """What the effects of a state change along the motion."""
-        return sum((state.contribution(self.library, key, self.motion) for key in state.effects), Contribution())
+        return sum(self.contributions(state).values(), Contribution())
 
+    @last_kept_of
     def posed(self, state):
         """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
         actuators, command = self.driven
@@ -256,13 +269,13 @@ class Case:
         if self.readings is not None:
             return lacking(self.mechanism, self.readings, *self.posed(state))
         model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
-        return rows.measured(self.measurements) - model
+        return self._measured - model
 
     def by_other(self, robot, poses, twists):
         """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
         if self.readings is not None:
             return self.of_rows(lacking(robot, self.readings, poses, twists))
-        return self.of_rows(rows.measured(self.measurements) - robot.measured(poses, twists))
+        return self.of_rows(self._measured - robot.measured(poses, twists))
 
     def residual(self, state):
         """`left` of the used points (m, 3)."""

@@ -26,7 +26,7 @@ from itertools import product
 import numpy as np
 
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.averages import Average, averaged_mean
+from rrru.gap.averages import Average, averaged_mean, beside
 from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.options import OPTIONS
 from rrru.gap.projected import Prior, Projected
@@ -276,7 +276,8 @@ class ModelEvidence:
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
             # drives on which the law does not act by this term: no set has a law twice
-            others = self._whitened.layout[0][term.effect, term.shape, EACH]
+            apart = self._whitened.layout[0][term.effect, term.shape, EACH]
+            others = self._besides.of((term, int(level)), lambda: beside(gram, prior.index, apart))
             return Average.over(gram, moment, prior.index, prior.at(strength), others)
 
         return self._averages.of((term, float(strength), int(level)), make)
@@ -288,6 +289,11 @@ class ModelEvidence:
     @cached_property
     def _found(self):
         return Latest(OPTIONS.max_cached_results)
+
+    @cached_property
+    def _besides(self):
+        # of one term at all levels: its strengths come in turn
+        return Latest(len(LEVELS))
 
     @cached_property
     def _averages(self):

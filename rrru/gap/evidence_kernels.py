@@ -300,7 +300,18 @@ def log_evidence(gram, moment, scale, positive):
     gram (v, k, k), moment (v, k): of the whitened columns, for v noise levels; scale (m, k): prior standard deviations;
     positive (k,): coefficients that cannot be negative, whose prior is half-normal. Returns (v, m).
     """
-    return log_evidence_and_correction(gram, moment, scale, positive)[0]
+    if np.count_nonzero(positive) < 2:
+        return log_evidence_and_correction(gram, moment, scale, positive)[0]
+    # strengths that a law's largest size caps have the same deviations, and moments take long
+    distinct, which = _distinct(scale)
+    return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
+
+
+def _distinct(rows):
+    """Numbers (d,) of the first of each of the distinct rows (m, k), and which of these each row is (m,)."""
+    first = {}
+    which = [first.setdefault(row.tobytes(), len(first)) for row in rows]
+    return np.unique(which, return_index=True)[1], which
 
 
 def log_sum_exp(value):

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from rrru.effects.protocol import gives_way
+from rrru.effects.protocol import Contribution, gives_way
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
 from rrru.estimation.explain import explain_end
@@ -118,6 +118,7 @@ class EffectModel:
             values[places[WEIGHT]][k] = state.weight.get(name, 0.0)
         return self.parameters.clipped(values)
 
+    @last_kept
     def state(self, values):
         """The State of a parameter vector (p,)."""
         places = self.parameters.places
@@ -158,7 +159,7 @@ class EffectModel:
                 f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(effect_functions(case.motion))
             ]
             return np.concatenate(made, axis=-1) @ matrix
-        own = state.contribution(case.library, key, case.motion)
+        own = case.contributions(state)[key]
         result = np.empty((len(case), 3, matrix.shape[1]))
         for k, column in enumerate(matrix.T):
             typical = float(np.max(effect.coordinates.typical[column > 0.0]))
@@ -178,14 +179,18 @@ class EffectModel:
             step = -step
         shape = state.shape_values[name] | {key: value + step}
         moved = state.contribution(case.library, own, case.motion, shape=shape)
-        change = moved - state.contribution(case.library, own, case.motion)
+        change = moved - case.contributions(state)[own]
         return case.of_rows(at.move(change.twists))[..., None] / step
 
     def _by_weight(self, at, state, name):
         """Derivative (m, 3, 1) of the model by a number of the weight."""
         case, step = self.case, 1e-3 * self.case.doubts[name]
         other = state.under(state.weight | {name: state.weight[name] + step})
-        change = case.contribution(other) - case.contribution(state)
+        moved = {
+            key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else own
+            for key, own in case.contributions(state).items()
+        }
+        change = sum(moved.values(), Contribution()) - case.contribution(state)
         return case.of_rows(at.move(change.twists))[..., None] / step
 
 

@@ -64,5 +64,5 @@ def sites(library, motion, term):
     effect = library[term.effect]
     sizes = effect.coordinates.typical * spread(effect.coordinates, term.legs).sum(axis=1)
     values = effect.coordinates.to_values(sizes, effect.coordinates.shapes[term.shape])
-    active = np.nan_to_num(effect.contribute(motion, values).twists).any(axis=(0, 2))
+    active = np.nan_to_num(effect.contribute(motion, values).twists).any(axis=0).any(axis=1)
     return [name for name, acts in zip(motion.robot.legs.sites, active, strict=True) if acts]

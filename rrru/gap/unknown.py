@@ -43,10 +43,16 @@ class Unknown:
         """Changes under coefficients (drives or axes times k,)."""
         coefficients = np.reshape(values, (-1, self.count))
         if self.per_leg:
-            functions = np.stack([self.basis(drive) for drive in motion.drive.T], axis=1)
+            functions = self._once(motion, lambda: np.stack([self.basis(drive) for drive in motion.drive.T], axis=1))
             return motion.at_drives(np.einsum("nlk,lk->nl", functions, coefficients))
-        shift = self.basis(motion) @ coefficients.T
+        shift = self._once(motion, lambda: self.basis(motion)) @ coefficients.T
         return motion.at({WORLD: np.concatenate([shift, np.zeros_like(shift)], axis=1)})
+
+    def _once(self, motion, make):
+        """The functions along a motion, made once."""
+        if self.name not in motion.kept:
+            motion.kept[self.name] = make()
+        return motion.kept[self.name]
 
 
 def _unit(values):

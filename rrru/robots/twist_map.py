@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.robots import walk_kernel
 from rrru.robots.legs import TOOL, WORLD, cross
-from rrru.robots.walk import Twists, walks
+from rrru.robots.walk import Twists, active_sites, walks
 from rrru.robots.wrenches import by_group, screw
 
 _EYE = np.eye(3)
@@ -30,7 +30,7 @@ class TwistMap:
 
     def __init__(self, closure, actuators, poses, twists=None, tool_mm=((0.0, 0.0, 0.0),)):
         self.closure, self.poses, self._twists = closure, poses, Twists(closure.legs, twists)
-        self._actuators = np.asarray(actuators, dtype=float)
+        self._actuators, self._effects = np.asarray(actuators, dtype=float), {}
         self.point_mm = poses.point(np.asarray(tool_mm, dtype=float))
         self._ways = walks(closure.legs, self._actuators, poses, self._twists)
         self._wrenches, self.platform = _factors(closure, self._ways, poses, self._actuators, self._twists)
@@ -138,6 +138,12 @@ class TwistMap:
         """Change (m, 3, 6) of what is read per twist at a site, in the site's frame: here `response`."""
         return self.response(site)
 
+    def _effect_once(self, site):
+        """`effect`, made once."""
+        if site not in self._effects:
+            self._effects[site] = self.effect(site)
+        return self._effects[site]
+
     @property
     def rows(self):
         """Pose (m,) of each row of what is read."""
@@ -146,11 +152,11 @@ class TwistMap:
     def move(self, twists):
         """Change (m, 3) of what is read, a position in mm, under small twists (n or 1, sites, 6)."""
         rows, numbers = self.rows, self.closure.legs.site_numbers
-        result, active = np.zeros((len(rows), 3)), np.asarray(twists).any(axis=(0, 2))
+        result, active = np.zeros((len(rows), 3)), active_sites(np.asarray(twists))
         for name in self.closure.legs.sites:
             if active[numbers[name]]:
                 one = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))[rows]
-                result = result + np.einsum("naj,nj->na", self.effect(name), one)
+                result = result + np.einsum("naj,nj->na", self._effect_once(name), one)
         return result
 
     def columns(self, directions):

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.averages import Average, averaged_mean
+from rrru.gap.averages import Average, averaged_mean, beside
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
 from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.state import Linear
@@ -358,7 +358,8 @@ def test_an_average_is_an_integral_over_the_coefficients():
     generator = np.random.default_rng(7)
     columns, data, size = generator.normal(size=(9, 5)), generator.normal(size=9), generator.uniform(0.3, 2.0, 3)
     index, others = np.array([1, 2, 4]), np.array([0, 3])
-    made = Average.over(columns.T @ columns, columns.T @ data, index, size)
+    gram = columns.T @ columns
+    made = Average.over(gram, columns.T @ data, index, size, beside(gram, index))
     averaged = np.eye(9) + (columns[:, index] * size**2) @ columns[:, index].T
     assert made.kept.tolist() == others.tolist()
     ratio = multivariate_normal.logpdf(data, cov=averaged) - multivariate_normal.logpdf(data, cov=np.eye(9))

@@ -49,6 +49,12 @@ def misled():
     return _found({"load_kg": _OFF["extra_kg"], "tilt_x_rad": _OFF["lean_x"], "tilt_y_rad": _OFF["lean_y"]})
 
 
+@pytest.fixture(scope="module")
+def as_told():
+    """Under a weight that is as told."""
+    return _found({})
+
+
 def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
     *_, attribution = misled
     nothing = replace(attribution.hypothesis, terms=(), strengths=np.zeros((len(LEVELS), 0)))
@@ -89,18 +95,18 @@ def test_what_the_weight_is_off_by_is_found_and_told(misled):
     assert len(sure) and said == len(sure)
 
 
-def test_a_weight_that_is_as_told_stays_so():
-    verdict, numbers, _ = _found({})
+def test_a_weight_that_is_as_told_stays_so(as_told):
+    verdict, numbers, _ = as_told
     weight = numbers.loc["weight"]
     assert verdict["effects"] == "drive_compliance" and "weight not" not in verdict["notes"]
     assert (weight["value"].abs() < 3.0 * weight["standard_error"]).all()
 
 
-def test_a_weight_that_is_known_is_not_fitted():
+def test_a_weight_that_is_known_is_not_fitted(as_told):
     known = dict.fromkeys(_OFF, 0.0)
     verdict, numbers, _ = _found({}, GapSettings(known={"weight": known}))
     assert verdict["effects"] == "drive_compliance" and "weight" not in numbers.index.get_level_values("effect")
-    _, free, _ = _found({})
+    _, free, _ = as_told
     sizes = [one.loc["drive_compliance", "standard_error"] for one in (numbers, free)]
     assert (sizes[0] < sizes[1]).all()
 

@@ -1,6 +1,7 @@
 """Rigid registration: the six numbers that turn an instrument's frame into the robot's frame. Lengths in mm."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -15,8 +16,7 @@ _LEAST_WIDTH = 0.05
 class Registration:
     """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,); what it leaves at `points` points.
 
-    covariance (6, 6): of the translation in mm and the rotation vector in rad, if what is left were random and alike at
-    all points; NaN where three points leave no freedom.
+    placed_mm (n, 3): the measured positions in the robot's frame; off_mm (n,): how far these are from the commanded.
     """
 
     rotation: np.ndarray
@@ -24,7 +24,16 @@ class Registration:
     rms_mm: float
     max_mm: float
     points: int
-    covariance: np.ndarray
+    placed_mm: np.ndarray
+    off_mm: np.ndarray
+
+    @cached_property
+    def covariance(self):
+        """Covariance (6, 6) of the translation in mm and the rotation vector in rad.
+
+        If what is left were random and alike at all points; NaN where three points leave no freedom.
+        """
+        return _covariance(self.placed_mm, self.off_mm, self.rotation, self.translation)
 
     @property
     def numbers(self):
@@ -63,7 +72,7 @@ def register(measured_mm, command_mm):
     placed = measured @ rotation.T + translation
     off = np.linalg.norm(placed - command, axis=1)
     sizes = float(np.sqrt((off**2).mean())), float(off.max()), len(command)
-    return Registration(rotation, translation, *sizes, _covariance(placed, off, rotation, translation))
+    return Registration(rotation, translation, *sizes, placed, off)
 
 
 def _covariance(placed, off, rotation, translation):
