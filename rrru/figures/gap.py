@@ -36,11 +36,11 @@ _JOINT = "\N{NO-BREAK SPACE}"
 def gap(tables, options):
     """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
     each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; parts that
-    are confounded do not add up to 1. (a) Where: measured minus calibrated sim at the points from above and from
-    the side, magnified as stated. (b) Why: probability of every effect, those of the verdict in colour, those that
-    cannot be told apart hatched. (c) Remaining
-    gap: on runs that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d)
-    Residual of every point.
+    are confounded do not add up to 1. The probability in the headline is that of exactly these causes. (a) Where:
+    measured minus calibrated sim at the points from above and from the side, magnified as stated. (b) Why: probability
+    of every effect, those of the verdict in colour, those that cannot be told apart hatched. (c) Remaining gap: on runs
+    that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d) Residual of every
+    point.
     """
     campaign, frames = options["campaign"], {}
     for name in ("gap_verdicts", "gap_attribute", "gap_shrink", "gap_budget"):
@@ -119,12 +119,14 @@ def _page(lines, causes, trajectories, used):
 
 def _headline(verdict, words):
     """Lines of the verdict itself, and of what is to be known and done about it."""
-    name = _named(verdict["effects"]) + (f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else "")
+    groups = {names.split(" | ")[0]: names.replace(" | ", " or ") for names in verdict["groups"].split("; ")}
+    name = _named("+".join(groups.get(one, one) for one in verdict["effects"].split("+")))
+    name += f", {_leg(str(verdict['leg']), **words)}" if verdict["leg"] else ""
     if verdict["no_answer"]:
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
     sure = _probability(verdict["probability"], "= ", " ")
-    first = f"{name} (p {sure} of exactly this): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
+    first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")
     facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst spot {place} mm"]
     facts += [f"{verdict['dropped_points']} outliers left out"] if verdict["dropped_points"] else []

@@ -190,7 +190,8 @@ def _causes(facts):
     """What makes the gap, and how sure that is."""
     told = _shares_told(facts)
     groups = {group["names"][0]: group for group in facts["groups"]}
-    single = [effect for effect in facts["effects"] if effect["name"] not in groups and not _is_small(effect, facts)]
+    single = [effect for effect in facts["effects"] if effect["name"] not in groups]
+    single = [effect for effect in single if not (told and _is_small(effect, facts))]
     said = [_by_share(facts, groups)] if told and len(facts["effects"]) > 1 else []
     said += [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(single)]
     said += [_of_group(group, told) for group in groups.values()]

@@ -113,18 +113,34 @@ def with_noise(case, linear, stated_mm):
 def _noise_columns(case, linear, known):
     """Columns (m, 3, k) that may explain the readings while the noise is estimated.
 
-    All of the library; without effects of many coefficients where these leave too few numbers. known: whether the
-    noise is known otherwise, so that no number needs to be left; where it is not and the library explains everything,
-    what the calibration leaves has to do.
+    All of the library; where these leave too few numbers without effects of many coefficients, then each effect in the
+    shape alone that fits best, then without unknown functions. known: whether the noise is known otherwise, so that no
+    number needs to be left; where it is not and the library explains everything, what the calibration leaves has to do.
     """
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
-    few = [one for key, one in blocks.items() if not case.library[key[0]].coordinates.broad]
-    choices = [*blocks.values()], few
-    for chosen in choices:
-        columns = np.concatenate([linear.base, *chosen, *linear.shape_columns.values()], axis=-1)
+    few = {key: one for key, one in blocks.items() if not case.library[key[0]].coordinates.broad}
+    fitting = _best_shapes(linear, few)
+    laws = {key: one for key, one in fitting.items() if key[0] not in UNKNOWN}
+    for chosen in (blocks, few, fitting, laws):
+        columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
         if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size):
             return columns
     return columns if known else linear.base
+
+
+def _best_shapes(linear, blocks):
+    """Those of some blocks of columns that leave least of the data beside the calibration, one of each effect."""
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    best = {}
+    for key, columns in blocks.items():
+        flat = columns.reshape(linear.data.size, -1)
+        flat = flat - basis @ (basis.T @ flat)
+        size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        own = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
+        explained = float(((flat / size @ own) ** 2).sum())
+        if explained > best.get(key[0], (-np.inf, None))[0]:
+            best[key[0]] = explained, key
+    return {key: blocks[key] for _, key in best.values()}
 
 
 def _few(case, calibrated):

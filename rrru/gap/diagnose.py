@@ -188,16 +188,21 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
 
     The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
     verdict without it does, by more than chance, is ruled out and the rest decides again. Beside something unexplained,
-    a part of which it may be, an effect has to make them better.
+    a part of which it may be, an effect has to make them better, and by more than a small part of the gap to be named.
     """
     ruled_out: set[str] = set()
+    small: frozenset[str] = frozenset()
     while True:
-        verdict = decide(attribution.posterior, attribution.case.effects)
+        verdict = decide(attribution.posterior, attribution.case.effects, small)
         fitted = with_effects(attribution, verdict.effects)
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
+            least_share = OPTIONS.min_share_with_unexplained if verdict.unexplained else -np.inf
+            if found_small := {term.effect for term, share in ordered if share < least_share}:
+                small |= found_small
+                continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))

@@ -128,6 +128,8 @@ class DiagnosisOptions:
     min_rival_probability_ratio: float = 0.05
     # a cause, or a group, is named from this probability on: a false name costs as much as 2.3 missed ones; assumed
     min_named_probability: float = 0.7
+    # with something unexplained an effect that makes less of the gap by itself may be a part of that; the usual 5 %
+    min_share_with_unexplained: float = 0.05
     # causes of less probability are excluded; the usual 5 %
     min_possible_probability: float = 0.05
     # causes of a group act together less often than this share of what independent ones do; assumed

@@ -62,7 +62,9 @@ class GapSettings:
     @classmethod
     def from_config(cls, section, seed=0, use_near_singularity=True):
         """Settings of the configuration's `gap` section."""
-        prior = Prior(tuple(section["prior_counts"]), section["prior_unexplained"], section["tolerance"])
+        keys = ("prior_counts", "prior_unexplained", "tolerance", "prior_each", "prior_share")
+        counts, *others = (section[key] for key in keys)
+        prior = Prior(tuple(counts), *others)
         named = NAMES if section["effects"] == ALL else section["effects"]
         effects = *named, *section["own_effects"]
         return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)

@@ -75,11 +75,12 @@ def label(effects, unexplained):
     return "+".join((*effects, *(("unexplained",) if unexplained else ()))) or "none"
 
 
-def decide(beliefs, library):
-    """Verdict of a Posterior; library: the effects that may be named, by name.
+def decide(beliefs, library, small=frozenset()):
+    """Verdict of a Posterior; library: the effects that may be named, by name; small: those that are not, see below.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Something is unexplained where that is more probable than not.
+    matter. Something is unexplained where that is more probable than not; an effect that makes a small part of the gap
+    may then be a part of that.
     """
     sets, unknown = beliefs.sets(), beliefs.probability_unexplained
     none = sets.get(_NONE, 0.0)
@@ -89,10 +90,11 @@ def decide(beliefs, library):
     if none > OPTIONS.max_none_probability:
         effects, unexplained = (), False
     else:
+        unexplained = unknown > OPTIONS.min_unexplained_probability
+        order = [name for name in order if not (unexplained and name in small)]
         effects = tuple(name for name in order if each[name] >= OPTIONS.min_named_probability)
         groups = _groups(beliefs, [name for name in order if name not in effects], each)
         effects += tuple(group.names[0] for group in groups)
-        unexplained = unknown > OPTIONS.min_unexplained_probability
         if not (effects or unexplained):
             # something acts, and no cause is probable enough: the most probable answer that has one
             answers = {key: p for key, p in sets.items() if key != _NONE}

@@ -31,13 +31,20 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
-    texts = {"confusable_with": "drive_compliance", "next_runs": NEXT, "noise_from": "repeats"}
+    texts = {"confusable_with": "drive_compliance", "groups": "", "next_runs": NEXT, "noise_from": "repeats"}
     texts |= {"notes": "", "not_in_model": "", "no_answer": "", "file_remainder": "", "file_headline": ""}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}
     numbers |= {"file_error_mm": np.nan, "file_error_fresh_mm": np.nan}
     numbers |= {"noise_stated_mm": 0.02, "noise_correlation": 0.1, "noise_runs_mm": 0.005}
-    numbers |= {"worst_x_mm": -512.3, "worst_y_mm": 37.5, "worst_z_mm": 600.0, "points": 144, "dropped_points": 2}
+    numbers |= {
+        "searches_apart": 0.01,
+        "worst_x_mm": -512.3,
+        "worst_y_mm": 37.5,
+        "worst_z_mm": 600.0,
+        "points": 144,
+        "dropped_points": 2,
+    }
     return check(
         "gap_verdicts", pd.DataFrame([{"campaign": campaign, "effects": effects} | texts | numbers | _SHARES | changes])
     )
@@ -66,8 +73,11 @@ def gap_attribute(
         for k, name in enumerate((*EFFECTS, "none", "unexplained"))
     }
     rows["thermal_growth"] |= {"probability": 0.0, "log_evidence": np.nan}
+    for row in rows.values():
+        row["decision"] = "excluded"
     for name, probability, legs in likely:
-        rows[name] |= {"probability": probability, "legs": legs}
+        decision = "named" if probability >= 0.7 else "possible"
+        rows[name] |= {"probability": probability, "legs": legs, "decision": decision}
     frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("effect").reset_index()
     return check(
         "gap_attribute",

@@ -79,7 +79,8 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
         "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): play ",
         "play between motor and drive arm.",
-        "Probability of this answer: 0.97.",
+        "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
+        "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
         "10 % (95 %: 8 % to 13 %) does not repeat",
         "Add them to the simulator and 0.020 mm is left",
         "the noise is 0.035 mm",
@@ -87,6 +88,28 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "Next: drive line_1 in reverse. That decides whether servo lag acts.",
     ):
         assert words in said
+
+
+def test_causes_that_cannot_be_told_apart_are_one_sentence_with_their_probabilities():
+    facts_of = answered(effects="backlash+link_flexure", groups="link_flexure | servo_lag")
+    said = facts_of["sentences"]
+    assert "Causes by their share of the gap: link flexure or servo lag 60 %, backlash 20 %." in said
+    (group,) = [one for one in said if one.startswith("One of these acts")]
+    assert "link flexure 0.98, servo lag 0.02 (probability that one does: more than 0.99)" in group
+    assert "together they make 60 % of the gap" in group and "The corrected model has link flexure." in group
+    assert not any(" is link flexure" in one for one in said)
+    assert any(one.startswith("Probability that it acts: backlash 0.97.") for one in said)
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+@pytest.mark.parametrize(("share", "rms"), [(0.009, 0.3), (0.5, 0.009)])
+def test_a_small_cause_is_counted_and_has_no_sentence(share, rms):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    small = budget["part"] == "backlash"
+    budget = budget.assign(share=budget["share"].mask(small, share), rms_mm=budget["rms_mm"].mask(small, rms))
+    said = answered(budget)["sentences"]
+    assert "Causes by their share of the gap: link flexure 60 %, 1 small one." in said
+    assert not any(" is backlash" in one for one in said)
 
 
 @pytest.mark.parametrize(("sure", "told"), [(0.49, False), (0.51, True)])
