@@ -16,6 +16,7 @@ _NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
 _PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
 _WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
 _NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
+_FOLLOWS = ("follows", "explained", "scale", "unit", "rms_mm")
 _RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
 _APART = ("none", "unexplained")
 _OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
@@ -53,6 +54,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
         "searches_apart": verdict["searches_apart"],
         **_row(verdict, _VERDICT + _NOISE),
+        "unexplained_follows": [_row(row, _FOLLOWS) for row in tables["gap_remainder"].to_dict("records")],
         "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
         "budget": budget,
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
@@ -209,7 +211,30 @@ def _causes(facts):
             said.append(
                 f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
             )
+        said += _looks_like(facts["unexplained_follows"])
     return [*said, *_sure(facts, groups)] if said else []
+
+
+def _looks_like(rows):
+    """What the unexplained part follows, from rows of `gap_remainder`, the best first."""
+    if not rows:
+        return []
+    best = rows[0]
+    size = f"{rounded(best['rms_mm'])} mm rms"
+    if best["explained"] < OPTIONS.min_followed_share:
+        return [
+            f"What is unexplained follows no single variable that was tried: {best['follows']} comes next, a smooth "
+            f"function of it predicts {percent(best['explained'])} at left-out points."
+        ]
+    how = "steps with" if not np.isfinite(best["scale"] or np.nan) else "a smooth function of"
+    scale, unit = best["scale"], best["unit"]
+    if unit == "rad" and how.startswith("a"):
+        scale, unit = np.degrees(scale), "degrees"
+    over = f", which changes over about {rounded(scale)} {unit}," if how.startswith("a") else ""
+    return [
+        f"What is unexplained follows {best['follows']}: {how} it{over} predict{'' if how[0] == 's' else 's'} "
+        f"{percent(best['explained'])} of it at left-out points ({size})."
+    ]
 
 
 def _is_small(effect, facts):

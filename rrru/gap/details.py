@@ -14,7 +14,6 @@ from rrru.gap.locate import drive_errors, locate
 from rrru.gap.options import OPTIONS
 from rrru.gap.shrink import shrink_table
 from rrru.gap.terms import per_leg, sites, spread
-from rrru.gap.unknown import UNKNOWN
 from rrru.gap.verdict import label
 from rrru.gap.weight import WEIGHT
 
@@ -48,9 +47,8 @@ def _attribute_rows(attribution, verdict):
         for name, note in case.untestable.items()
     ]
     none, unknown = beliefs.sets().get((frozenset(), False), 0.0), beliefs.probability_unexplained
-    note = _looks_like(beliefs) if unknown > OPTIONS.min_unexplained_probability else ""
     result.append({"effect": "none", "probability": none, **_EMPTY})
-    result.append({"effect": "unexplained", "probability": unknown, **_EMPTY, "note": note})
+    result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
     rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
     return rows
@@ -88,15 +86,6 @@ def _effect_row(attribution, name):
             half = float(student_t.ppf(0.975, len(by_fold) - 1) * np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
             row |= {"heldout_gain_low": row["heldout_gain"] - half, "heldout_gain_high": row["heldout_gain"] + half}
     return row
-
-
-def _looks_like(beliefs):
-    """What the unexplained part follows, where one of the unknown functions is likely."""
-    likely = {name: beliefs.marginal(name) for name in UNKNOWN}
-    best = max(likely, key=likely.get)
-    if likely[best] > OPTIONS.min_function_probability:
-        return f"follows {UNKNOWN[best].follows} (p = {likely[best]:.2f})"
-    return "follows no smooth function tried"
 
 
 def _set_rows(attribution):

@@ -22,6 +22,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.model_space import explore
 from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import Posterior
+from rrru.gap.remainder import NO_REMAINDER, followed_alike, remainder_rows
 from rrru.gap.result_notes import fit_notes, noise_notes, posterior_notes, weight_doubts, weight_notes, zero_notes
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
@@ -105,6 +106,8 @@ def diagnose(
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = parameter_rows(attribution)
     tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
+    unexplained = verdict.unexplained and not verdict.no_answer
+    tables["gap_remainder"] = remainder_rows(attribution) if unexplained else NO_REMAINDER
     if details:
         tables |= details_of(attribution, verdict, steps, residual, generator, settings.draws)
     return Diagnosis(row, tables, attribution.state, attribution)
@@ -199,13 +202,24 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
-            least_share = OPTIONS.min_share_with_unexplained if verdict.unexplained else -np.inf
-            if found_small := {term.effect for term, share in ordered if share < least_share}:
+            if found_small := _small(fitted, dict((term.effect, share) for term, share in ordered), verdict):
                 small |= found_small
                 continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
+
+
+def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> set[str]:
+    """Effects of a verdict that may be a part of what is unexplained; shares: of the gap, of each effect."""
+    if not verdict.unexplained:
+        return set()
+    found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
+    residual = attribution.case.residual(attribution.calibrated)[attribution.case.on_robot]
+    gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
+    alike, left_mm = followed_alike(remainder_rows(attribution), attribution.case.effects, tuple(shares))
+    least = OPTIONS.min_size_per_remainder * left_mm
+    return found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least}
 
 
 def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:

@@ -130,6 +130,9 @@ class DiagnosisOptions:
     min_named_probability: float = 0.7
     # with something unexplained an effect that makes less of the gap by itself may be a part of that; the usual 5 %
     min_share_with_unexplained: float = 0.05
+    # what is unexplained and follows the same variable as an effect: the effect has to be so many times as large, or it
+    # may be a part of that which has the law's form by chance; assumed
+    min_size_per_remainder: float = 2.0
     # causes of less probability are excluded; the usual 5 %
     min_possible_probability: float = 0.05
     # causes of a group act together less often than this share of what independent ones do; assumed
@@ -191,6 +194,14 @@ class DiagnosisOptions:
     # drives slower than this, in their unit a second, are at rest; assumed
     min_drive_rate: float = 1e-6
 
+    # --- what the unexplained part looks like ---
+    # scales of a smooth function over the range of its variable: from ten waves to one; assumed
+    remainder_scales: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4, 0.8)
+    # values of the variable that such a function is told by; bounds the time
+    remainder_points: int = 40
+    # it follows a variable where that predicts this share of it at left-out points: more than all others together
+    min_followed_share: float = 0.5
+
     # --- notes and text of the answer ---
     # standard errors from which on a note says that payload or tilt differ from the stated ones; the usual 3 sigma
     min_nuisance_z: float = 3.0
@@ -203,8 +214,6 @@ class DiagnosisOptions:
     outside_error_rad: float = 0.03
     # rows of the table of sets; assumed
     max_listed_sets: int = 20
-    # a function of the discrepancy is named where it is more probable than not
-    min_function_probability: float = 0.5
     # a text that lists more fitted numbers says how many there are; the table has them; assumed
     max_listed_numbers: int = 3
     # a share of the gap that is worth a sentence; assumed

@@ -131,6 +131,18 @@ heldout_gain_low       float? lower end, 95 %, from the folds; null where there 
 heldout_gain_high      float? upper end, 95 %
 note                   str    empty where there is nothing to say
 
+## gap_remainder | tables/gap_remainder.parquet | campaign follows
+What the unexplained part of a gap looks like: how well a function of one variable predicts it. None where nothing is
+unexplained.
+--
+campaign
+follows                str    the variable: the value of a drive, the place, the time, the payload, the speed, the sense
+    of motion of the drives
+explained              float  share of its mean square that such a function predicts at left-out points, 0 to 1
+scale                  float? distance over which the function changes; null for steps
+unit                   str    of the variable
+rms_mm                 float  rms distance of what the function makes
+
 ## gap_sets | tables/gap_sets.parquet | campaign rank
 The sets of effects that carry the probability, best first.
 --

@@ -27,7 +27,7 @@ SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_tex
 _LEGS = DriveWords()
 
 
-def answered(budget=None, runs=(), drives=_LEGS, places=(), **verdict):
+def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), **verdict):
     """Facts of a made-up diagnosis as a file holds them; drives: the robot's DriveWords."""
     tables = {
         "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
@@ -43,6 +43,7 @@ def answered(budget=None, runs=(), drives=_LEGS, places=(), **verdict):
         ),
         "gap_next_runs": pd.DataFrame(list(runs), columns=answer._RUN),
         "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "worst", *answer._WORST)),
+        "gap_remainder": pd.DataFrame(list(follows), columns=answer._FOLLOWS),
         "gap_left_out": pd.DataFrame({"reason": ["outlier in the file"], "points": [2]}),
     }
     row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
@@ -181,6 +182,22 @@ def test_where_a_drive_errs_most_is_told_with_its_interval():
     text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean over "
     assert text in said
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_of_it():
+    follows = [("the value of axis2", 0.71, np.radians(12.0), "rad", 0.21), ("the time", 0.2, 60.0, "s", 0.1)]
+    facts_of = answered(effects="unexplained", leg=0, follows=follows)
+    assert (
+        "What is unexplained follows the value of axis2: a smooth function of it, which changes over about 12 degrees, "
+        "predicts 71 % of it at left-out points (0.21 mm rms)." in facts_of["sentences"]
+    )
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+    unclear = answered(effects="unexplained", leg=0, follows=[("the time", 0.3, 60.0, "s", 0.1)])
+    assert any("follows no single variable that was tried: the time comes next" in one for one in unclear["sentences"])
+    steps = answered(
+        effects="unexplained", leg=0, follows=[("the sense of motion of the drives", 0.9, np.nan, "1", 0.1)]
+    )
+    assert any("steps with it predict 90 % of it" in one for one in steps["sentences"])
 
 
 def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():

@@ -6,6 +6,7 @@ GAP_TABLES = [
     "gap_locate",
     "gap_identifiability",
     "gap_attribute",
+    "gap_remainder",
     "gap_sets",
     "gap_shrink",
     "gap_parameters",
