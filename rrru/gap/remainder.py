@@ -21,9 +21,7 @@ from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
 TIME, DRIVE = "the time", "the value of "
-NO_REMAINDER = pd.DataFrame(
-    {name: pd.Series(dtype="str" if name in ("follows", "unit") else float) for name in COLUMNS}
-)
+NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
 # deviations of the function over the rms of what is left
 _AMPLITUDES = (0.3, 1.0, 3.0)
 _JITTER = 1e-8
@@ -31,8 +29,8 @@ _JITTER = 1e-8
 
 @dataclass(frozen=True)
 class _Variable:
-    """follows: in words; value (n, d) with its unit, NaN columns being none; drive: number of the drive that the function
-    is added to, None where it moves the positions; steps: the value itself is the function, at each of its columns.
+    """follows: in words; value (n, d) with its unit; drive: number of the drive that the function is added to, None
+    where it moves the positions; steps: the value itself is the function, at each of its columns.
     """
 
     follows: str
