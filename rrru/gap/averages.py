@@ -8,52 +8,49 @@ of a problem in the other columns (x) alone:
 and their evidence beside it is 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
 """
 
-from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_solve, solve_triangular
 
 
-def beside(gram, index, apart=()):
-    """Numbers (k,) of the columns of a Gram matrix (K, K) beside columns index (z,), and their part of it (k, k).
-
-    apart: numbers of further columns to leave out, which no other term of a set has.
-    """
-    kept = np.setdiff1d(np.arange(len(gram)), np.union1d(index, np.asarray(apart, dtype=int)))
-    return kept, gram[kept[:, None], kept]
-
-
-@dataclass(frozen=True)
 class Average:
     """Average over the coefficients of one term at one size.
 
-    evidence: log evidence of the term alone; kept (k,): numbers of the other columns, in order; gram (k, k), moment
-    (k,): of these after the average.
+    gram (K, K), moment (K,): of all columns; index (z,): the term's own; size (z,): its prior deviations; apart:
+    numbers of further columns to leave out, which no other term of a set has. evidence: log evidence of the term alone.
     """
 
-    evidence: float
-    kept: np.ndarray
-    gram: np.ndarray
-    moment: np.ndarray
+    def __init__(self, gram, moment, index, size, apart=()):
+        self._gram, self._moment, self._index, self._size = gram, moment, index, size
+        self._apart = np.asarray(apart, dtype=int)
+        self._factor = _factor(gram, index, size)
+        self._half = solve_triangular(self._factor, size * moment[index], lower=True, check_finite=False)
+        self.evidence = float(0.5 * self._half @ self._half - np.log(np.diag(self._factor)).sum())
 
-    @classmethod
-    def over(cls, gram, moment, index, size, others):
-        """Of the columns index (z,) with prior sizes (z,) of a Gram matrix (K, K) and moments (K,).
+    @cached_property
+    def kept(self):
+        """Which columns (K,) other terms of a set may have."""
+        result = np.full(len(self._moment), True)
+        result[self._index] = result[self._apart] = False
+        return result
 
-        others: what is `beside` these.
-        """
-        kept, rest = others
-        factor = _factor(gram, index, size)
-        both = size[:, None] * np.column_stack([gram[index[:, None], kept], moment[index]])
-        half = solve_triangular(factor, both, lower=True, check_finite=False)
-        evidence = 0.5 * half[:, -1] @ half[:, -1] - np.log(np.diag(factor)).sum()
-        taken = half[:, :-1].T @ half
-        return cls(float(evidence), kept, rest - taken[:, :-1], moment[kept] - taken[:, -1])
+    @cached_property
+    def across(self):
+        """What the average takes of the other columns (K, z): their Gram matrix less it times its transpose is left."""
+        columns = self._size[:, None] * self._gram[self._index]
+        half = solve_triangular(self._factor, columns, lower=True, check_finite=False)
+        return np.where(self.kept[:, None], half.T, 0.0)
+
+    @cached_property
+    def moment(self):
+        """Moments (K,) of the other columns after the average."""
+        return self._moment - self.across @ self._half
 
     def rest(self, index):
-        """Gram matrix (k, k) and moments (k,) of some of the other columns."""
-        at = np.searchsorted(self.kept, index)
-        return self.gram[at[:, None], at], self.moment[at]
+        """Gram matrix (k, k) and moments (k,) of some of the other columns after the average."""
+        own = self.across[index]
+        return self._gram[index[:, None], index] - own @ own.T, self.moment[index]
 
 
 def averaged_mean(gram, moment, index, size, others, values):

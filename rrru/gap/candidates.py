@@ -64,11 +64,12 @@ class Candidates:
         taken = {term.effect for term in terms}
         result = np.full((len(self.terms), len(STRENGTHS)), -np.inf)
         numbers, ends, scale, positive = self._blocks
-        gram, moment, across, place = self._left(terms, strengths, level)
-        few = log_evidence_of_blocks(gram, moment, across, np.maximum(place[numbers], 0), ends, scale, positive)
+        gram, moment, across = self._left(terms, strengths, level)
+        few = log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
         result[: len(few)] = few
         own = None
         for row, term in enumerate(self.terms):
+            # columns of an effect that the set has are gone
             if term.effect in taken:
                 result[row] = -np.inf
             elif row >= len(few):
@@ -79,13 +80,13 @@ class Candidates:
         return result
 
     def _left(self, terms, strengths, level):
-        """Gram matrix (k, k), moments (k,) and W^T (k, x) of what a set leaves, and columns' places (K,) in them."""
-        gram, moment, place, problem, scale = self._evidence.columns_beside(terms, strengths, level)
+        """Gram matrix (K, K), moments (K,) and across (K, x): what a set leaves is the first less across across^T."""
+        gram, across, moment, problem, scale = self._evidence.columns_beside(terms, strengths, level)
         if problem is None:
-            return gram, moment, np.zeros((len(moment), 0)), place
-        across = gram[place[problem.index]]
-        across = across if problem.mix is None else problem.mix.T @ across
+            return gram, moment, across
+        own = gram[problem.index] - across[problem.index] @ across.T
+        own = own if problem.mix is None else problem.mix.T @ own
         factor = np.linalg.cholesky(scale[:, None] * problem.gram[0] * scale + np.eye(len(scale)))
-        half = solve_triangular(factor, scale[:, None] * across, lower=True, check_finite=False)
-        moment = moment - posterior_mean(problem, scale) @ across
-        return gram, moment, np.ascontiguousarray(half.T), place
+        half = solve_triangular(factor, scale[:, None] * own, lower=True, check_finite=False)
+        moment = moment - posterior_mean(problem, scale) @ own
+        return gram, moment, np.ascontiguousarray(np.concatenate([across, half.T], axis=1))

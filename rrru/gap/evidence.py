@@ -26,7 +26,7 @@ from itertools import product
 import numpy as np
 
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.averages import Average, averaged_mean, beside
+from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence_kernels import log_sum_exp
 from rrru.gap.options import OPTIONS
 from rrru.gap.projected import Prior, Projected
@@ -225,28 +225,26 @@ class ModelEvidence:
 
     @_on_complete
     def columns_beside(self, terms, strengths, level):
-        """All columns once the broad term of a set has been averaged over, and the problem of the set's others.
+        """All columns beside the broad term of a set, and the problem of the set's others.
 
-        Gram matrix (k, k) and moments (k,) of all columns but the broad term's; place (K,): where each column is in
-        them, -1 for those that are gone; the Projected problem at the level (an index), and the prior deviations of its
-        coefficients at the strengths; both None where there is nothing else.
+        Gram matrix (K, K) of all columns; across (K, z): what the broad term takes of it, its product with its
+        transpose; moments (K,) after that; the Projected problem at the level (an index), and the prior deviations of
+        its coefficients at the strengths, both None where there is nothing else.
         """
         broad = self._broadest(terms)
         gram, moment, _ = self._whitened.gram(level)
-        place, rest = np.arange(len(moment)), tuple(terms)
-        strengths = np.asarray(strengths, dtype=float)
+        rest, strengths = tuple(terms), np.asarray(strengths, dtype=float)
+        across, average = np.zeros((len(moment), 0)), None
         if broad is not None:
             average = self._average(terms[broad], strengths[broad], level)
-            place = np.full(len(moment), -1)
-            place[average.kept] = np.arange(len(average.kept))
-            gram, moment, rest = average.gram, average.moment, (*terms[:broad], *terms[broad + 1 :])
-            strengths = np.delete(strengths, broad)
+            across, moment = average.across, average.moment
+            rest, strengths = (*terms[:broad], *terms[broad + 1 :]), np.delete(strengths, broad)
         if not rest:
-            return gram, moment, place, None, None
+            return gram, across, moment, None, None
         problem = self.projected(rest, [level])
-        if broad is not None:
+        if average is not None:
             problem = problem.on(*(part[None] for part in average.rest(problem.index)))
-        return gram, moment, place, problem, problem.scale(strengths[None])[0]
+        return gram, across, moment, problem, problem.scale(strengths[None])[0]
 
     def _broadest(self, terms):
         """Number of the term of the most coefficients if these are many, None where no term has."""
@@ -277,8 +275,7 @@ class ModelEvidence:
             prior = self._prior(term)
             # drives on which the law does not act by this term: no set has a law twice
             apart = self._whitened.layout[0][term.effect, term.shape, EACH]
-            others = self._besides.of((term, int(level)), lambda: beside(gram, prior.index, apart))
-            return Average.over(gram, moment, prior.index, prior.at(strength), others)
+            return Average(gram, moment, prior.index, prior.at(strength), apart)
 
         return self._averages.of((term, float(strength), int(level)), make)
 
@@ -289,11 +286,6 @@ class ModelEvidence:
     @cached_property
     def _found(self):
         return Latest(OPTIONS.max_cached_results)
-
-    @cached_property
-    def _besides(self):
-        # of one term at all levels: its strengths come in turn
-        return Latest(len(LEVELS))
 
     @cached_property
     def _averages(self):

@@ -13,7 +13,7 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.averages import Average, averaged_mean, beside
+from rrru.gap.averages import Average, averaged_mean
 from rrru.gap.evidence import STRENGTHS, ModelEvidence
 from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.state import Linear
@@ -358,10 +358,10 @@ def test_an_average_is_an_integral_over_the_coefficients():
     generator = np.random.default_rng(7)
     columns, data, size = generator.normal(size=(9, 5)), generator.normal(size=9), generator.uniform(0.3, 2.0, 3)
     index, others = np.array([1, 2, 4]), np.array([0, 3])
-    gram = columns.T @ columns
-    made = Average.over(gram, columns.T @ data, index, size, beside(gram, index))
+    gram0 = gram = columns.T @ columns
+    made = Average(gram, columns.T @ data, index, size)
     averaged = np.eye(9) + (columns[:, index] * size**2) @ columns[:, index].T
-    assert made.kept.tolist() == others.tolist()
+    assert np.flatnonzero(made.kept).tolist() == others.tolist()
     ratio = multivariate_normal.logpdf(data, cov=averaged) - multivariate_normal.logpdf(data, cov=np.eye(9))
     assert made.evidence == pytest.approx(ratio, rel=1e-9)
     for values in generator.normal(size=(4, 2)):
@@ -370,7 +370,10 @@ def test_an_average_is_an_integral_over_the_coefficients():
         foretold = moment @ values - 0.5 * values @ gram @ values
         assert moved - multivariate_normal.logpdf(data, cov=averaged) == pytest.approx(foretold, rel=1e-8)
     gram, moment = made.rest(np.array([3]))
-    assert gram[0, 0] == made.gram[1, 1] and moment[0] == made.moment[1]
+    whole = made.rest(others)
+    assert gram[0, 0] == pytest.approx(whole[0][1, 1]) and moment[0] == pytest.approx(whole[1][1])
+    assert (made.across[index] == 0.0).all()
+    assert np.flatnonzero(Average(gram0, columns.T @ data, index, size, [0]).kept).tolist() == [3]
     values = generator.normal(size=2)
     design = np.concatenate([columns[:, index], np.diag(1.0 / size)])
     target = np.concatenate([data - columns[:, others] @ values, np.zeros(3)])
