@@ -43,10 +43,14 @@ def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
 
 @dataclass
 class _Search:
-    """Sets that a search has reached and those whose neighbours it has evaluated, by their terms as a set."""
+    """Sets that a search has reached and those whose neighbours it has evaluated, by their terms as a set, in order."""
 
-    reached: set = field(default_factory=set)
-    expanded: set = field(default_factory=set)
+    reached: dict = field(default_factory=dict)
+    expanded: dict = field(default_factory=dict)
+
+    def reach(self, terms):
+        """Note that a set has been reached."""
+        self.reached[frozenset(terms)] = None
 
 
 class ModelSpace:
@@ -76,7 +80,7 @@ class ModelSpace:
         each = [Posterior.of([self._known[key] for key in one.reached]) for one in searches]
         marginals = np.array([[beliefs.marginal(name) for name in sorted(causes)] for beliefs in each])
         apart = float(np.ptp(marginals, axis=0).max(initial=0.0))
-        expanded = frozenset().union(*(one.expanded for one in searches))
+        expanded = {key: None for one in searches for key in one.expanded}
         share = sum(np.exp(self._known[key].height - result.total) for key in expanded)
         return Posterior.of(found, apart, float(share))
 
@@ -85,10 +89,11 @@ class ModelSpace:
         known = {term for term in start if term in self._terms}
         found, first = _Search(), frozenset(known)
         self._evaluate(tuple(term for term in start if term in known), None, None, climb=True)
-        found.reached |= {frozenset(), *(frozenset((term,)) for term in self._terms), first}
+        for terms in ((), *((term,) for term in self._terms), first):
+            found.reach(terms)
         upcoming = first
         while upcoming is not None and len(found.expanded) < OPTIONS.max_expanded_sets:
-            found.expanded.add(upcoming)
+            found.expanded[upcoming] = None
             self._expand(self._known[upcoming], found)
             upcoming = self._next(found)
         return found
@@ -98,11 +103,9 @@ class ModelSpace:
         heights = {key: self._known[key].height for key in found.reached}
         open_sets = [key for key in heights if key not in found.expanded]
         best = max(open_sets, key=heights.get, default=None)
-        if best is None or heights[best] < log_sum_exp(np.array(list(heights.values()))) + np.log(
-            OPTIONS.min_expanded_probability
-        ):
-            return None
-        return best
+        total = log_sum_exp(np.array(list(heights.values())))
+        matters = best is not None and heights[best] > total + np.log(OPTIONS.min_expanded_probability)
+        return best if matters else None
 
     def fullest(self):
         """The set that grows by the term that adds most, however improbable many terms are, as long as one adds."""
@@ -140,7 +143,7 @@ class ModelSpace:
                 rest = [k for k in range(len(terms)) if k != out]
                 smaller = tuple(terms[k] for k in rest)
                 self._evaluate(smaller, level, strengths[rest], climb=True)
-                found.reached.add(frozenset(smaller))
+                found.reach(smaller)
                 base = self._known[frozenset(smaller)].hypothesis
             if len(base.terms) == self._most:
                 continue
@@ -162,7 +165,7 @@ class ModelSpace:
         chosen.sort(key=lambda one: -one[0])
         for _, neighbour, scales in chosen[: OPTIONS.max_neighbours]:
             self._evaluate(neighbour, level, scales)
-            found.reached.add(frozenset(neighbour))
+            found.reach(neighbour)
 
     def _evaluate(self, terms, level, strengths, climb=False):
         """Evaluate a set of terms unless it is known: at a level, and at those next to it as long as they matter.
