@@ -20,7 +20,7 @@ from rrru.gap.options import OPTIONS
 from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
-TIME, DRIVE = "the time", "the value of "
+TIME, PLACE, DRIVE = "the time", "the place", "the value of "
 NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
 # deviations of the function over the rms of what is left
 _AMPLITUDES = (0.3, 1.0, 3.0)
@@ -65,17 +65,21 @@ def remainder_rows(attribution):
 def followed_alike(rows, library, names):
     """Which of some effects, by name, follow the variable that most of the remainder follows, and its rms in mm.
 
-    rows: of `gap_remainder`. Laws of the time follow the time, laws of a drive's value follow the drives' values.
+    rows: of `gap_remainder`. Laws of the time follow the time, those of a drive's value the drives' values. The place
+    tells the drives' values, too: what needs nothing but these, as errors of assembly, follows it.
     """
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
         return (), 0.0
     if best["follows"] == TIME:
-        return tuple(name for name in names if "time_s" in library[name].needs), float(best["rms_mm"])
-    if best["follows"].startswith(DRIVE):
-        chosen = tuple(name for name in names if getattr(library[name], "of_drive_value", False))
-        return chosen, float(best["rms_mm"])
-    return (), 0.0
+        chosen = [name for name in names if "time_s" in library[name].needs]
+    elif best["follows"] == PLACE:
+        chosen = [name for name in names if not library[name].needs]
+    elif best["follows"].startswith(DRIVE):
+        chosen = [name for name in names if getattr(library[name], "of_drive_value", False)]
+    else:
+        chosen = []
+    return tuple(chosen), float(best["rms_mm"]) if chosen else 0.0
 
 
 def _variables(case, rows):
@@ -87,7 +91,7 @@ def _variables(case, rows):
         _Variable(f"{DRIVE}{name}", motion.drive[at, k : k + 1], unit, k)
         for k, (name, unit) in enumerate(zip(names, units, strict=False))
     ]
-    found.append(_Variable("the place", motion.position_mm[at], "mm"))
+    found.append(_Variable(PLACE, motion.position_mm[at], "mm"))
     found.append(_Variable(TIME, motion.time_s[at][:, None], "s"))
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
     speed = case.points["speed_mm_s"].to_numpy(dtype=float)[rows]

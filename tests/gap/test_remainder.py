@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rrru.gap.options import OPTIONS
-from rrru.gap.remainder import DRIVE, TIME, _Regression, followed_alike, remainder_rows
+from rrru.gap.remainder import DRIVE, PLACE, TIME, _Regression, followed_alike, remainder_rows
 from rrru.robots.rrru3 import Rrru3
 
 NOISE_MM = 0.02
@@ -105,7 +105,12 @@ def test_laws_of_the_same_variable_are_found_by_what_they_need():
         "gear": SimpleNamespace(needs=(), of_drive_value=True),
         "flex": SimpleNamespace(needs=("force_n",), of_drive_value=False),
     }
-    for follows, expected in ((TIME, ("drift",)), (f"{DRIVE}leg 1", ("gear",)), ("the place", ())):
+    for follows, expected in (
+        (TIME, ("drift",)),
+        (f"{DRIVE}leg 1", ("gear",)),
+        (PLACE, ("gear",)),
+        ("the payload", ()),
+    ):
         rows = pd.DataFrame({"follows": [follows], "explained": [0.8], "rms_mm": [0.3]})
         names, size = followed_alike(rows, library, tuple(library))
         assert names == expected and size == (0.3 if expected else 0.0)
