@@ -65,7 +65,8 @@ def test_further_points_never_take_information_away():
 
 def test_passes_lie_between_measured_points_within_reach():
     frame = measure(plan=plan_of(trajectories=LINES[1:]))
-    start, end = poses.passes(frame, SIM)
+    passes = poses.passes(frame, SIM)
+    start, end = passes.start_mm, passes.end_mm
     points = poses.points_of(start, end).reshape(-1, 3)
     known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
     assert len(start) > 20 and np.isfinite(SIM.inverse(points)).all()
