@@ -53,7 +53,8 @@ def advise(attribution, verdict, masses, stated=None, sizes=None):
     contests = contests_of(attribution, verdict, sizes or {})
     if not contests:
         return NOTHING
-    limits, limited = run_limits(attribution.case, masses, stated or StatedLimits())
+    stated = stated or StatedLimits()
+    limits, limited = run_limits(attribution.case, masses, stated)
     result = _runs(attribution, contests, masses, limits)
     first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
     if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
@@ -70,7 +71,8 @@ def advise(attribution, verdict, masses, stated=None, sizes=None):
     told = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
     open_still = not told and verdict.probability < OPTIONS.min_sure_probability
     listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
-    return Advice(runs, listed, contests[0].separates if open_still else "", limited)
+    undecided = contests[0].separates if open_still else ""
+    return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
 def _runs(attribution, contests, masses, limits):

@@ -8,6 +8,7 @@ import numpy as np
 from rrru.effects.causes import cause_texts
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
+from rrru.gap.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -29,6 +30,7 @@ _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
 _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
+_LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -374,7 +376,7 @@ def _undecided(separates, drives):
 def _undecidable(facts):
     """What would decide between two answers where nothing that can be simulated does: inspection of their causes."""
     undecided = facts["undecided"]
-    limited = " within the limits" if any("limits.payload_kg" in note for note in facts["notes"]) else ""
+    limited = " within the limits" if any(note.startswith(_LIMITED) for note in facts["notes"]) else ""
     would = " ".join(
         f"{_initial(readable(one['name']))}: {one['inspect'] or 'add a sensor at the part itself.'}"
         for one in undecided["inspect"]

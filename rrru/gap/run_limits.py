@@ -12,6 +12,9 @@ import numpy.typing as npt
 
 from rrru.gap.options import OPTIONS
 
+# first words of notes that say which candidates are left out
+NO_PAYLOAD, WITHIN_LIMITS = "no run with a payload is proposed", "runs are proposed within the limits"
+
 
 @dataclass(frozen=True)
 class StatedLimits:
@@ -25,6 +28,13 @@ class StatedLimits:
     def from_config(cls, section: Mapping[str, float] | None) -> Self:
         """From the key `limits` of the configuration."""
         return cls(**(section or {}))
+
+    @property
+    def words(self) -> str:
+        """The limits that are stated as a note, "" where none is."""
+        stated = ((name, getattr(self, name)) for name in ("payload_kg", "speed_mm_s", "minutes"))
+        listed = [f"{name} {value:g}" for name, value in stated if value is not None]
+        return f"{WITHIN_LIMITS} {', '.join(listed)}" if listed else ""
 
 
 @dataclass(frozen=True)
@@ -100,7 +110,7 @@ def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits,
         return replace(limits, added_kg=added, payload_kg=max(_rounded_down(plausible, 1), driven)), ""
     if not why or plausible < spare:
         why = f"the robot moves {moved:.2g} kg itself" if moved else "nobody states what the robot itself weighs"
-    return replace(limits, added_kg=0.0), f"no run with a payload is proposed, {why}: state limits.payload_kg"
+    return replace(limits, added_kg=0.0), f"{NO_PAYLOAD}, {why}: state limits.payload_kg"
 
 
 def moved_kg(robot: Any, masses: Any) -> float:
