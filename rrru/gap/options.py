@@ -244,6 +244,8 @@ class DiagnosisOptions:
     # points that are read on a short pass, and its length; assumed
     points_per_pass: int = 5
     pass_length_mm: float = 100.0
+    # a drive that turns further between two points of a pass goes round, or past a singularity; assumed
+    max_pass_step_rad: float = 0.5
     # log2 of the number of passes that are tried: 256; assumed
     tried_passes_log2: int = 8
     # a pass has at least this share of the campaign's own distance from singularities; assumed

@@ -125,7 +125,10 @@ def passes(measurements, mechanism):
     if read := rows.has_turns(measurements):
         turn = mechanism.solve(reached[:, 0], start).turn if turn is None else turn
     found = Passes(start, end, reached, turn, target, read)
-    return found.some(_clear((known, drives), points_of(start, end), reached, mechanism))
+    turning = np.array(mechanism.parts.units) == "rad"
+    step = np.abs(np.diff(reached, axis=1)).max(axis=1)[:, turning].max(axis=1, initial=0.0)
+    smooth = step < OPTIONS.max_pass_step_rad
+    return found.some(smooth & _clear((known, drives), points_of(start, end), reached, mechanism))
 
 
 def points_of(start_mm, end_mm):
