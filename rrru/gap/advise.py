@@ -117,20 +117,19 @@ def _poses(attribution, contest, masses, limits):
     last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
         speed = limits.fast(told_speed, np.full(1, np.nan)) if fast else own_speed
-        load, how = limits.loaded_kg(own_load) if loaded else own_load, []
+        load = limits.loaded_kg(own_load) if loaded else own_load
         if (fast and not (speed > told_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
             continue
         # a pass at which a drive would be too fast is none
         some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
         if not len(some) or not limits.allows(speed, load):
             continue
-        how = _how(fast, loaded, speed, load)
         table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(case, table, masses)
         if not _tell(planned, contest):
             continue
         now, added = worth(attribution, contest.truth, contest.imitator, planned)
-        chosen, gain = greedy(now, added, OPTIONS.max_advised_poses)
+        chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
         chosen = chosen[: some.within(chosen, speed, limits.seconds)]
         if not chosen:
             continue
@@ -138,7 +137,7 @@ def _poses(attribution, contest, masses, limits):
         # one that tells hardly more is not worth a payload
         if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
-            words = " ".join([f"{count} poses", *how]), "poses", "poses", False
+            words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
             told = contest.separates, now.nats(), gain
             row = *words, speed, load, count * OPTIONS.points_per_pass, *told
             listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)

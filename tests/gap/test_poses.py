@@ -19,6 +19,7 @@ from rrru.gap.make_case import make_case
 from rrru.gap.model_fit import fit_model
 from rrru.gap.model_space import explore
 from rrru.gap.options import OPTIONS
+from rrru.gap.run_limits import StatedLimits
 from rrru.gap.settings import Prior
 from rrru.gap.state import State
 from rrru.gap.verdict import Verdict, decide
@@ -100,8 +101,10 @@ class LocalCompliance:
 
 
 @pytest.fixture(scope="module")
-def between():
-    """Advice for a campaign of two lines, at y = 110 mm and -110 mm, between effects that differ between them alone."""
+def rivals():
+    """Attribution and verdict of a campaign of two lines, at y = 110 mm and -110 mm, of effects that differ between
+    these alone.
+    """
     library = {"drive_compliance": EFFECTS["drive_compliance"], "local_compliance": LocalCompliance()}
     case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
     calibrated = calibrate(case)
@@ -110,7 +113,24 @@ def between():
     found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
     verdict = decide(beliefs, library)
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
-    return advise(found, verdict, MASSES)
+    return found, verdict
+
+
+@pytest.fixture(scope="module")
+def between(rivals):
+    """The Advice for it."""
+    return advise(*rivals, MASSES)
+
+
+def test_advised_poses_keep_the_limits(between, rivals):
+    few = advise(*rivals, MASSES, StatedLimits(payload_kg=2.0, speed_mm_s=150.0, minutes=0.2))
+    (row,) = few.runs.to_dict("records")
+    assert row["kind"] == "poses" and 1 <= len(few.poses) < len(between.poses)
+    assert row["points"] == OPTIONS.points_per_pass * len(few.poses) and row["gain_nats"] > 0.2
+    assert (few.poses["payload_kg"] <= 2.0).all() and (few.poses["speed_mm_s"] <= 150.0).all()
+    none = advise(*rivals, MASSES, StatedLimits(minutes=0.01))
+    assert not len(none.runs) and not len(none.poses) and "local_compliance" in none.undecided
+    assert none.limited == "runs are proposed within the limits minutes 0.01"
 
 
 def test_poses_tell_what_no_trajectory_does(between):
