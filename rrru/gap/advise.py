@@ -1,7 +1,8 @@
-"""Which further run would tell two answers apart: computed by what each candidate adds, not by rule of thumb.
+"""Which further run would decide between two answers: computed by what each candidate adds, not by rule of thumb.
 
-Candidates are further passes along a campaign's own trajectories. Where none of them would rule a rival out, poses are
-chosen too, each the one that adds most to those before it. What they add is counted as `rrru.gap.worth` says.
+Candidates are further passes along a campaign's own trajectories. Where none of them would decide between the first two
+answers, poses are chosen too, each the one that adds most to those before it. What they add is counted as
+`rrru.gap.worth` says. No candidate exceeds the limits of the robot, see `rrru.gap.run_limits`.
 """
 
 from dataclasses import dataclass
@@ -12,72 +13,83 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.gap import poses
+from rrru.gap.contests import contests_of
 from rrru.gap.make_case import make_case
 from rrru.gap.options import OPTIONS
-from rrru.gap.verdict import label
+from rrru.gap.run_limits import RunLimits, StatedLimits, run_limits
 from rrru.gap.worth import greedy, worth
 
 RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
 _COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
-_POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"), "speed_mm_s", "payload_kg")
+_POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"))
+_POSE += (*(f"command_r{axis}_rad" for axis in "xyz"), "speed_mm_s", "payload_kg")
 # kinds of further passes: in reverse, fast, loaded
 _KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
 
 
 @dataclass(frozen=True)
 class Advice:
-    """Rows of `gap_next_runs`, best first, without campaign and rank, and of `gap_next_poses` without campaign."""
+    """Rows of `gap_next_runs`, best first, without campaign and rank, and of `gap_next_poses` without campaign.
+
+    undecided: the two answers, "a / b", that nothing which can be simulated would decide between, else empty; limited:
+    which limit of the robot leaves candidates out, in words, else empty.
+    """
 
     runs: pd.DataFrame
     poses: pd.DataFrame
+    undecided: str = ""
+    limited: str = ""
 
 
 NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
 
 
-def advise(attribution, verdict, masses, most=OPTIONS.max_advised_runs):
-    """The Advice, empty where no rival answer is left that the library can predict."""
-    contests = [] if verdict.unexplained else list(_contests(attribution, verdict))
+def advise(attribution, verdict, masses, stated=None, sizes=None):
+    """The Advice, empty where no rival answer is left that the library can predict.
+
+    stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
+    decide what matters most come first.
+    """
+    contests = contests_of(attribution, verdict, sizes or {})
     if not contests:
         return NOTHING
-    choice, table = candidates(attribution.case.measurements)
-    if not choice:
-        return NOTHING
-    planned, result = _planned(attribution.case, table, masses), []
-    contests = [contest for contest in contests if _tell(planned, contest)]
-    for separates, truth, imitator in contests:
-        now, added = worth(attribution, truth, imitator, planned)
-        start = now.nats()
-        gains = ((now + one).nats() - start for one in added)
-        result += [
-            run | {"separates": separates, "now_nats": start, "gain_nats": gain}
-            for run, gain in zip(choice, gains, strict=True)
-        ]
-    runs = pd.DataFrame(result, columns=_COLUMNS)
-    listed = NOTHING.poses
-    if contests and not (runs["gain_nats"] > OPTIONS.decisive_gain_nats).any():
-        row, listed = _poses(attribution, contests[0], masses)
-        runs = pd.DataFrame([*result, *row], columns=_COLUMNS)
+    stated = stated or StatedLimits()
+    limits, limited = run_limits(attribution.case, masses, stated)
+    result = _runs(attribution, contests, masses, limits)
+    first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
+    if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
+        row, listed = _poses(attribution, contests[0], masses, limits)
+        result, first = result + row, first + row
+    runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
     runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
-    runs = runs.sort_values(["gain_nats", "run"], ascending=[False, True], kind="stable")
-    runs = runs.drop_duplicates("run").head(most).reset_index(drop=True)
-    return Advice(runs, listed if (runs["kind"] == "poses").any() else NOTHING.poses)
+    # of runs that decide, those that decide what matters most; of others those that tell most
+    turn = runs["contest"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(contests))
+    runs = runs.assign(turn=turn).sort_values(
+        ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
+    )
+    runs = runs.drop_duplicates("run").head(OPTIONS.max_advised_runs)[[*_COLUMNS]].reset_index(drop=True)
+    told = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
+    open_still = not told and verdict.probability < OPTIONS.min_sure_probability
+    listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
+    undecided = contests[0].separates if open_still else ""
+    return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
-def _contests(attribution, verdict):
-    """What is to be told apart, in words, and its two (hypothesis, level), for the favoured answer and its rivals."""
-    effects = frozenset(verdict.effects)
-    favoured = attribution.posterior.best_of(effects)
-    rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
-    if not rivals and verdict.probability < OPTIONS.min_sure_probability:
-        rivals = [names for names, flag in attribution.posterior.sets() if not flag and names != effects]
-    for names in rivals[: OPTIONS.max_advised_rivals]:
-        other = attribution.posterior.best_of(names)
-        # a rival may be one only beside something small that is unknown
-        if favoured is not None and other is not None:
-            # the answer with more effects makes the data: the smaller one could not make the larger one's
-            pair = (favoured, other) if len(favoured[0].terms) >= len(other[0].terms) else (other, favoured)
-            yield " / ".join(label(sorted(answer), False) for answer in (effects, names)), *pair
+def _runs(attribution, contests, masses, limits):
+    """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
+    choice, table = candidates(attribution.case.measurements, limits)
+    if not choice:
+        return []
+    planned, result = _planned(attribution.case, table, masses), []
+    for number, contest in enumerate(contests):
+        if not _tell(planned, contest):
+            continue
+        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        start = now.nats()
+        for run, one in zip(choice, added, strict=True):
+            told = {"contest": number, "separates": contest.separates, "now_nats": start}
+            result.append(run | told | {"gain_nats": (now + one).nats() - start})
+    return result
 
 
 def _planned(case, table, masses):
@@ -86,49 +98,56 @@ def _planned(case, table, masses):
 
 
 def _tell(planned, contest):
-    """Whether planned runs tell what the effects of a contest need, such as times or temperatures."""
-    _, *answers = contest
+    """Whether planned runs tell what the effects of a Contest need, such as times or temperatures."""
+    answers = contest.truth, contest.imitator
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
 
-def _poses(attribution, contest, masses):
+def _poses(attribution, contest, masses, limits):
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
     They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
     """
-    (separates, truth, imitator), case, best = contest, attribution.case, ([], NOTHING.poses)
-    start, end = poses.passes(case.measurements, case.mechanism)
-    if not len(start):
+    case, best = attribution.case, ([], NOTHING.poses)
+    passes = poses.passes(case.measurements, case.mechanism)
+    if not len(passes):
         return best
     told_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
     own_speed = told_speed if np.isfinite(told_speed) else _speed(case.measurements)
     last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
     for fast, loaded in product((False, True), repeat=2):
-        if fast and not (told_speed < OPTIONS.fast_pass_mm_s and np.isfinite(last_s)):
+        speed = limits.fast(told_speed, np.full(1, np.nan)) if fast else own_speed
+        load = limits.loaded_kg(own_load) if loaded else own_load
+        if (fast and not (speed > told_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
             continue
-        speed, load, how = _driven(own_speed, own_load, fast, loaded)
-        table = poses.commands(start, end, case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
+        # a pass at which a drive would be too fast is none
+        some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
+        if not len(some) or not limits.allows(speed, load):
+            continue
+        table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
         planned = _planned(case, table, masses)
         if not _tell(planned, contest):
             continue
-        now, added = worth(attribution, truth, imitator, planned)
-        chosen, gain = greedy(now, added, OPTIONS.max_advised_poses)
+        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
+        chosen = chosen[: some.within(chosen, speed, limits.seconds)]
+        if not chosen:
+            continue
+        gain = sum((added[number] for number in chosen), now).nats() - now.nats()
         # one that tells hardly more is not worth a payload
         if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
-            words = " ".join([f"{count} poses", *how]), "poses", "poses", False
-            row = *words, speed, load, count * OPTIONS.points_per_pass, separates, now.nats(), gain
-            ends = {**rows.vector_columns("from", start[chosen]), **rows.vector_columns("to", end[chosen])}
-            listed = pd.DataFrame({"pose": np.arange(1, count + 1), **ends, "speed_mm_s": speed, "payload_kg": load})
-            best = [dict(zip(_COLUMNS, row, strict=True))], listed
+            words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
+            told = contest.separates, now.nats(), gain
+            row = *words, speed, load, count * OPTIONS.points_per_pass, *told
+            listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
+            best = [{"contest": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
     return best
 
 
-def _driven(own_speed, own_load, fast, loaded):
-    """Speed and payload of a kind of pass, and in words what is not the campaign's own."""
-    speed = OPTIONS.fast_pass_mm_s if fast else own_speed
-    load = own_load + (OPTIONS.added_payload_kg if loaded else 0.0)
-    return speed, load, [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
+def _how(fast, loaded, speed, load):
+    """In words what of a kind of pass is not the campaign's own."""
+    return [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
 
 
 def _end_s(frame):
@@ -144,11 +163,13 @@ def _speed(frame):
     return float(np.median(way[moved] / time[moved])) if moved.any() else np.nan
 
 
-def candidates(frame):
+def candidates(frame, limits=None):
     """Candidate runs as mappings of the columns RUN of `gap_next_runs`, and their commands, numbered from 1.
 
-    Every kind of pass along some of a measurement table's trajectories.
+    Every kind of pass along some of a measurement table's trajectories that keeps the RunLimits, by default those of a
+    robot of which nothing is known.
     """
+    limits = limits or RunLimits()
     count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
     # passes of poses that were driven before are no trajectories
     names = count.index[(count > OPTIONS.points_per_pass) | (count.max() <= OPTIONS.points_per_pass)]
@@ -158,15 +179,36 @@ def candidates(frame):
         first = frame[frame["trajectory"] == name]
         first = first[first["run"] == first["run"].iloc[0]]
         own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
+        fastest, heaviest = limits.fast(own_speed, _rates(first, limits.columns)), limits.loaded_kg(own_load)
         for reverse, fast, loaded in _KINDS:
-            if fast and not (own_speed < OPTIONS.fast_pass_mm_s and np.isfinite(end)):
+            if (fast and not (fastest > own_speed and np.isfinite(end))) or (loaded and not heaviest > own_load):
                 continue
-            speed, load, how = _driven(own_speed, own_load, fast, loaded)
-            how = ["in reverse"] * reverse + how
-            tables.append(_pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load))
+            speed, load = fastest if fast else own_speed, heaviest if loaded else own_load
+            table = _pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load)
+            if not limits.allows(speed, load, _seconds(table)):
+                continue
+            tables.append(table)
+            how = ["in reverse"] * reverse + _how(fast, loaded, speed, load)
             words = f"{name} {' '.join(how) or 'once more'}"
             result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
     return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
+
+
+def _rates(run, columns):
+    """Largest rates (K,) of the drives of some columns between the points of a run; NaN where it has no times."""
+    time = np.diff(run["time_s"].to_numpy(dtype=float))
+    way = np.abs(np.diff(run[[*columns]].to_numpy(dtype=float), axis=0))
+    rate = np.divide(way, time[:, None], out=np.full(way.shape, np.nan), where=time[:, None] > 0.0)
+    return np.nanmax(rate, axis=0, initial=0.0)
+
+
+def _seconds(run):
+    """Driving time of a run, by its times, else by its way and its speed; NaN where it has neither."""
+    time = run["time_s"].to_numpy(dtype=float)
+    if np.isfinite(time).any():
+        return float(np.nanmax(time) - np.nanmin(time))
+    way = np.linalg.norm(np.diff(rows.command(run), axis=0), axis=1).sum()
+    return float(way / run["speed_mm_s"].iloc[0])
 
 
 def _pass(first, number, start_s, reverse, speed_mm_s, payload_kg):

@@ -8,6 +8,7 @@ import numpy as np
 from rrru.effects.causes import cause_texts
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
+from rrru.gap.run_limits import NO_PAYLOAD, WITHIN_LIMITS
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -30,6 +31,7 @@ _WORDS = DriveWords()
 # units of sentences for those of tables, and the factor: without rows of zeros
 _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
+_LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -58,6 +60,7 @@ def answer(campaign, verdict, tables, drives=_WORDS):
         "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
         "budget": budget,
         "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
+        "undecided": _undecided(verdict["undecided"], drives),
         **_row(verdict, ("points", "dropped_points")),
         "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
         "notes": [note for note in verdict["notes"].split("; ") if note],
@@ -88,7 +91,7 @@ def sentences(facts):
     said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
     said += [_missed(facts), *_causes(facts), *_scatter(facts)]
     said += _left(facts) if facts["effects"] else []
-    return [*said, *_open(facts), _next(facts)]
+    return [*said, *_open(facts), *_next(facts)]
 
 
 def readable(name):
@@ -369,16 +372,47 @@ def _open(facts):
 
 
 def _next(facts):
-    """What to measure next."""
+    """What to measure next, and what would decide where nothing that can be simulated does."""
+    said = [_undecidable(facts)] if facts["undecided"] else []
     if facts["next"]:
         best = facts["next"][0]
         what = f"measure {best['run']} (see gap_next_poses)" if best["kind"] == "poses" else f"drive {best['run']}"
-        return f"Next: {what}. That decides {_contest(best['separates'])}."
+        return [*said, f"Next: {what}. That decides {_contest(best['separates'])}."]
+    if said:
+        return said
     if facts["unexplained"]:
-        return "Next: no run is advised, since the library has nothing to test; see where the gap lies."
+        return ["Next: no run is advised, since the library has nothing to test; see where the gap lies."]
     if facts["probability"] >= OPTIONS.min_sure_probability:
-        return "Next: nothing more needs to be measured for this answer."
-    return "Next: no further run that was tried in computation would settle it."
+        return ["Next: nothing more needs to be measured for this answer."]
+    return ["Next: no further run that was tried in computation would settle it."]
+
+
+def _undecided(separates, drives):
+    """The two answers that no run decides between, and what to inspect instead of each cause; None where there are
+    none.
+    """
+    if not separates:
+        return None
+    names = sorted(set().union(*_apart(separates)))
+    inspect = [{"name": name, "inspect": cause_texts(name, drives).inspect} for name in names]
+    return {"separates": separates, "inspect": inspect}
+
+
+def _undecidable(facts):
+    """What would decide between two answers where nothing that can be simulated does: inspection of their causes."""
+    undecided = facts["undecided"]
+    limited = " within the limits" if any(note.startswith(_LIMITED) for note in facts["notes"]) else ""
+    would = " ".join(
+        f"{_initial(readable(one['name']))}: {one['inspect'] or 'add a sensor at the part itself.'}"
+        for one in undecided["inspect"]
+    )
+    first = f"Next: nothing that can be simulated{limited} would decide {_contest(undecided['separates'])}"
+    return f"{first}; inspection would. {would}"
+
+
+def _initial(text):
+    """A text with a capital first letter."""
+    return text[:1].upper() + text[1:]
 
 
 def _contest(separates):

@@ -9,7 +9,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
-from rrru.gap.advise import advise
+from rrru.gap.advise import Advice, advise
 from rrru.gap.attribute import KNOWN, STATED, UNKNOWN_NOISE, Attribution, attribute, with_arm, with_beside, with_effects
 from rrru.gap.bias import bias_notes
 from rrru.gap.budget import budget
@@ -24,6 +24,7 @@ from rrru.gap.options import OPTIONS
 from rrru.gap.posterior import Posterior
 from rrru.gap.remainder import NO_REMAINDER, followed_alike, remainder_rows
 from rrru.gap.result_notes import fit_notes, noise_notes, posterior_notes, weight_doubts, weight_notes, zero_notes
+from rrru.gap.run_limits import StatedLimits
 from rrru.gap.settings import GapSettings, Prior
 from rrru.gap.shrink import CLOSED, order_by_share, share_closed, shrink_steps
 from rrru.gap.state import State
@@ -43,7 +44,7 @@ class MeasuredRobot:
 
     mechanism: its nominal one; masses: `rrru.robots.dynamics.Masses`; noise_mm: of the instrument, per axis, None or 0
     where nobody states it, and noise_rad: of the orientations that it reads; noise_known: noise_mm is no guess within
-    30 % but right; campaign: name of the campaign, for its random stream.
+    30 % but right; campaign: name of the campaign, for its random stream; limits: what further runs may ask of it.
     """
 
     mechanism: Robot
@@ -52,6 +53,7 @@ class MeasuredRobot:
     campaign: str = ""
     noise_rad: float | None = None
     noise_known: bool = False
+    limits: StatedLimits = field(default_factory=StatedLimits)
 
 
 @dataclass(frozen=True)
@@ -96,13 +98,14 @@ def diagnose(
     steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
     case = attribution.case
     residual = case.residual(attribution.calibrated)
-    further = advise(attribution, verdict, robot.masses)
-    worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
-    excluded = left_out(case, near)
-    row = _row(attribution, verdict, steps, worst, further.runs, (robot.noise_mm, excluded))
-    ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     own = stream(settings.seed, "gap budget", robot.campaign)
     parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
+    sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
+    further = advise(attribution, verdict, robot.masses, robot.limits, sizes)
+    worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
+    excluded = left_out(case, near)
+    row = _row(attribution, verdict, steps, worst, further, (robot.noise_mm, excluded))
+    ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
     tables["gap_parameters"] = parameter_rows(attribution)
     tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
@@ -149,7 +152,7 @@ def _row(
     verdict: Verdict,
     steps: Sequence,
     worst_mm: np.ndarray,
-    further: pd.DataFrame,
+    further: Advice,
     told: tuple[float | None, pd.DataFrame],
 ) -> dict:
     """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
@@ -169,14 +172,15 @@ def _row(
         "gap_after_rms_mm": steps[-1].gap_rms_mm,
         **dict(zip(CLOSED, share_closed(steps[0], steps[-1]), strict=True)),
         **dict(zip(("worst_x_mm", "worst_y_mm", "worst_z_mm"), worst_mm.tolist(), strict=True)),
-        "next_runs": "; ".join(further["run"]),
+        "next_runs": "; ".join(further.runs["run"]),
+        "undecided": further.undecided,
         "noise_stated_mm": stated_mm or np.nan,
         "noise_correlation": noise.correlation,
         "noise_runs_mm": float(np.sqrt(noise.offset * (noise.axis_mm**2).mean())),
         "noise_from": attribution.noise_from,
         "points": case.count,
         "dropped_points": attribution.dropped,
-        "notes": _joined([*found, *_notes(attribution, stated_mm, excluded)]),
+        "notes": _joined([*found, *_notes(attribution, stated_mm, excluded), *filter(None, [further.limited])]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,

@@ -227,17 +227,24 @@ class DiagnosisOptions:
     max_mentioned_share: float = 1.5
 
     # --- experiment design: the next runs and poses ---
-    # a fast pass, the added mass, and the pause between runs; assumed
-    fast_pass_mm_s: float = 300.0
-    added_payload_kg: float = 5.0
+    # speed of a fast pass where no `limits` state it, and mass that a loaded pass adds where neither they nor the
+    # efforts of the robot's file say how much; assumed
+    default_fast_pass_mm_s: float = 300.0
+    default_added_payload_kg: float = 5.0
+    # a payload that nobody states is at most this share of what the robot itself moves, and at least so much; assumed
+    max_payload_per_moved_mass: float = 0.5
+    min_added_payload_kg: float = 0.1
+    # share of a drive's effort that a payload may bring it to: the rest is for acceleration and friction; assumed
+    max_effort_share: float = 0.8
+    # pause between runs; assumed
     pause_between_runs_s: float = 60.0
     # runs that are advised; assumed
     max_advised_runs: int = 3
     # poses at another speed or payload are worth it where they gain this many times as much; assumed
     min_gain_ratio_of_harder_poses: float = 1.1
-    # trajectories and pairs of rivals that runs are designed for, and poses of a run; assumed, bound the time
+    # trajectories and pairs of answers that runs are designed for, and poses of a run; assumed, bound the time
     max_advised_trajectories: int = 4
-    max_advised_rivals: int = 2
+    max_advised_rivals: int = 3
     max_advised_poses: int = 10
     # less expected log Bayes factor than this is not worth a run; assumed
     min_run_gain_nats: float = 0.2
@@ -246,6 +253,8 @@ class DiagnosisOptions:
     # points that are read on a short pass, and its length; assumed
     points_per_pass: int = 5
     pass_length_mm: float = 100.0
+    # a drive that turns further between two points of a pass goes round, or past a singularity; assumed
+    max_pass_step_rad: float = 0.5
     # log2 of the number of passes that are tried: 256; assumed
     tried_passes_log2: int = 8
     # a pass has at least this share of the campaign's own distance from singularities; assumed

@@ -128,6 +128,18 @@ class Posterior:
             weights = np.where(self.unexplained[rows] == unexplained, weights, -np.inf)
         return self._best(rows, weights)
 
+    def best_where(self, condition):
+        """The hypothesis of highest weight without unknown functions whose effects meet a condition, and its level.
+
+        condition: from a frozenset of names to a bool. None where there is none.
+        """
+        rows = [
+            k
+            for k, h in enumerate(self.hypotheses)
+            if h.effects.isdisjoint(UNKNOWN) and condition(frozenset(h.effects))
+        ]
+        return self._best(rows, self.log_weights[rows]) if rows else None
+
     def _best(self, rows, weights):
         """The hypothesis among some rows (k) of highest weight (k, levels), and its level (an index)."""
         row, level = np.unravel_index(weights.argmax(), weights.shape)

@@ -41,6 +41,8 @@ worst_y_mm             float  where the gap is largest, y, robot frame
 worst_z_mm             float  where the gap is largest, z, robot frame
 next_runs              str    runs that would tell the causes apart best; empty where none is needed, helps or can be
     computed
+undecided              str    the two answers, joined by ' / ', between which it matters most to decide, where nothing
+    that can be simulated would; empty elsewhere
 noise_stated_mm        float? noise per axis as the configuration states it; null where it does not
 noise_correlation      float  of the noise from point to point along a run, 0 to 1
 noise_runs_mm          float  offsets of the runs, 1 sigma per axis
@@ -227,12 +229,14 @@ gain_nats              float  expected log evidence that the run adds
 ## gap_next_poses | tables/gap_next_poses.parquet | campaign pose
 Poses that would separate effects where no further run along a trajectory of the campaign would rule a rival out. Each
 is the middle of a straight pass from rest to rest, five points of which are read, both ends included. They lie in the
-box about the measured points, clear of singularities; whether anything else is in the way there nobody has checked.
+box about the measured points, within the drives' ranges and clear of singularities; whether anything else is in the way
+there nobody has checked.
 --
 campaign
 pose                   int    1: tells most; each further one tells most beside those before it
 from_{xyz}_mm          float  where the pass begins, robot frame
 to_{xyz}_mm            float  where it ends
+command_r{xyz}_rad     float? orientation of the platform, rotation vector; null where the drives cannot choose it
 speed_mm_s             float? speed in the middle, to which the robot speeds up evenly; null where any will do
 payload_kg             float  payload
 

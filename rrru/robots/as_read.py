@@ -109,6 +109,16 @@ def _own(name):
 
 for _name in (
     *("name", "parts", "angle_arm_mm", "up", "tool_mm", "orients", "workspace_lines", "seats", "deviation_names"),
-    *("reach_mm", "size_mm", "farthest_mm", "strokes", "TRACKED", "RICHEST", "SEARCHED"),
+    *(
+        "reach_mm",
+        "size_mm",
+        "farthest_mm",
+        "strokes",
+        "effort_limits",
+        "velocity_limits",
+        "TRACKED",
+        "RICHEST",
+        "SEARCHED",
+    ),
 ):
     setattr(AsRead, _name, _own(_name))

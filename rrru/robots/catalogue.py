@@ -34,8 +34,9 @@ def searched_set(name: str) -> str:
 def make_mechanism(name: str, section: Mapping[str, Any], **options: Any) -> Robot:
     """The robot of one `robots:` entry of the configuration; raises ConfigError for an unknown robot or key.
 
-    Angles of the entry are in degrees, with keys that end in _deg.
+    Angles of the entry are in degrees, with keys that end in _deg. Its limits are no part of the robot.
     """
+    section = {key: value for key, value in section.items() if key != "limits"}
     if any(key in section for key in OWN):
         return _own(name, dict(section), options)
     if name not in MECHANISMS:

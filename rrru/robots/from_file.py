@@ -74,6 +74,7 @@ def urdf_parts(path, base=None, tip=None, home=None):
             raise assembly.error(urdf.odd[link])
     follows = of_mimics(assembly, urdf.mimics)
     servos = {move.joint: [] for move in assembly.moves.values() if move.joint not in follows}
+    assembly.limits = {known[name]: limits for name, limits in urdf.limits.items() if name in known}
     return assembly, servos, follows
 
 
@@ -103,6 +104,7 @@ def mjcf_parts(path, platform):
     home = model.key_qpos[0] if model.nkey else model.qpos0
     assembly = _assembly(model, file, 0, model.body(platform).id, home)
     servos = _servos(assembly)
+    assembly.limits = {joint: (_effort(model, joint), np.nan) for joint in servos}
     return assembly, servos, of_equalities(assembly, servos)
 
 
@@ -154,6 +156,15 @@ def _servos(assembly):
     return result
 
 
+def _effort(model, joint):
+    """Effort in N m or N that a model allows the actuators of a joint, NaN where it states none."""
+    ranges = [model.jnt_actfrcrange[joint]] if model.jnt_actfrclimited[joint] else []
+    of_joint = (model.actuator_trntype == _TRN.mjTRN_JOINT) & (model.actuator_trnid[:, 0] == joint)
+    ranges += [model.actuator_forcerange[k] for k in np.flatnonzero(of_joint) if model.actuator_forcelimited[k]]
+    efforts = [effort for effort in (float(np.abs(one).min()) for one in ranges) if effort > 0.0]
+    return min(efforts, default=np.nan)
+
+
 def _moved_by(model, k):
     """Joints that an actuator moves, None where these are not told."""
     kind, target = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
@@ -168,7 +179,8 @@ def _moved_by(model, k):
 
 def _robot(assembly, servos, follows, options):
     """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, follows by joint."""
-    known = {one.name for one in fields(GeneralRobot) if one.init} - {"legs", "parts", "lumps"}
+    read = {"legs", "parts", "lumps", "effort_limits", "velocity_limits"}
+    known = {one.name for one in fields(GeneralRobot) if one.init} - read
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
     structure = structure_of(assembly, servos, follows, options.get("up"))
@@ -182,7 +194,19 @@ def _robot(assembly, servos, follows, options):
     own = {"legs": legs, "parts": parts, "lumps": lumps_of(chains, structure.open_legs, legs)}
     own["drive_range"] = np.array([_range(assembly, move, one) for move, one in zip(each, stated, strict=False)])
     own["assumed"] = frozenset(drive.column for drive, one in zip(drives, stated, strict=True) if not one)
+    own |= _limits(assembly, each[: len(servos)])
     return GeneralRobot(**defaults | own | options)
+
+
+def _limits(assembly, moves):
+    """What a GeneralRobot has as `effort_limits` and `velocity_limits`, of the driven joints of some Moves."""
+    none = np.nan, np.nan
+    effort, velocity = np.array([assembly.limits.get(move.joint, none) for move in moves]).T
+    slides = np.array([move.kind == "P" for move in moves])
+    return {
+        "effort_limits": None if np.isnan(effort).all() else np.where(slides, effort, MM * effort),
+        "velocity_limits": None if np.isnan(velocity).all() else np.where(slides, MM * velocity, velocity),
+    }
 
 
 def _stated(assembly, move, servos):

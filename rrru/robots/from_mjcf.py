@@ -63,10 +63,13 @@ class Assembly:
     """The parts and seams of a compiled model between two of its bodies, by number, in a home pose qpos.
 
     frames: by body its part and its placement there; a part is called by the number of one body, whose frame it has.
+    limits: by joint the effort in N m or N and the velocity in rad/s or m/s that the file allows its drive, NaN where
+    none is stated.
     """
 
     def __init__(self, model, file, base, platform, qpos):
         self.model, self.file, self.base, self.platform = model, file, base, platform
+        self.limits = {}
         self.data = mujoco.MjData(model)
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(model, self.data)

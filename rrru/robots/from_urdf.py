@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 
 from rrru.errors import ConfigError
 
@@ -21,7 +22,8 @@ class Urdf:
     """A compiled URDF.
 
     children: links by their parent; parents: link by its child; odd: by child link what is wrong with its joint;
-    mimics: by joint's name the joint that it follows, factor and offset.
+    mimics: by joint's name the joint that it follows, factor and offset; limits: by joint's name its effort in N m or N
+    and its velocity in rad/s or m/s, NaN where none above zero is stated.
     """
 
     model: mujoco.MjModel
@@ -29,6 +31,7 @@ class Urdf:
     parents: dict
     odd: dict
     mimics: dict
+    limits: dict
 
 
 def read(file):
@@ -39,7 +42,7 @@ def read(file):
         raise ConfigError(f"{file}: {error}; allowed: a URDF") from None
     if robot.tag != "robot" or any("xacro" in element.tag for element in robot.iter()):
         raise ConfigError(f"{file}: its root is {robot.tag!r}; allowed: a URDF's robot, without xacro's macros")
-    children, parents, odd, mimics = {}, {}, {}, {}
+    children, parents, odd, mimics, limits = {}, {}, {}, {}, {}
     for link in robot.iter("link"):
         children.setdefault(link.get("name"), [])
         for shape in (*link.findall("visual"), *link.findall("collision")):
@@ -50,10 +53,25 @@ def read(file):
         parents[child] = parent
         if joint.get("type") not in _ALLOWED:
             odd[child] = f"joint {joint.get('name')} is of the type {joint.get('type')}; allowed: {', '.join(_ALLOWED)}"
+        limits[joint.get("name")] = _limits(joint)
         for mimic in joint.findall("mimic"):
             mimics[joint.get("name")] = mimic.get("joint"), *_numbers(joint, mimic, file)
             joint.remove(mimic)
-    return Urdf(_compiled(ElementTree.tostring(robot, encoding="unicode"), file), children, parents, odd, mimics)
+    return Urdf(
+        _compiled(ElementTree.tostring(robot, encoding="unicode"), file), children, parents, odd, mimics, limits
+    )
+
+
+def _limits(joint):
+    """Effort and velocity of a joint's limit, NaN where none is stated; files write 0 for what nobody knows."""
+    limit, result = joint.find("limit"), []
+    for key in ("effort", "velocity"):
+        try:
+            value = float(limit.get(key)) if limit is not None and limit.get(key) else np.nan
+        except ValueError:
+            value = np.nan
+        result.append(value if 0.0 < value < np.inf else np.nan)
+    return tuple(result)
 
 
 def _numbers(joint, mimic, file):

@@ -33,7 +33,8 @@ class GeneralRobot(Robot):
     drive_range (K, 2): actuator values between which it works; assumed: columns of the drives that nobody states a
     range of, which may go beyond it; parameter_set: one of SETS; lumps: point masses of its links; sample: actuator
     values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names
-    that it is chosen from, by default all; reads: what a campaign's readings leave open.
+    that it is chosen from, by default all; reads: what a campaign's readings leave open; effort_limits,
+    velocity_limits: of `Robot`.
     """
 
     name: str
@@ -51,6 +52,8 @@ class GeneralRobot(Robot):
     sample: tuple | None = None
     among: tuple[str, ...] = ()
     reads: Reads = field(default_factory=Reads)
+    effort_limits: np.ndarray | None = None
+    velocity_limits: np.ndarray | None = None
 
     TRACKED = RICHEST = "full"
     SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm

@@ -129,6 +129,7 @@ def with_hands(arms, shared, carries=None):
         "drive_range": ranges,
         "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),
         "lumps": _lumps([*arms.values()], shared),
+        **{name: _limits(arms.values(), name, drives) for name in ("effort_limits", "velocity_limits")},
     }
     return HandedRobot(**options | own)
 
@@ -143,6 +144,15 @@ def _drives(arms):
             ranges.setdefault(drive.column, own)
             homes.setdefault(drive.column, home)
     return drives, np.array([*ranges.values()]), np.array([*homes.values()])
+
+
+def _limits(arms, name, columns):
+    """One of `effort_limits` and `velocity_limits` of arms, by the columns of all drives; None where no arm has any."""
+    known = {}
+    for arm in arms:
+        if (limits := getattr(arm, name)) is not None:
+            known |= dict(zip(arm.parts.columns, limits, strict=True))
+    return np.array([known.get(column, np.nan) for column in columns]) if known else None
 
 
 def shared_joints(arms):

@@ -46,6 +46,10 @@ class Robot(ABC):
     SEARCHED: str
     up = (0.0, 0.0, 1.0)
     tool_mm = (0.0, 0.0, 0.0)
+    # loads in N mm or N, and rates in rad/s or mm/s, that its file allows the drives (K,), NaN of a drive without one;
+    # None where it states none
+    effort_limits: FloatArray | None = None
+    velocity_limits: FloatArray | None = None
     # whether its drives can orient its platform beside moving it
     orients = False
     # whether positions and their slopes are found without poses

@@ -9,8 +9,8 @@ from pathlib import Path
 from rrru.errors import ConfigError
 from rrru.objects import module_file
 
-# what of a campaign's section only drives it
-_DRIVEN = ("trajectories", "passes", "advised_by")
+# what of a campaign's section only drives it, or limits what is driven next
+_DRIVEN = ("trajectories", "passes", "advised_by", "limits")
 
 
 def part(config, *keys):
@@ -32,6 +32,8 @@ def robot(config, section):
     """
     name = section["robot"]
     dimensions = {**config["robots"].get(name, {}), **section.get("dimensions", {})}
+    # what it may be asked to do makes it no other robot
+    dimensions.pop("limits", None)
     own = own_robot_file(dimensions)
     # a robot of the user's own changes with its file
     digest = {"digest": hashlib.sha256(own.read_bytes()).hexdigest()} if own and own.is_file() else {}
@@ -41,6 +43,14 @@ def robot(config, section):
     if section.get("frame") == "register":
         chosen["registered"] = True
     return chosen
+
+
+def limits(config, section):
+    """What further runs of a campaign's section may ask of its robot, as `rrru.gap.run_limits.StatedLimits` has it.
+
+    Key by key the campaign's own, else the robot's.
+    """
+    return {**config["robots"].get(section["robot"], {}).get("limits", {}), **section.get("limits", {})}
 
 
 def own_robot_file(dimensions):

@@ -31,7 +31,13 @@ _SHARES = {"share_closed": 0.96, "share_closed_low": 0.94, "share_closed_high": 
 
 def gap_verdicts(campaign, effects="link_flexure+backlash", **changes):
     """`gap_verdicts` of one campaign."""
-    texts = {"confusable_with": "drive_compliance", "groups": "", "next_runs": NEXT, "noise_from": "repeats"}
+    texts = {
+        "confusable_with": "drive_compliance",
+        "groups": "",
+        "next_runs": NEXT,
+        "undecided": "",
+        "noise_from": "repeats",
+    }
     texts |= {"notes": "", "not_in_model": "", "no_answer": "", "file_remainder": "", "file_headline": ""}
     texts["where"] = "leg 2 wrist, leg 1 drive to leg 3 drive"
     numbers = {"probability": 0.97, "leg": 2, "noise_rms_mm": NOISE_MM, "gap_rms_mm": 0.37, "gap_after_rms_mm": 0.02}

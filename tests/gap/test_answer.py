@@ -17,6 +17,7 @@ from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.drive_words import DriveWords, drive_words
 from rrru.store import facts
+from rrru.studies.withheld.sentences import claims
 from tests.figures import synthetic_gap
 from tests.figures import synthetic_tables as synthetic
 from tests.places import ROOT
@@ -153,6 +154,30 @@ def test_what_the_advised_run_decides_is_said_to_be_open(separates, left_open, d
     """Also where no rival alone is probable enough to be named."""
     said = answered(runs=[(*RUN[:-2], separates, 3.0)], confusable_with="")["sentences"]
     assert f"These data cannot rule out: {left_open}." in said and said[-1].endswith(f"That decides {decided}.")
+
+
+def test_where_no_run_decides_the_inspection_that_would_is_said():
+    facts_of = answered(undecided="backlash+link_flexure / backlash+servo_lag", probability=0.5)
+    last = facts_of["sentences"][-1]
+    flexure, lag = (cause_texts(name).inspect for name in ("link_flexure", "servo_lag"))
+    assert last == (
+        "Next: nothing that can be simulated would decide between link flexure and servo lag; inspection would. "
+        f"Link flexure: {flexure} Servo lag: {lag}"
+    )
+    assert claims._of_text(last, claims._SENTENCES)[0].kind == "next, nothing would decide"
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+def test_a_run_that_decides_something_else_follows_what_nothing_decides():
+    note = "no run with a payload is proposed, the robot moves 2 kg itself: state limits.payload_kg"
+    facts_of = answered(runs=(RUN,), undecided="my_own / none", probability=0.5, notes=note)
+    first, last = facts_of["sentences"][-2:]
+    assert first == (
+        "Next: nothing that can be simulated within the limits would decide whether my own acts; inspection would. "
+        "My own: add a sensor at the part itself."
+    )
+    assert last.startswith("Next: drive line_1 in reverse.")
+    assert claims._of_text(note, claims._NOTES)[0].kind == "runs are limited"
 
 
 def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():

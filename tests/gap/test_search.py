@@ -17,12 +17,14 @@ from rrru.gap.evidence import averaged
 from rrru.gap.hypothesis import Hypothesis
 from rrru.gap.model_fit import fit_model
 from rrru.gap.model_space import explore
+from rrru.gap.run_limits import StatedLimits
 from rrru.gap.settings import Prior
 from rrru.gap.state import State
 from rrru.gap.terms import Term, spread, variants
-from rrru.gap.verdict import decide
+from rrru.gap.verdict import Group, decide
 from rrru.gap.whitened import LEVELS
 from rrru.parameters import ParameterSet
+from rrru.robots.dynamics import Masses
 from tests.gap.campaigns import (
     EFFECTS,
     FORWARD,
@@ -197,6 +199,26 @@ def test_a_payload_is_advised_where_only_a_payload_tells(twins):
     assert (table["payload_kg"] > 0.0).all() and len(table) and table["gain_nats"].is_monotonic_decreasing
     assert table["now_nats"].iloc[0] < 0.01 * table["gain_nats"].iloc[0]
     assert table["run"].str.contains("5 kg payload").all()
+
+
+def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_said(twins):
+    found, verdict, _ = twins
+    none = advise(found, verdict, MASSES, StatedLimits(payload_kg=0.0))
+    sides = [set(side.split("+")) for side in none.undecided.split(" / ")]
+    assert sides[0] ^ sides[1] == TWINS and not none.runs["separates"].eq(none.undecided).any()
+    assert none.limited == "runs are proposed within the limits payload_kg 0"
+    light = advise(found, verdict, Masses(0.5, 0.1, 0.1))
+    assert light.undecided == none.undecided and light.limited.startswith("no run with a payload is proposed, ")
+    sure = advise(found, replace(verdict, probability=0.95), MASSES, StatedLimits(payload_kg=0.0))
+    assert sure.undecided == ""
+
+
+def test_runs_that_split_a_group_come_before_those_that_tell_more_of_something_else(twins):
+    found, verdict, _ = twins
+    group = Group(tuple(sorted(TWINS)), 0.99)
+    told = advise(found, replace(verdict, effects=("drive_compliance",), groups=(group,)), MASSES).runs
+    first = told["separates"] == "drive_compliance / own_weight"
+    assert first.iloc[0] and told.loc[first, "gain_nats"].is_monotonic_decreasing
 
 
 def _columns(library, linear, hypothesis):

@@ -533,3 +533,22 @@ def test_options_reach_the_robot():
     assert robot.name == "mine" and lengths[:6] == [100.0] * 6 and set(lengths[6:]) == {2.0}
     np.testing.assert_allclose(robot.forward(np.zeros((1, 6)))[0], [0.0, 0.0, 540.0], atol=1e-9)
     assert len(robot.parameters.names) == 42 or robot.gauge
+
+
+def test_efforts_and_velocities_that_a_file_allows_are_those_of_the_drives(tmp_path):
+    arm = from_urdf(ARM)
+    np.testing.assert_allclose(arm.velocity_limits, [2.4, 2.4, 2.8, 5.0, 5.0, 7.0])
+    np.testing.assert_allclose(arm.effort_limits, [250e3, 250e3, 140e3, 40e3, 40e3, 20e3])
+    text = ARM.read_text().replace('effort="250" velocity="2.4"', 'effort="0" velocity="0"')
+    unknown = from_urdf(file_of(tmp_path, text, "unknown.urdf"))
+    assert np.isnan(unknown.velocity_limits[:2]).all() and np.isnan(unknown.effort_limits[:2]).all()
+    assert unknown.velocity_limits[2] == 2.8
+
+
+def test_the_force_that_an_mjcf_allows_a_servo_is_its_effort(tmp_path):
+    assert from_mjcf(HEXAPOD, "plate").effort_limits is None
+    limits = '<position forcelimited="true" forcerange="-400 300" name="servo1"'
+    limited = HEXAPOD.read_text().replace('<position name="servo1"', limits)
+    robot = from_mjcf(file_of(tmp_path, limited, "limited.xml"), "plate")
+    assert robot.effort_limits[0] == 300.0 and np.isnan(robot.effort_limits[1:]).all()
+    assert robot.velocity_limits is None

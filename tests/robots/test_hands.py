@@ -201,6 +201,8 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
     drives = robot.legs.per_actuator(load)
     np.testing.assert_allclose(drives, _motion().drive_load[:, order], rtol=1e-5, atol=0.1)
     assert sum(lump.mass_kg for lump in robot.lumps) == pytest.approx(sum(mass for _, (mass, _) in two_arms.masses()))
+    np.testing.assert_array_equal(robot.velocity_limits, np.ones(len(order)))
+    np.testing.assert_array_equal(robot.effort_limits, np.full(len(order), 1e3))
 
 
 def test_a_key_says_what_a_hand_carries():

@@ -92,6 +92,19 @@ def test_a_broken_configuration_is_taken_or_refused(monkeypatch):
             "campaigns: {mine: {robot: rrru3, ingest: a.csv, motion: {kind: continuous, path: tool}}}",
             "'path' was unexpected); allowed: kind, between",
         ),
+        (
+            "robots: {rrru3: {limits: {payload_kg: -1.0}}}",
+            "robots.rrru3.limits.payload_kg: -1.0 is less than the minimum",
+        ),
+        (
+            "robots: {ur10: {limits: {speed: 250.0}}}",
+            "robots.ur10.limits: Additional properties are not allowed ('speed' was unexpected); did you mean",
+        ),
+        (
+            "campaigns: {mine: {robot: rrru3, ingest: a.csv, limits: {minutes: 0}}}",
+            "campaigns.mine.limits.minutes: 0 is less than or equal to the minimum of 0",
+        ),
+        ("campaigns: {crooked: {limits: {}}}", "campaigns.crooked.limits: {} should be non-empty"),
         ("campaigns: {mine: {robot: rrru3, virtual: crooked}}", "'trajectories' is a required property"),
         ("campaigns: {mine: {robot: rrru3}}", "a measured one has `ingest: file.csv` instead"),
         ("gap: {zzz: 3}", "; allowed: effects"),

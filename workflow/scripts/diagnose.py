@@ -6,6 +6,7 @@ from rrru.campaign.noise import read_noise
 from rrru.figures.drawing import draw_all
 from rrru.gap.answer import answer
 from rrru.gap.diagnose import MeasuredRobot, diagnose
+from rrru.gap.run_limits import StatedLimits
 from rrru.gap.schemas import TABLES, tables_of
 from rrru.gap.settings import GapSettings
 from rrru.robots.drive_words import drive_words
@@ -21,7 +22,8 @@ def main(settings, inputs, outputs):
     nominal = setup.measured_robot(settings["robot"], measurements)
     noise = {key: settings[key] for key in ("noise_mm", "noise_rad", "noise_known")}
     noise["noise_mm"] = noise["noise_mm"] or read_noise(measurements)
-    robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], **noise)
+    limits = StatedLimits.from_config(settings["limits"])
+    robot = MeasuredRobot(nominal, masses, campaign=settings["campaign"], limits=limits, **noise)
     chosen = GapSettings.from_config(settings["gap"], settings["seed"], settings["use_near_singularity"])
     result = diagnose(measurements, robot, chosen)
     if "corrected" in outputs:

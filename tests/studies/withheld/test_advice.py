@@ -64,7 +64,8 @@ def test_the_robot_that_drives_on_is_the_one_that_was_measured(robot):
 
 def test_poses_are_driven_one_by_one(robot):
     measurements = robot.measured(CONDITIONS)
-    start, end = (ends[:3] for ends in passes(measurements, CONDITIONS.mechanism))
+    found = passes(measurements, CONDITIONS.mechanism)
+    start, end = found.start_mm[:3], found.end_mm[:3]
     listed = {**rows.vector_columns("from", start), **rows.vector_columns("to", end)}
     run = {"kind": "poses", "trajectory": "poses", "reverse": False, "speed_mm_s": 80.0, "payload_kg": 5.0}
     longer, runs = advice.drive(robot, _arm(measurements, poses=listed), run, CONDITIONS, np.random.default_rng(0))

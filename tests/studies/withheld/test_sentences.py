@@ -67,6 +67,17 @@ _CASES = [
     ("a cause with a size", ({"name": "backlash"}, {}, _FACTS), ({"name": "backlash"}, _UNKNOWN, _FACTS)),
     ("a cause without a share", ({"name": "backlash"}, {}, _FACTS), ({"name": "axis tilt"}, {}, _FACTS)),
     ("the corrected file is worse", ({}, {"file_mm": 0.59}, _FACTS), ({}, {}, _FACTS)),
+    ("a cause by its share", ({"name": "servo lag or backlash"}, {}, _FACTS), ({"name": "servo lag"}, {}, _FACTS)),
+    (
+        "a group of causes",
+        ({"listed": "servo lag 0.60, backlash 0.38"}, {}, _FACTS),
+        ({"listed": "servo lag 0.60, axis tilt less than 0.01"}, {}, _FACTS),
+    ),
+    (
+        "probability of a cause",
+        ({"name": "backlash", "probability": "0.95"}, {}, _FACTS),
+        ({"name": "servo lag", "probability": "more than 0.99"}, {}, _FACTS),
+    ),
     ("shares are not determined", ({}, {"before_mm": 0.02}, _FACTS), ({}, {}, _FACTS)),
     (
         "shares overlap",
@@ -81,6 +92,11 @@ _CASES = [
     ("what is left with it", ({"value": "0.011"}, {}, _FACTS), ({"value": "0.05"}, {}, _FACTS)),
     ("next, a run", ({"run": "stops in reverse"}, {}, _FACTS), ({"run": "line_9 once more"}, {}, _FACTS)),
     ("next, none is advised", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
+    (
+        "next, nothing would decide",
+        ({"contest": "between backlash and servo lag"}, {}, _FACTS),
+        ({"contest": "whether servo lag acts"}, {}, _FACTS),
+    ),
     ("next, nothing more", ({}, {}, _FACTS), ({}, _UNKNOWN, _FACTS)),
     (
         "a zero is off",
@@ -216,6 +232,7 @@ _CASES = [
 # kinds that say nothing that could be false
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
+    *("runs are limited", "causes by share"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
     "a reflector is assumed",
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),

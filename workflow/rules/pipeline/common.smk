@@ -125,6 +125,7 @@ def diagnosed(wildcards):
         "noise_mm": section.get("noise_mm") or None,
         "noise_rad": section.get("noise_rad"),
         "noise_known": section.get("noise_known", False),
+        "limits": parts.limits(config, section),
         "use_near_singularity": config["calibration"]["use_near_singularity"],
         "figures": GAP_FIGURES,
         "options": {"campaign": wildcards.campaign},

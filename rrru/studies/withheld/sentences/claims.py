@@ -62,6 +62,8 @@ _SENTENCES = {
     "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That decides (?P<contest>.*)\.",
     "next, none is advised": r"Next: no run is advised.*",
     "next, nothing more": r"Next: nothing more needs to be measured for this answer\.",
+    "next, nothing would decide": r"Next: nothing that can be simulated(?: within the limits)? would decide "
+    r"(?P<contest>[^;]*); inspection would\. .*",
     "next, nothing would settle it": r"Next: no further run that was tried in computation would settle it\.",
 }
 # kinds of notes of the diagnosis and of what a corrected file cannot hold
@@ -86,6 +88,7 @@ _NOTES = {
     "an effect is a calibration's number": r"(?P<name>\w+) not tested: the calibration's own parameters take it up",
     "an effect is absorbed": r"(?P<name>\w+) not tested: the calibration takes it up entirely on these points",
     "an effect is not tested": r"(?P<name>\w+) not tested: .*",
+    "runs are limited": r"no run with a payload is proposed, .*|runs are proposed within the limits .*",
     "the file leaves": rf"the corrected file leaves {_X} mm rms at the readings, the diagnosis {_Y} mm",
     "the file would be worse": rf"not corrected: it would miss by {_X} mm rms, the file as it came misses by {_Y} mm",
     "the file is not corrected": r"not corrected: .*",

@@ -402,6 +402,14 @@ def _next_run(stated, truth, _facts):
     return stated["run"].startswith(("stops", "poses")) or bool(re.match(r"\d+ poses", stated["run"]))
 
 
+def _next_inspection(stated, truth, _facts):
+    """What acts is one of the causes that no run would decide between; nothing shows where it could not be seen."""
+    words = re.sub(r"^(?:between|whether) | acts$", "", stated["contest"])
+    if _one_of(re.split(r" and | \+ ", words), truth):
+        return True
+    return False if truth.outside or truth.chi2 > _SEEN else None
+
+
 def _turned(stated, _truth, _facts):
     """The instrument's orientations are those of the platform, but for the robot's own errors."""
     return float(stated["value"]) <= _NEAR_TURN_RAD
@@ -443,6 +451,7 @@ _JUDGES = {
     "next, a run": _next_run,
     "next, none is advised": _unexplained,
     "next, nothing more": _next_nothing,
+    "next, nothing would decide": _next_inspection,
     "next, nothing would settle it": _undecided,
     "a zero is off": _zero,
     "a zero is confounded": _undecided,
@@ -463,6 +472,7 @@ _JUDGES = {
     "an effect is a calibration's number": lambda stated, t, _: stated["name"] not in t.effects,
     "an effect is absorbed": _absorbed,
     "an effect is not tested": _undecided,
+    "runs are limited": _undecided,
     "the file leaves": _file_leaves,
     "the file would be worse": _file_worse,
     "the file is not corrected": _undecided,
