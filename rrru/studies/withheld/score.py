@@ -9,12 +9,13 @@ import pandas as pd
 from rrru.effects.library import HOLDS
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
+from rrru.studies.withheld.causes import causes_of, empty_causes
 from rrru.studies.withheld.members import fresh_runs, robot_of
 from rrru.studies.withheld.numbers import held
 from rrru.studies.withheld.oracle import Limits, limits, of_displacement, with_truth
 from rrru.studies.withheld.parts import is_enough, parts
 from rrru.studies.withheld.states import state_of
-from rrru.studies.withheld.verdicts import PLANTS, is_right, scores
+from rrru.studies.withheld.verdicts import PLANTS, SEVERAL_CAUSES, is_right, scores
 
 _LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
 # checks of one or two causes under the stated noise, whose limits are computed
@@ -22,21 +23,22 @@ _LIMITED = ("label", "effect", *PLANTS)
 
 
 class Scored(NamedTuple):
-    """Frames `withheld_scores`, `withheld_limits` and `withheld_parts`."""
+    """Frames `withheld_scores`, `withheld_limits`, `withheld_parts` and `withheld_causes`."""
 
     scores: pd.DataFrame
     limits: pd.DataFrame
     parts: pd.DataFrame
+    causes: pd.DataFrame
 
 
-def score_chunk(answers, measurements, verdicts, states, budget, known):
-    """What is Scored of the robots of a chunk from the five frames about them.
+def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
+    """What is Scored of the robots of a chunk from the six frames about them.
 
     known: what is Known of their robots by the entry of their files, with an empty name of our own.
     """
     told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
-    points, found = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget))
-    measured, listed = [], []
+    points, found, on_causes = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget, stated))
+    measured, listed, causes = [], [], []
     for row in told.to_dict("records"):
         name, robot = row["robot"], robot_of(row["drawn"])
         about = known[robot.file]
@@ -44,14 +46,18 @@ def score_chunk(answers, measurements, verdicts, states, budget, known):
         own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
         measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, robot, own)})
         listed.append(own.assign(check=row["check"], robot=name))
+        if name in on_causes:
+            causes.append(causes_of(on_causes[name], robot).assign(check=row["check"]))
     told = told.assign(**pd.DataFrame(measured, index=told.index))
     limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
-    return Scored(scores(told), limited, pd.concat(listed, ignore_index=True))
+    # where readings allow no effect to be tested nothing is stated
+    stated_causes = pd.concat(causes or [empty_causes()], ignore_index=True)
+    return Scored(scores(told), limited, pd.concat(listed, ignore_index=True), stated_causes)
 
 
 def _right(row, robot, listed):
     """Whether the verdict of a row on a robot is right; listed: the robot's rows of `withheld_parts`."""
-    if row["check"] == "many":
+    if row["check"] in SEVERAL_CAUSES:
         return is_enough(listed, row["strength"])
     effects = row["effects"]
     if robot.file:
