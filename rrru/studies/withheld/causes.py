@@ -72,6 +72,11 @@ def group_size(group):
     return (group.str.count(f"[{BETWEEN.strip()}]") + 1).where(group != "", 0)
 
 
+def groups_of(stated):
+    """Groups of causes that cannot be told apart, each a tuple of names, from rows of `withheld_stated`."""
+    return [tuple(group.split(BETWEEN)) for group in stated["group"].unique() if group]
+
+
 def named_lines(causes):
     """Causes and groups that verdicts name, from `withheld_causes`: a row each, with its size and whether it is there.
 

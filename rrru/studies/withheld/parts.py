@@ -61,13 +61,16 @@ def _true(robot, taken_out):
     return [*rows, (UNEXPLAINED, UNEXPLAINED, float(np.linalg.norm(unknown)))]
 
 
-def is_enough(listed, strength):
+def is_enough(listed, strength, groups=()):
     """Whether a verdict on many causes names all that matter and nothing that is not there.
 
-    listed: rows of `withheld_parts` of the robot; strength: of its whole gap.
+    listed: rows of `withheld_parts` of the robot; strength: of its whole gap; groups: of causes that the verdict cannot
+    tell apart, each a tuple of names. A group one of whose members acts names those that act, and nothing else.
     """
     cause, kind = listed["kind"].isin(CAUSES), listed["kind"]
+    acting = set(listed.loc[listed["strength"] > 0.0, "part"])
+    in_group = listed["part"].isin([name for group in groups if acting & set(group) for name in group])
     matter = (kind == "effect") & (listed["strength"] >= _LEAST_SHARE * strength)
     matter |= (kind == UNEXPLAINED) & (listed["strength"] >= _CLEAR)
-    invented = listed["named"] & cause & (listed["strength"] == 0.0)
-    return bool(listed.loc[matter, "named"].all() and not invented.any())
+    invented = listed["named"] & cause & (listed["strength"] == 0.0) & ~in_group
+    return bool((listed["named"] | in_group)[matter].all() and not invented.any())

@@ -100,8 +100,9 @@ Each verdict beside the truth.
 check robot kind file cause truth truth_leg strength
 verdict                str    the diagnosis's effects
 right                  bool   it names exactly the truth or, where the library lacks that, says unexplained;
-    background: joint_axis_error may be named; many and as_robots_are: it names all causes of 30 % of the gap, nothing
-    that is not there, and unexplained for a cause from outside of twice the noise
+    background: joint_axis_error may be named; many and as_robots_are: it names all causes of 30 % of the gap, alone or
+    in a group, nothing that is not there, of groups none without a member that acts, and unexplained for a cause from
+    outside of twice the noise
 leg_right              float? 1 where the leg is right, 0 where not; null where there is none to name
 probability            float  that the diagnosis gave its verdict, 0 to 1
 oracle_detects

@@ -9,7 +9,7 @@ import pandas as pd
 from rrru.effects.library import HOLDS
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
-from rrru.studies.withheld.causes import causes_of, empty_causes
+from rrru.studies.withheld.causes import causes_of, empty_causes, groups_of
 from rrru.studies.withheld.members import fresh_runs, robot_of
 from rrru.studies.withheld.numbers import held
 from rrru.studies.withheld.oracle import Limits, limits, of_displacement, with_truth
@@ -44,10 +44,12 @@ def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
         about = known[robot.file]
         taken_out = row["truth"] if row["check"] == "effect" else ""
         own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
-        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, robot, own)})
+        on_own = on_causes.get(name, empty_causes())
+        right = _right(row, robot, own, groups_of(on_own))
+        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": right})
         listed.append(own.assign(check=row["check"], robot=name))
-        if name in on_causes:
-            causes.append(causes_of(on_causes[name], robot).assign(check=row["check"]))
+        if len(on_own):
+            causes.append(causes_of(on_own, robot).assign(check=row["check"]))
     told = told.assign(**pd.DataFrame(measured, index=told.index))
     limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
     # where readings allow no effect to be tested nothing is stated
@@ -55,10 +57,13 @@ def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
     return Scored(scores(told), limited, pd.concat(listed, ignore_index=True), stated_causes)
 
 
-def _right(row, robot, listed):
-    """Whether the verdict of a row on a robot is right; listed: the robot's rows of `withheld_parts`."""
+def _right(row, robot, listed, groups):
+    """Whether the verdict of a row on a robot is right.
+
+    listed: the robot's rows of `withheld_parts`; groups: of causes that the verdict cannot tell apart.
+    """
     if row["check"] in SEVERAL_CAUSES:
-        return is_enough(listed, row["strength"])
+        return is_enough(listed, row["strength"], groups)
     effects = row["effects"]
     if robot.file:
         effects = "+".join(name for name in effects.split("+") if name not in robot.beside) or effects

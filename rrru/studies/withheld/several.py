@@ -24,7 +24,9 @@ from rrru.studies.withheld.draw import (
 from rrru.studies.withheld.faults import OUTSIDE_OF_ANY, Fault, kind_of
 from rrru.studies.withheld.outside import drawn_effects
 
-# draws of a cause's strength and ratios before another cause is drawn, and how far the strength may end off the drawn
+# a calibration of all numbers takes these up but for terms of second order
+_CALIBRATED = ("frame_misregistration", "tool_offset")
+# draws of a cause's strength and ratios before another cause is drawn, and how far its gap may be off the drawn one
 _TRIES, _OFF = 3, 0.1
 
 
@@ -37,7 +39,7 @@ def draw(member, conditions):
     robot = bare(member, generator, conditions)
     count, outside = count_of_causes(generator), has_outside(member.number)
     for _ in range(foreign.DRAWS):
-        effects = list(drawn_effects(library(conditions.mechanism)))
+        effects = [name for name in drawn_effects(library(conditions.mechanism)) if name not in _CALIBRATED]
         acting = _some(robot, effects, count, generator, conditions)
         acting += _some(robot, OUTSIDE_OF_ANY, int(outside), generator, conditions)
         drawn = replace(robot, acting=acting)
@@ -73,7 +75,7 @@ def _some(robot, names, count, generator, conditions):
 def _cause(robot, name, generator, conditions):
     """A cause of a strength drawn log-uniform from MANY, or None where no draw has it.
 
-    What a calibration takes up but for terms of second order has none of its strengths.
+    What a calibration takes up but for terms of second order is none: its gap is not twice as large for twice the size.
     """
     coordinates = kind_of(name).law(conditions.mechanism).coordinates
     for _ in range(_TRIES):
@@ -83,7 +85,9 @@ def _cause(robot, name, generator, conditions):
             fault = foreign.sized(robot, Fault(name, one.coordinates, one.shape), strength, conditions)
         except (SimulationError, UnreachableError):
             continue
-        alone = foreign.gap_over_noise(replace(robot, acting=(fault,)), conditions)
-        if abs(alone - strength) < _OFF * strength:
+        alone, half = (
+            foreign.gap_over_noise(replace(robot, acting=(fault.scaled(factor),)), conditions) for factor in (1.0, 0.5)
+        )
+        if max(abs(alone - strength), abs(2.0 * half - strength)) < _OFF * strength:
             return replace(fault, strength=alone)
     return None

@@ -14,6 +14,7 @@ from rrru.studies.withheld.causes import (
     causes_of,
     counted,
     group_size,
+    groups_of,
     log_loss,
     named_lines,
 )
@@ -83,6 +84,7 @@ def test_a_group_is_one_statement_and_there_where_one_of_its_members_acts():
         *((name, 0.3, "group", other) for name in other.split(" | ")),
         *(("link_flexure", 0.9, "named", ""), ("thermal_growth", 0.2, "possible", "")),
     )
+    assert groups_of(table) == [tuple(group.split(" | ")) for group in (pair, other)]
     assert group_size(table["group"]).tolist() == [2, 2, 3, 3, 3, 0, 0]
     lines = named_lines(table.assign(acts=table["effect"] == "leg_asymmetry")).set_index("line")
     assert lines["size"].to_dict() == {pair: 2, other: 3, "link_flexure": 1}

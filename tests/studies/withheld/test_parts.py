@@ -122,6 +122,20 @@ def test_many_causes_need_those_that_matter_and_nothing_invented(entries, right)
     assert is_enough(_listed(*entries), 10.0) is right
 
 
+@pytest.mark.parametrize(
+    ("entries", "right"),
+    [
+        # the group's first member is in the verdict, the other acts
+        ([("a", "effect", 4.0, False), ("b", "effect", 0.0, True)], True),
+        ([("a", "background", 1.0, False), ("b", "effect", 0.0, True)], True),
+        ([("c", "effect", 4.0, True), ("b", "effect", 0.0, True)], False),
+        ([("a", "effect", 4.0, False), ("b", "effect", 0.0, True), ("c", "effect", 0.0, True)], False),
+    ],
+)
+def test_a_group_is_right_where_one_of_its_members_acts(entries, right):
+    assert is_enough(_listed(*entries), 5.0, [("b", "a")]) is right
+
+
 def _score(check, robot, truth, verdict, right, strength):
     """A row of `withheld_scores`."""
     base = {"kind": "full", "truth_leg": 0, "leg_right": np.nan, "probability": 0.9, "oracle_detects": False}
