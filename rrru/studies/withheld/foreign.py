@@ -213,6 +213,9 @@ def sized(robot, fault, strength, conditions):
         if not gap > _NOTHING:
             raise UnreachableError(f"{robot.name}: a calibration takes up {fault.kind} of {fault.sizes}")
         fault = fault.scaled(strength / gap)
+        # far beyond its bounds it is not simulated: no calibration fits such readings
+        if fault.scaled(0.5).beyond(conditions.mechanism):
+            break
     if fault.beyond(conditions.mechanism):
         raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} is more than its law allows")
     return fault
