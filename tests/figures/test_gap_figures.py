@@ -188,7 +188,7 @@ def test_both_plants_stand_beside_each_other():
     figure = draw("withheld_plants", frames)
     for check, title in (("mujoco", "robots, driven by MuJoCo"), ("own", "robots, the same, own plant")):
         assert sum(map(int, written(panel(figure, title)))) == (frames["withheld_scores"]["check"] == check).sum() > 0
-    labels = {line.get_label() for line in panel(figure, "stated probability").lines}
+    labels = {line.get_label() for line in panel(figure, "strength").lines}
     assert {"driven by MuJoCo", "the same, own plant"} <= labels and "label withheld" not in labels
 
 
@@ -203,13 +203,26 @@ def test_every_verdict_has_a_column(verdict, column):
 def test_shares_are_of_the_scores():
     scores = made_up.withheld_scores()
     figure = draw("withheld", made_up.withheld_tables(scores))
-    axes = panel(figure, "stated probability")
-    sure = scores.query("check == 'label' and probability >= 0.97")
-    line = next(one for one in axes.lines if one.get_label() == "label withheld")
-    assert line.get_ydata()[-1] == pytest.approx(sure["right"].mean())
+    line = next(one for one in panel(figure, "strength").lines if one.get_label() == "label withheld")
+    strong = scores.query("check == 'label' and 12 <= strength < 25")
+    assert line.get_ydata()[-1] == pytest.approx(strong["right"].mean())
     oracle = next(one for one in panel(figure, "strength").lines if one.get_label().startswith("detected"))
     weak = scores.query("check == 'label' and 0.3 <= strength < 0.6")
     assert oracle.get_ydata()[0] == pytest.approx(weak["oracle_detects"].mean())
+
+
+def test_reliability_of_causes_is_drawn_check_by_check_with_the_number_of_statements():
+    frames = made_up.withheld_tables()
+    figure = draw("withheld", frames)
+    for check, title in (("label", "causes, label withheld"), ("as_robots_are", "causes, as robots are")):
+        axes = panel(figure, title)
+        causes = frames["withheld_causes"].query(f"check == '{check}'")
+        *numbers, whole = written(axes)
+        assert len(numbers) == 10 and sum(map(int, numbers)) == len(causes)
+        assert whole.startswith(f"{len(causes)} statements, error 0.")
+        sure = causes[causes["probability"] >= 0.9]
+        assert axes.lines[-1].get_xdata()[-1] == pytest.approx(sure["probability"].mean())
+        assert axes.lines[-1].get_ydata()[-1] == pytest.approx(sure["acts"].mean())
 
 
 def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
@@ -217,7 +230,8 @@ def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
     for check in scores["check"].unique():
         name = "withheld_plants" if check in PLANTS else "withheld"
         figure = draw(name, made_up.withheld_tables(scores[scores["check"] == check]))
-        assert len(figure.axes) == (5 if check in ("many", "noise", *PLANTS) else 4)
+        count = 5 if check in ("many", "noise", "as_robots_are", *PLANTS) else 3 if check == "field" else 4
+        assert len(figure.axes) == count
     with pytest.raises(ConfigError, match="withheld_scores"):
         draw("withheld", made_up.withheld_tables(scores.iloc[:0]))
 
@@ -225,7 +239,7 @@ def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
 def test_parts_are_drawn_found_against_true():
     frames = made_up.withheld_tables()
     figure = draw("withheld", frames)
-    for check, title in (("many", "the gap, many causes"), ("noise", "the gap, noise not")):
+    for check, title in (("many", "parts, many causes"), ("noise", "parts, noise not")):
         parts = frames["withheld_parts"].query(f"check == '{check}' and kind == 'scatter' and named")
         line = next(one for one in panel(figure, title).lines if one.get_label() == "scatter")
         np.testing.assert_allclose(sorted(line.get_xdata()), sorted(parts["true_rms_mm"].clip(withheld._LEAST_MM)))

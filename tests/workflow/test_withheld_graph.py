@@ -51,6 +51,7 @@ def test_no_diagnosis_is_given_an_answer(jobs):
             assert {Path(path).stem for path in inputs} == {"withheld_measurements"}
             assert {Path(path).stem for path in outputs} == {
                 "withheld_verdicts",
+                "withheld_stated",
                 "withheld_states",
                 "withheld_budget",
             }
@@ -82,6 +83,7 @@ def test_no_code_of_the_diagnosis_knows_how_robots_are_drawn(script):
         "__init__",
         "numbers",
         "schemas",
+        "stated",
         "states",
         *(("beliefs", "rivals", "verdicts") if "beliefs" in script else ()),
     }

@@ -11,14 +11,15 @@ from rrru.store.job import run
 from rrru.studies import setup
 from rrru.studies.withheld.numbers import fitted
 from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.withheld.stated import stated
 from rrru.studies.withheld.states import VERDICT, state_row
 
 
 def main(settings, inputs, outputs):
-    """Write verdicts, states and budgets of a chunk."""
+    """Write verdicts, statements on causes, states and budgets of a chunk."""
     library = GapSettings.from_config(settings["gap"], settings["seed"])
     noise_mm = settings["withheld"]["noise_mm"]
-    verdicts, states, budgets = [], [], []
+    verdicts, causes, states, budgets = [], [], [], []
     for (name, kind), rows in tables.read(inputs["withheld_measurements"]).groupby(["robot", "kind"], sort=False):
         points = rows.drop(columns=["robot", "kind"]).reset_index(drop=True)
         check, taken_out, file = settings["robots"][name]
@@ -27,12 +28,14 @@ def main(settings, inputs, outputs):
         robot = setup.measured_robot(told["robot"], points) if file else setup.mechanism(told["robot"])
         result = diagnose(points, MeasuredRobot(robot, Masses(**told["masses"]), noise_mm, name), known, details=False)
         verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
+        causes.append(stated(name, result))
         numbers = fitted(parameter_rows(result.attribution))
         fit = result.attribution
         states.append(state_row(name, fit.calibrated.deviations, result.state, fit.case.library, numbers))
         budgets.append(result.tables["gap_budget"].assign(robot=name))
     frames = {
         "withheld_verdicts": pd.DataFrame(verdicts),
+        "withheld_stated": pd.concat(causes, ignore_index=True),
         "withheld_states": pd.DataFrame(states),
         "withheld_budget": pd.concat(budgets, ignore_index=True),
     }

@@ -9,7 +9,7 @@ from rrru.studies.withheld.score import score_chunk
 
 
 def main(settings, inputs, outputs):
-    """Write scores, limits and parts of the gaps of the robots of a chunk."""
+    """Write scores, limits, parts of the gaps and statements on causes of the robots of a chunk."""
     frames = {name.removeprefix("withheld_"): tables.read(path) for name, path in inputs.items()}
     gap = GapSettings.from_config(settings["gap"])
     known = {name: Known(one, gap.library(one.mechanism)) for name, one in all_conditions(settings).items()}

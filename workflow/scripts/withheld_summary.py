@@ -4,7 +4,7 @@ from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies.withheld.field import field_verdicts, read_field_answers, score_field
 from rrru.studies.withheld.schemas import TABLES
-from rrru.studies.withheld.summary import LIMITS, PARTS, confusion, summary
+from rrru.studies.withheld.summary import CAUSES, LIMITS, PARTS, confusion, summary
 
 
 def main(settings, inputs, outputs):
@@ -15,9 +15,12 @@ def main(settings, inputs, outputs):
         tables.gather([*inputs[name], *more], outputs[name])
         tables.check_keys(schemas[name], outputs[name])
     scores = tables.read(outputs["withheld_scores"])
-    limits = tables.read(outputs["withheld_limits"], columns=LIMITS)
+    listed = {
+        name: tables.read(outputs[f"withheld_{name}"], columns=columns)
+        for name, columns in (("limits", LIMITS), ("parts", PARTS), ("causes", CAUSES))
+    }
     frames = {
-        "withheld_summary": summary(scores, limits, tables.read(outputs["withheld_parts"], rows=PARTS)),
+        "withheld_summary": summary(scores, **listed),
         "withheld_confusion": confusion(scores),
     }
     tables.write_all(TABLES, frames, outputs)

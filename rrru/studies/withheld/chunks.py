@@ -9,7 +9,7 @@ from rrru.errors import ConfigError
 from rrru.studies import config as parts
 from rrru.studies.withheld.models import MODELS
 from rrru.studies.withheld.noise import NOISES
-from rrru.studies.withheld.verdicts import PLANTS
+from rrru.studies.withheld.verdicts import AS_ROBOTS_ARE, PLANTS
 
 # what is done with own robots whose pages and files are judged
 PAGES, MISTAKES, RIGHT = "pages", "mistakes", "right_files"
@@ -18,7 +18,7 @@ _APART = 4
 
 
 class Member(NamedTuple):
-    """One robot: check (label, effect, noise, many, background, or a plant), what it is about, number.
+    """One robot: check (label, effect, noise, many, background, as_robots_are, or a plant), what it is about, number.
 
     about: the effect that the diagnosis has to do without, the noise, the robot's entry in `robots:`, or nothing.
     """
@@ -40,7 +40,7 @@ class Member(NamedTuple):
     @property
     def file(self):
         """The entry in `robots:` of a robot that is read from a file, empty for the 3-RRRU of our own."""
-        return self.about if self.check in PLANTS else ""
+        return self.about if self.check in (*PLANTS, AS_ROBOTS_ARE) else ""
 
 
 def noise_of(name):
@@ -55,9 +55,11 @@ def chunks(section):
     members += [Member("effect", e, k) for e in section["effects"] for k in range(section["per_effect"])]
     members += [Member("noise", noise, k) for noise in NOISES for k in range(section["per_noise"])]
     members += [Member(check, "", k) for check in ("many", "background") for k in range(section[check])]
-    driven = [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
+    members += [Member(AS_ROBOTS_ARE, file, k) for file, k in _in_turns(section)]
+    members += [_of_file(plant, section["files"], k) for plant in PLANTS for k in range(section[plant])]
     # a chunk's robots have the same drives
-    groups = [members, *([one for one in driven if one.file == file] for file in section["files"])]
+    files = dict.fromkeys(["", *section["files"], *section["as_robots_are_files"]])
+    groups = [[one for one in members if one.file == file] for file in files]
     result, size = {}, section["chunk"]
     for k, group in zip(np.cumsum([0, *map(len, groups)]).tolist(), groups, strict=False):
         result |= {f"robots_{k + first:04d}": group[first : first + size] for first in range(0, len(group), size)}
@@ -71,6 +73,14 @@ def statement_chunks(section):
         for first in range(0, section[check], size):
             found[f"{check}_{first:04d}"] = (check, first, min(first + size, section[check]))
     return found
+
+
+def _in_turns(section):
+    """File and number of every robot as robots are: the 3-RRRU of our own, with an empty name, and the files."""
+    files = ["", *section["as_robots_are_files"]]
+    for k in range(section[AS_ROBOTS_ARE]):
+        number, turn = divmod(k, len(files))
+        yield files[turn], number
 
 
 def _of_file(plant, files, k):
@@ -111,8 +121,8 @@ def check(config):
         for name in section[key]:
             if name not in known:
                 raise ConfigError(f"withheld.{key} has {name!r}; known: {', '.join(known)}")
-    for name in section["files"]:
-        file = parts.entry(config, "robots", name, "withheld.files").get("mjcf", "")
+    for key, name in [(of, name) for of in ("files", "as_robots_are_files") for name in section[of]]:
+        file = parts.entry(config, "robots", name, f"withheld.{key}").get("mjcf", "")
         if Path(file).stem not in MODELS:
             known = ", ".join(f"{model}.xml" for model in MODELS)
-            raise ConfigError(f"withheld.files: {name} has the mjcf {file!r}; allowed: one of {known}")
+            raise ConfigError(f"withheld.{key}: {name} has the mjcf {file!r}; allowed: one of {known}")

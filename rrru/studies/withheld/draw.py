@@ -16,13 +16,16 @@ from rrru.seeds import stream
 from rrru.studies.withheld.noise import NOISES, NoiseLaw
 from rrru.studies.withheld.outside import CAUSES, EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import PASSES, Acting, Robot, true_gap_mm
+from rrru.studies.withheld.verdicts import AS_ROBOTS_ARE
 
 TRUTHS = {"none": 0.15, "one": 0.55, "two": 0.2, "outside": 0.1}
 WEAKEST, STRONGEST, CLEAR, SEEN = 0.1, 10.0, 2.0, 1.5
 # of many causes at once: strengths, and scatter over the noise
 MANY, MOST_SCATTER = (0.3, 30.0), 5.0
+# of robots as they are: causes at once, and of so many robots one has a cause from outside besides
+MOST_CAUSES, OUTSIDE_EVERY = 6, 3
 # axes of joints as they are built, 1 sigma
-_AXES_SD = {"mm": 0.01, "rad": 5e-5}
+AXES_SD = {"mm": 0.01, "rad": 5e-5}
 _ANGLE_SD_RAD, _LENGTH_SD_MM = 0.002, 0.5
 _SAFE = 0.1
 _DRAWS = 20
@@ -31,6 +34,7 @@ _DRAWS = 20
 def draw(member, conditions):
     """The robot of a member of the check, see `rrru.studies.withheld.chunks`."""
     kinds = {"effect": _draw_single, "noise": _draw_noisy, "many": _draw_many, "background": _draw_background}
+    kinds[AS_ROBOTS_ARE] = _draw_as_robots_are
     return kinds.get(member.check, _draw_labelled)(member, conditions)
 
 
@@ -100,10 +104,41 @@ def _draw_background(member, conditions):
     return _with_causes(robot, [str(generator.choice(list(EFFECTS)))], (SEEN, STRONGEST), generator, conditions)
 
 
+def _draw_as_robots_are(member, conditions):
+    """A robot with axis errors, scatter, noise that is not as stated and one to six effects.
+
+    Every third one has a cause from outside besides.
+    """
+    generator = stream(conditions.seed, "withheld", member.check, member.number)
+    robot = with_background(bare(member.name, generator, conditions.mechanism), generator, conditions)
+    robot = replace(robot, noise=noise_not_as_stated(generator))
+    names = generator.choice(list(EFFECTS), count_of_causes(generator), replace=False).tolist()
+    if has_outside(member.number):
+        names.append(str(generator.choice(list(OUTSIDE))))
+    return _with_causes(robot, names, MANY, generator, conditions)
+
+
+def count_of_causes(generator):
+    """How many effects act at once in a robot as robots are."""
+    return int(generator.integers(1, MOST_CAUSES + 1))
+
+
+def has_outside(number):
+    """Whether the robot of a number has a cause from outside besides, as a third of them do."""
+    return number % OUTSIDE_EVERY == 1
+
+
+def noise_not_as_stated(generator):
+    """Fields of the NoiseLaw of a robot as robots are: one of NOISES, and scatter."""
+    law = NOISES[str(generator.choice(list(NOISES)))]
+    # scatter that the law has by itself stays
+    return {"scatter": float(generator.uniform(0.0, MOST_SCATTER))} | _changed(law)
+
+
 def with_background(robot, generator, conditions):
     """The robot with ordinary errors of the axes of all its joints."""
     law = CAUSES["joint_axis_error"]
-    size = [_AXES_SD[unit] for unit in law.parameters.units]
+    size = [AXES_SD[unit] for unit in law.parameters.units]
     acting = Acting(law.name, {}, tuple((size * generator.standard_normal(len(size))).tolist()), 0, 0.0)
     gap = true_gap_mm(replace(robot, background=(acting,)), conditions)
     return replace(robot, background=(replace(acting, strength=float(gap / conditions.noise_rms_mm)),))
@@ -168,14 +203,14 @@ def draw_acting(robot, name, single, span, generator, conditions):
     for _ in range(_DRAWS):
         strength = float(np.exp(generator.uniform(*np.log(span))))
         for _ in range(_DRAWS):
-            acting = _draw_direction(name, coordinates, single, strength, generator)
+            acting = draw_direction(name, coordinates, single, strength, generator)
             acting = _to_strength(robot, acting, conditions)
             if acting is not None:
                 return acting
     raise UnreachableError(f"{robot.name}: no {name} of strength {span[0]:g} to {span[1]:g} within its bounds")
 
 
-def _draw_direction(name, coordinates, single, strength, generator):
+def draw_direction(name, coordinates, single, strength, generator):
     """A cause with its shape, legs and the ratios of its coordinates drawn, not yet of that strength."""
     sizes = coordinates.typical * generator.standard_normal(len(coordinates))
     sizes = np.where(coordinates.positive, np.abs(sizes), sizes)

@@ -16,6 +16,7 @@ import numpy as np
 from rrru.effects.library import find
 from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
 from rrru.parameters import ParameterSet
+from rrru.studies.withheld.outside import OUTSIDE
 from rrru.studies.withheld.verdicts import NONE, PREFIX
 
 _FRICTION = {"rad": ("s^2/rad", 0.0, 1.0), "mm": ("s^2/mm", 0.0, 1e-2)}
@@ -83,6 +84,17 @@ KINDS = {
     "base_on_springs": Kind(_leaning_base, None),
     "speed_friction": Kind(_speed_friction, None),
 }
+# causes from outside that act in a robot of any kind, by the name of their kind
+OUTSIDE_OF_ANY = ("speed_friction", "tripod_sway", "tracker_bump")
+
+
+def kind_of(name):
+    """The Kind of a name in KINDS, of a cause from outside in `OUTSIDE`, or of an effect of the library."""
+    if name in OUTSIDE:
+        return Kind(lambda _: OUTSIDE[name], None)
+    return KINDS[name] if name in KINDS else _named(name)
+
+
 # what is given to the robots of one model, one after the other
 ORDER = (
     *("play", NONE, "soft_servo", "base_on_springs", "slow_servo", "length", NONE, "soft_link", "speed_friction"),
@@ -110,17 +122,17 @@ class Fault:
     @property
     def effect(self):
         """Its name as a part of a gap, empty where it makes none."""
-        return self.kind if self.outside else KINDS[self.kind].answer
+        return self.kind if self.outside else kind_of(self.kind).answer
 
     @property
     def outside(self):
         """Whether no law of the library holds it."""
-        return KINDS[self.kind].answer is None
+        return kind_of(self.kind).answer is None
 
     @property
     def truth(self):
         """The right answer in words."""
-        return f"{PREFIX}:{self.kind}" if self.outside else KINDS[self.kind].answer or NONE
+        return f"{PREFIX}:{self.kind}" if self.outside else kind_of(self.kind).answer or NONE
 
     def scaled(self, factor):
         """The same fault, so many times as large."""
@@ -128,23 +140,23 @@ class Fault:
 
     def moves(self, robot):
         """Whether it shows only while the robot moves; all others are read at rest."""
-        law = KINDS[self.kind].law
+        law = kind_of(self.kind).law
         return bool(law and "drive_rate" in law(robot).needs)
 
     def beyond(self, robot):
         """Whether it is larger than the law of the library allows that is the right answer."""
-        kind = KINDS[self.kind]
+        kind = kind_of(self.kind)
         return bool(kind.law and kind.answer and (np.abs(self.sizes) > kind.law(robot).coordinates.most).any())
 
     def values(self, robot):
         """Its Effect on a robot, and the law's parameter values by name."""
-        law = KINDS[self.kind].law(robot)
+        law = kind_of(self.kind).law(robot)
         shape = {name: self.more.get(name, value) for name, value in law.coordinates.shapes[0].items()}
         return law, law.parameters.mapping(law.coordinates.to_values(np.array(self.sizes), shape))
 
     def numbers(self, robot):
         """True values of the library's parameters by effect and name, as far as the fault is these."""
-        if not (KINDS[self.kind].law and KINDS[self.kind].answer) or "load_kg" in self.more:
+        if not (kind_of(self.kind).law and kind_of(self.kind).answer) or "load_kg" in self.more:
             return {}
         law, values = self.values(robot)
         return {law.name: values}

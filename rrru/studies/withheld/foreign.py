@@ -4,7 +4,7 @@ The same number is the same robot on every plant, but that each plant makes its 
 """
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,16 +21,17 @@ from rrru.robots.dynamics import Masses
 from rrru.seeds import stream
 from rrru.studies import setup
 from rrru.studies.withheld.box import draw_trajectories
-from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
+from rrru.studies.withheld.faults import Fault, draw_fault, kind_of, kinds_of
 from rrru.studies.withheld.models import MODELS
+from rrru.studies.withheld.noise import NoiseLaw, with_noise
 from rrru.studies.withheld.plants import PLANTS
 from rrru.studies.withheld.robots import Conditions, WithheldCampaign
 from rrru.studies.withheld.verdicts import NONE, UNEXPLAINED
 
 # what can be seen at all, and what an own tracker would find
 WEAKEST, STRONGEST = 0.7, 10.0
-_OFFSET_SD = {"rad": 0.002, "mm": 0.5}
-_DRAWS, _STEPS = 20, 2
+OFFSET_SD = {"rad": 0.002, "mm": 0.5}
+DRAWS, _STEPS = 20, 2
 # a gap over the noise that is rounding
 _NOTHING = 1e-6
 # so slow that inertia, of those that are read as they move, stays about a hundredth of the weight
@@ -75,9 +76,10 @@ class FileConditions(Conditions):
 @dataclass(frozen=True)
 class FileRobot:
     """A robot of a file: the file's entry in `robots:`, plant, trajectories as in the configuration, offsets of its
-    drives (K,), the fault if any.
+    drives (K,) and errors of its other numbers if any, the faults if any.
 
-    oracle_chi2: what its own displacement, the size fitted, takes off the chi-square of its measurements.
+    oracle_chi2: what its own displacement, the size fitted, takes off the chi-square of its measurements; noise: fields
+    of the NoiseLaw that are not as stated; rests: it is read at rest unless what acts shows in motion alone.
     """
 
     name: str
@@ -87,13 +89,10 @@ class FileRobot:
     offsets: tuple
     acting: tuple = ()
     oracle_chi2: float = 0.0
+    noise: dict = field(default_factory=dict)
+    rests: bool = True
     kind = "full"
     background = ()
-
-    @property
-    def noise(self):
-        """The noise is as stated."""
-        return {}
 
     @property
     def causes(self):
@@ -103,7 +102,7 @@ class FileRobot:
     @property
     def truth(self):
         """The right answer."""
-        return self.acting[0].truth if self.acting else NONE
+        return "+".join(sorted(one.truth for one in self.acting)) or NONE
 
     @property
     def beside(self):
@@ -113,11 +112,11 @@ class FileRobot:
     @property
     def cause(self):
         """What acts, in the plant's words."""
-        return self.acting[0].kind if self.acting else NONE
+        return "+".join(sorted(one.kind for one in self.acting)) or NONE
 
     def numbers(self, conditions):
         """True values of the library's parameters by effect and name."""
-        return self.acting[0].numbers(conditions.mechanism) if self.acting else {}
+        return {name: values for one in self.acting for name, values in one.numbers(conditions.mechanism).items()}
 
     def plan(self, conditions):
         """What it is told to do."""
@@ -128,25 +127,30 @@ class FileRobot:
         robot = PLANTS[self.plant](conditions, self.offsets, *self.acting)
         sees = Sees(conditions.model.targets)
         plan, noise_mm = self.plan(conditions), conditions.noise_mm
-        if not any(one.moves(conditions.mechanism) for one in self.acting):
+        if self.rests and not any(one.moves(conditions.mechanism) for one in self.acting):
             plan = plan.resting(SETTLE_S)
         return WithheldCampaign(robot, plan, noise_mm, conditions.seed, self.name, sees=sees)
 
     def measured(self, conditions):
         """The measurement table that the diagnosis is given."""
-        return self.campaign(conditions).run()[0]
+        campaign = self.campaign(conditions)
+        if not self.noise:
+            return campaign.run()[0]
+        return with_noise(
+            noise_free(self, conditions), NoiseLaw(**self.noise), conditions.noise_mm, campaign.generator()
+        )
 
     def answer(self, conditions):
         """The robot's row of `withheld_answers`."""
-        del conditions
-        strength = max((one.strength for one in self.acting), default=0.0)
+        strengths = [one.strength for one in self.acting]
+        strength = gap_over_noise(self, conditions) if len(strengths) > 1 else max(strengths, default=0.0)
         return {
             "robot": self.name,
             "kind": self.kind,
             "truth": self.truth,
             "truth_leg": max((one.leg for one in self.acting), default=0),
             "strength": strength,
-            "weakest": strength,
+            "weakest": min(strengths, default=0.0),
             "drawn": json.dumps(asdict(self), sort_keys=True),
         }
 
@@ -175,14 +179,14 @@ def draw(member, conditions):
     drawn again, and with it the trajectories; raises the last of these errors where none can be driven.
     """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
-    offsets = [_OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
+    offsets = [OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
     trajectories = draw_trajectories(generator, conditions)
     robot = FileRobot(member.name, member.file, member.check, trajectories, tuple(offsets))
     kinds = kinds_of(conditions.model, conditions.mechanism)
     kind = kinds[member.number % len(kinds)]
     if kind == NONE:
         return robot, robot.measured(conditions)
-    for _ in range(_DRAWS):
+    for _ in range(DRAWS):
         fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
         strength = float(np.exp(generator.uniform(*np.log([WEAKEST, STRONGEST]))))
         try:
@@ -198,7 +202,7 @@ def sized(robot, fault, strength, conditions):
 
     Raises UnreachableError where none has that strength, or one only that is larger than the library has causes.
     """
-    if KINDS[fault.kind].law is None:
+    if kind_of(fault.kind).law is None:
         return fault
     still = residual(noise_free(replace(robot, plant="own", acting=()), conditions), conditions)
     for _ in range(_STEPS):
@@ -209,6 +213,9 @@ def sized(robot, fault, strength, conditions):
         if not gap > _NOTHING:
             raise UnreachableError(f"{robot.name}: a calibration takes up {fault.kind} of {fault.sizes}")
         fault = fault.scaled(strength / gap)
+        # far beyond its bounds it is not simulated: no calibration fits such readings
+        if fault.scaled(0.5).beyond(conditions.mechanism):
+            break
     if fault.beyond(conditions.mechanism):
         raise UnreachableError(f"{robot.name}: {fault.kind} of {fault.sizes} is more than its law allows")
     return fault
@@ -229,6 +236,18 @@ def as_driven(robot, conditions):
     read = residual(measurements, conditions) - residual(still, conditions)
     chi2 = float((left * read).sum() ** 2 / (left**2).sum() / conditions.noise_mm**2) if left.any() else 0.0
     return replace(robot, acting=(fault,), oracle_chi2=chi2), measurements
+
+
+def gap_over_noise(robot, conditions):
+    """Rms distance between what a calibration leaves of a robot with all that acts and without, over the noise's.
+
+    NaN where a pose is lost.
+    """
+    driven = [noise_free(one, conditions) for one in (robot, replace(robot, acting=()))]
+    if any(measurements is None for measurements in driven):
+        return np.nan
+    acting, still = (residual(measurements, conditions) for measurements in driven)
+    return float(_rms(acting - still) / conditions.noise_rms_mm)
 
 
 def _rms(residual_mm):

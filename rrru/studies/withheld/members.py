@@ -3,8 +3,9 @@
 import json
 from typing import NamedTuple
 
-from rrru.studies.withheld import draw, foreign, robots
+from rrru.studies.withheld import draw, foreign, robots, several
 from rrru.studies.withheld.outside import EFFECTS
+from rrru.studies.withheld.verdicts import AS_ROBOTS_ARE
 
 
 class Known(NamedTuple):
@@ -23,6 +24,8 @@ def all_conditions(settings):
 
 def drawn(member, conditions):
     """The robot of a Member under its Conditions, and what the diagnosis is given: its measurement table."""
+    if member.file and member.check == AS_ROBOTS_ARE:
+        return several.draw(member, conditions)
     if member.file:
         return foreign.draw(member, conditions)
     robot = draw.draw(member, conditions)

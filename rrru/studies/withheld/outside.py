@@ -79,7 +79,16 @@ OUTSIDE = {
 _LIBRARY = library(Rrru3())
 # these campaigns cannot show it: their robots do not stop at points, no temperature is told, all lengths are calibrated
 _UNSEEN = ("read_before_rest", "thermal_expansion", "tracker_scale")
-# of the library and from outside, whatever may act in a robot of the check, all of which are 3-RRRUs; what holds others
-# is a background, no cause that is drawn
-EFFECTS = {name: effect for name, effect in _LIBRARY.items() if name not in (*HOLDS, *_UNSEEN)}
+
+
+def drawn_effects(known):
+    """Effects by name of a robot's library that may be drawn as causes.
+
+    What holds others is a background, no cause that is drawn.
+    """
+    return {name: effect for name, effect in known.items() if name not in (*HOLDS, *_UNSEEN)}
+
+
+# of the library and from outside, whatever may act in a 3-RRRU of the check
+EFFECTS = drawn_effects(_LIBRARY)
 CAUSES = _LIBRARY | OUTSIDE

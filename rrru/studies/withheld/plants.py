@@ -8,29 +8,31 @@ from scipy.spatial.transform import Rotation
 
 from rrru.effects.protocol import ActiveEffect
 from rrru.plant.virtual_robot import VirtualRobot
-from rrru.studies.withheld.faults import KINDS
+from rrru.studies.withheld.faults import KINDS, kind_of
 
 # servos whose friction shows, in N mm/rad or N/mm: so stiff that weight does not
 _STIFF = {"rad": 4e9, "mm": 2e3}
 
 
-def own(conditions, offsets, fault=None):
-    """The VirtualRobot of a file with offsets (K,) of its drives and a Fault."""
-    robot = conditions.mechanism
+def own(conditions, offsets, *faults):
+    """The VirtualRobot of a file with Faults.
+
+    offsets: errors of its first candidates, of which the drives' (K,) come first.
+    """
+    robot, masses, effects = conditions.mechanism, conditions.masses, []
     deviations = {one.name: offset for one, offset in zip(robot.candidates, offsets, strict=False)}
-    if fault is None:
-        return VirtualRobot(robot, deviations, masses=conditions.masses)
-    masses, kind, effects = conditions.masses, KINDS[fault.kind], ()
-    if kind.law:
-        effects = (ActiveEffect(*fault.values(robot)),)
-    else:
-        errors = zip(getattr(conditions.model, kind.on), fault.sizes, strict=True)
-        deviations |= {number: size for error, size in errors for _, number in error}
-    if "load_kg" in fault.more:
-        masses = replace(masses, platform_kg=masses.platform_kg + fault.more["load_kg"])
-    if "tilt_x_rad" in fault.more:
-        robot = replace(robot, up=tuple(_turned(fault).apply(robot.up).tolist()))
-    return VirtualRobot(robot, deviations, effects=effects, masses=masses)
+    for fault in faults:
+        kind = kind_of(fault.kind)
+        if kind.law:
+            effects.append(ActiveEffect(*fault.values(conditions.mechanism)))
+        else:
+            for error, size in zip(getattr(conditions.model, kind.on), fault.sizes, strict=True):
+                deviations |= {number: deviations.get(number, 0.0) + size for _, number in error}
+        if "load_kg" in fault.more:
+            masses = replace(masses, platform_kg=masses.platform_kg + fault.more["load_kg"])
+        if "tilt_x_rad" in fault.more:
+            robot = replace(robot, up=tuple(_turned(fault).apply(robot.up).tolist()))
+    return VirtualRobot(robot, deviations, effects=tuple(effects), masses=masses)
 
 
 def _turned(fault):

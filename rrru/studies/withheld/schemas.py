@@ -24,8 +24,12 @@ oracle_detects         bool   a likelihood-ratio test that knows the true law de
     label, effect, mujoco and own, false in the other checks
 check                  str    label: the robots' effects are hidden; effect: the robot's effect is taken out of the
     library; noise: the noise is not as stated; many: three to six effects, axis errors and scatter; background: axis
-    errors in every robot; mujoco: robots of files that MuJoCo drives; own: the same, driven by our own laws; field:
-    recorded by another simulator {label, effect, noise, many, background, mujoco, own, field}
+    errors in every robot; as_robots_are: axis errors, scatter, noise not as stated and one to six effects; mujoco:
+    robots of files that MuJoCo drives; own: the same, driven by our own laws; field: recorded by another simulator
+    {label, effect, noise, many, background, as_robots_are, mujoco, own, field}
+decision               str    named: as a cause; group: it or others that these data cannot tell from it; possible;
+    excluded {named, group, possible, excluded}
+group                  str    members of its group, separated by |, the most probable first; empty for none
 
 ## withheld_answers | withheld/answers/{chunk}.parquet | robot
 What was drawn for each robot: read by the virtual robot and by the scoring, never by the diagnosis.
@@ -54,6 +58,14 @@ share                  float  of the gap's mean square
 share_low              float  lower end, 95 %, from the posterior
 share_high             float  upper end, 95 %, from the posterior
 probability            float? that the part is real; null where that is no question
+
+## withheld_stated | withheld/stated/{chunk}.parquet | robot effect
+What the diagnosis states about each effect that it tested; made without knowing any answer.
+--
+robot
+effect                 str    effect of the library
+probability            float  posterior probability that it acts, 0 to 1
+decision group
 
 ## withheld_limits | tables/withheld_limits.parquet | check robot
 What the data of each robot could tell somebody who knows the true law; of the checks label, effect, mujoco and own,
@@ -88,8 +100,9 @@ Each verdict beside the truth.
 check robot kind file cause truth truth_leg strength
 verdict                str    the diagnosis's effects
 right                  bool   it names exactly the truth or, where the library lacks that, says unexplained;
-    background: joint_axis_error may be named; many: it names all causes of 30 % of the gap, nothing that is not there,
-    and unexplained for a cause from outside of twice the noise
+    background: joint_axis_error may be named; many and as_robots_are: it names all causes of 30 % of the gap, alone or
+    in a group, nothing that is not there, of groups none without a member that acts, and unexplained for a cause from
+    outside of twice the noise
 leg_right              float? 1 where the leg is right, 0 where not; null where there is none to name
 probability            float  that the diagnosis gave its verdict, 0 to 1
 oracle_detects
@@ -110,8 +123,22 @@ kind                   str    effect; background: errors of all axes; outside: t
 strength               float  true rms over that of the stated noise; 0 for what is not there
 true_rms_mm            float  gap that it leaves alone, after its own calibration; 0 for what is not there
 found_rms_mm           float? as in gap_budget, 0 where that does not list it; null for a cause from outside
+found_low_mm           float? lower end of its 95 % interval; as found_rms_mm where it is not listed
+found_high_mm          float? upper end
 probability            float? as in gap_budget, 0 where that does not list it; null for a cause from outside
 named                  bool   the verdict names it; outside: says unexplained; scatter, runs: more probable than not
+
+## withheld_causes | tables/withheld_causes.parquet | check robot effect
+What the diagnosis states about each effect that it tested, beside the truth.
+--
+check
+robot
+effect                 str    effect of the library
+probability            float  posterior probability that it acts, 0 to 1
+decision group
+acts                   bool   it acts, the axis errors of the robot among what does
+strength               float  true rms of the gap that it makes alone over that of the stated noise; 0 where it does not
+    act
 
 ## withheld_beliefs | timings/withheld/{chunk}.parquet | robot method
 What each way to find a cause says about robots whose cause is hidden; made without knowing any answer.
@@ -148,7 +175,8 @@ The scores in figures, against what the tool is meant to reach.
 check
 group                  str    which robots are counted
 figure                 str    what is counted
-robots                 int    robots in the group, parts of their gaps, or numbers of their causes
+robots                 int    how many are counted: robots in the group, parts of their gaps, numbers of their causes,
+    statements on causes, or names
 value                  float? the figure; null where the group is empty
 low                    float? lower end of the 95 % Wilson interval; null where the figure is no share
 high                   float? upper end

@@ -9,12 +9,13 @@ import pandas as pd
 from rrru.effects.library import HOLDS
 from rrru.gap.make_case import make_case
 from rrru.gap.state import State
+from rrru.studies.withheld.causes import causes_of, empty_causes, groups_of
 from rrru.studies.withheld.members import fresh_runs, robot_of
 from rrru.studies.withheld.numbers import held
 from rrru.studies.withheld.oracle import Limits, limits, of_displacement, with_truth
 from rrru.studies.withheld.parts import is_enough, parts
 from rrru.studies.withheld.states import state_of
-from rrru.studies.withheld.verdicts import PLANTS, is_right, scores
+from rrru.studies.withheld.verdicts import PLANTS, SEVERAL_CAUSES, is_right, scores
 
 _LIMITS = ["oracle_chi2", "oracle_freedom", "oracle_detects", "rival", "rival_chi2", "imitated_share"]
 # checks of one or two causes under the stated noise, whose limits are computed
@@ -22,37 +23,47 @@ _LIMITED = ("label", "effect", *PLANTS)
 
 
 class Scored(NamedTuple):
-    """Frames `withheld_scores`, `withheld_limits` and `withheld_parts`."""
+    """Frames `withheld_scores`, `withheld_limits`, `withheld_parts` and `withheld_causes`."""
 
     scores: pd.DataFrame
     limits: pd.DataFrame
     parts: pd.DataFrame
+    causes: pd.DataFrame
 
 
-def score_chunk(answers, measurements, verdicts, states, budget, known):
-    """What is Scored of the robots of a chunk from the five frames about them.
+def score_chunk(answers, measurements, verdicts, stated, states, budget, known):
+    """What is Scored of the robots of a chunk from the six frames about them.
 
     known: what is Known of their robots by the entry of their files, with an empty name of our own.
     """
     told = answers.merge(verdicts, on=["robot", "kind"]).merge(states, on="robot")
-    points, found = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget))
-    measured, listed = [], []
+    points, found, on_causes = (dict(list(frame.groupby("robot"))) for frame in (measurements, budget, stated))
+    measured, listed, causes = [], [], []
     for row in told.to_dict("records"):
         name, robot = row["robot"], robot_of(row["drawn"])
         about = known[robot.file]
         taken_out = row["truth"] if row["check"] == "effect" else ""
         own = parts(robot, row["effects"], found[name], about.conditions.noise_rms_mm, taken_out)
-        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": _right(row, robot, own)})
+        on_own = on_causes.get(name, empty_causes())
+        right = _right(row, robot, own, groups_of(on_own))
+        measured.append(_measured(row, robot, points[name], about, taken_out) | {"right": right})
         listed.append(own.assign(check=row["check"], robot=name))
+        if len(on_own):
+            causes.append(causes_of(on_own, robot).assign(check=row["check"]))
     told = told.assign(**pd.DataFrame(measured, index=told.index))
     limited = told.loc[told["check"].isin(_LIMITED), ["check", "robot", "weakest", *_LIMITS]]
-    return Scored(scores(told), limited, pd.concat(listed, ignore_index=True))
+    # where readings allow no effect to be tested nothing is stated
+    stated_causes = pd.concat(causes or [empty_causes()], ignore_index=True)
+    return Scored(scores(told), limited, pd.concat(listed, ignore_index=True), stated_causes)
 
 
-def _right(row, robot, listed):
-    """Whether the verdict of a row on a robot is right; listed: the robot's rows of `withheld_parts`."""
-    if row["check"] == "many":
-        return is_enough(listed, row["strength"])
+def _right(row, robot, listed, groups):
+    """Whether the verdict of a row on a robot is right.
+
+    listed: the robot's rows of `withheld_parts`; groups: of causes that the verdict cannot tell apart.
+    """
+    if row["check"] in SEVERAL_CAUSES:
+        return is_enough(listed, row["strength"], groups)
     effects = row["effects"]
     if robot.file:
         effects = "+".join(name for name in effects.split("+") if name not in robot.beside) or effects

@@ -4,6 +4,9 @@ PREFIX = "outside"
 UNEXPLAINED, NONE = "unexplained", "none"
 # checks on robots of files, each the name of the plant that drives them
 PLANTS = ("mujoco", "own")
+AS_ROBOTS_ARE = "as_robots_are"
+# checks on robots of several causes, whose verdict has to name those that matter
+SEVERAL_CAUSES = ("many", AS_ROBOTS_ARE)
 # kinds of parts of a gap that a verdict names and that may not be there
 CAUSES = ("effect", "background")
 # what acts in every robot of the check on a background, asked for or not

@@ -14,10 +14,11 @@ from rrru.errors import ConfigError
 from rrru.gap.make_case import make_case
 from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots import singularity
+from rrru.seeds import stream
 from rrru.studies.withheld import draw
 from rrru.studies.withheld.chunks import Member, check, chunks, noise_of
 from rrru.studies.withheld.members import robot_of
-from rrru.studies.withheld.noise import NOISES
+from rrru.studies.withheld.noise import NOISES, NoiseLaw
 from rrru.studies.withheld.oracle import limits, with_truth
 from rrru.studies.withheld.outside import EFFECTS, OUTSIDE
 from rrru.studies.withheld.robots import noise_free, true_gap_mm
@@ -26,6 +27,7 @@ from tests.studies.withheld.conditions import CONDITIONS, bare
 
 _MECHANISM = CONDITIONS.mechanism
 _CONFIG = {"campaigns": {"paper": {}}, "robots": {"rrru3": {"L1_mm": 400.0}, "mine": {"mjcf": "mine.xml"}}}
+_NOT_AS_THEY_ARE = {"as_robots_are": 0, "as_robots_are_files": []}
 
 
 def _calibrated(measurements):
@@ -181,9 +183,63 @@ def test_the_laws_from_outside_do_as_they_say():
     assert 0.0 < (np.linalg.norm(pull, axis=1) > 0.0).mean() < 1.0
 
 
+def test_robots_as_they_are_have_one_to_six_causes_and_noise_that_is_not_as_stated(monkeypatch):
+    """Names and noises alone: what acts is not simulated."""
+    monkeypatch.setattr(draw, "_trajectories", lambda *_: {})
+    monkeypatch.setattr(draw, "true_gap_mm", lambda *_: 1.0)
+    spans = set()
+
+    def drawn(robot, name, single, span, *_):
+        spans.add(span)
+        return name
+
+    monkeypatch.setattr(draw, "draw_acting", drawn)
+    counts, outside, laws = Counter(), 0, Counter()
+    for number in range(900):
+        robot = draw.draw(Member("as_robots_are", "", number), CONDITIONS)
+        (axes,) = robot.background
+        assert axes.effect == "joint_axis_error"
+        own = [name for name in robot.acting if name in EFFECTS]
+        assert len(set(own)) == len(own) and len(robot.acting) - len(own) == (number % 3 == 1)
+        outside += len(robot.acting) - len(own)
+        counts[len(own)] += 1
+        assert 0.0 <= robot.noise["scatter"] <= draw.MOST_SCATTER
+        laws[tuple(sorted(robot.noise.keys() - {"scatter"}))] += 1
+    assert spans == {(0.3, 30.0)} and outside == 300
+    assert set(counts) == {1, 2, 3, 4, 5, 6} and chisquare(list(counts.values())).pvalue > 1e-3
+    # smaller or larger by a number, axes, along a run, of runs, tails, and scatter alone
+    assert set(laws) == {("size",), ("axes",), ("correlation",), ("runs",), ("freedom",), ()}
+
+
+def test_causes_of_a_robot_as_they_are_are_as_strong_as_they_say():
+    # one of two effects and a cause from outside
+    number = next(k for k in range(1, 60, 3) if _count(k) == 1)
+    robot = draw.draw(Member("as_robots_are", "", number), CONDITIONS)
+    assert len(robot.acting) == 2 and robot.acting[-1].outside and robot_of(robot.answer(CONDITIONS)["drawn"]) == robot
+    for one in robot.acting:
+        assert 0.29 < one.strength < 30.5
+        alone = replace(robot, acting=(one,), background=())
+        np.testing.assert_allclose(true_gap_mm(alone, CONDITIONS) / CONDITIONS.noise_rms_mm, one.strength, rtol=1e-6)
+    assert robot.background[0].strength > 0.0
+    # what is read is off by more than the exact places are
+    off = rows.measured(robot.measured(CONDITIONS)) - rows.measured(noise_free(robot, CONDITIONS))
+    law = NoiseLaw(**robot.noise)
+    own = (law.size * np.array(law.axes)) ** 2 + law.scatter**2 + law.runs**2
+    np.testing.assert_allclose(off.std(axis=0) / CONDITIONS.noise_mm, np.sqrt(own), rtol=0.35)
+
+
+def _count(number):
+    """How many effects of the library act in a 3-RRRU as it is, from what is drawn before them."""
+    generator = stream(CONDITIONS.seed, "withheld", "as_robots_are", number)
+    robot = draw.bare("", generator, _MECHANISM)
+    draw.with_background(robot, generator, CONDITIONS)
+    draw.noise_not_as_stated(generator)
+    return draw.count_of_causes(generator)
+
+
 def test_chunks_hold_every_robot_once():
     section = {"robots": 7, "per_effect": 3, "effects": list(EFFECTS), "chunk": 4}
-    others = {"per_noise": 0, "many": 0, "background": 0, "mujoco": 0, "own": 0, "files": []}
+    others = {"per_noise": 0, "many": 0, "background": 0, "mujoco": 0, "own": 0, "files": []} | _NOT_AS_THEY_ARE
     parts = list(chunks(section | others).values())
     count = 7 + 3 * len(EFFECTS)
     assert [len(part) for part in parts] == [4] * (count // 4) + [count % 4] * (count % 4 > 0)
@@ -195,6 +251,7 @@ def test_chunks_hold_every_robot_once():
 def test_chunks_hold_the_robots_of_every_check():
     section = {"robots": 1, "per_effect": 1, "effects": ["backlash"], "per_noise": 2, "many": 3, "background": 2}
     section |= {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]}
+    section |= {"as_robots_are": 7, "as_robots_are_files": ["b_file", "c_file"]}
     members = [member for chunk in chunks(section | {"chunk": 100}).values() for member in chunk]
     counted = Counter(member.check for member in members)
     assert counted == {
@@ -203,6 +260,7 @@ def test_chunks_hold_the_robots_of_every_check():
         "noise": 2 * len(NOISES),
         "many": 3,
         "background": 2,
+        "as_robots_are": 7,
         "mujoco": 4,
         "own": 3,
     }
@@ -210,24 +268,27 @@ def test_chunks_hold_the_robots_of_every_check():
     for member in members:
         assert noise_of(member.name) == (member.about if member.check == "noise" else "")
         assert member.taken_out == ("backlash" if member.check == "effect" else "")
-        assert member.file == (member.about if member.check in PLANTS else "")
+        assert member.file == (member.about if member.check in (*PLANTS, "as_robots_are") else "")
     driven = {plant: [(one.about, one.number) for one in members if one.check == plant] for plant in PLANTS}
     # the same robots on either plant, and the files take turns
     assert set(driven["own"]) < set(driven["mujoco"])
     assert Counter(file for file, _ in driven["mujoco"]) == {"a_file": 2, "b_file": 2}
+    mixed = Counter(member.file for member in members if member.check == "as_robots_are")
+    assert mixed == {"": 3, "b_file": 2, "c_file": 2}
 
 
 def test_robots_of_a_chunk_have_the_same_drives():
     section = {"robots": 3, "per_effect": 0, "effects": [], "per_noise": 0, "many": 0, "background": 0, "chunk": 2}
-    parts = chunks(section | {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]})
+    parts = chunks(section | {"mujoco": 4, "own": 3, "files": ["a_file", "b_file"]} | _NOT_AS_THEY_ARE)
     assert [len({member.file for member in members}) for members in parts.values()] == [1] * len(parts)
     assert sum(map(len, parts.values())) == 10 and list(parts)[:2] == ["robots_0000", "robots_0002"]
 
 
 @pytest.mark.parametrize(("key", "value"), [("field", ["nosuch"]), ("effects", ["nosuch"])])
 def test_unknown_names_are_refused(key, value):
+    section = {"field": ["paper"], "effects": ["backlash"], "files": []} | _NOT_AS_THEY_ARE
     with pytest.raises(ConfigError, match=f"withheld.{key} has 'nosuch'"):
-        check(_CONFIG | {"withheld": {"field": ["paper"], "effects": ["backlash"], "files": []} | {key: value}})
+        check(_CONFIG | {"withheld": section | {key: value}})
 
 
 @pytest.mark.parametrize(
@@ -235,5 +296,7 @@ def test_unknown_names_are_refused(key, value):
     [("nosuch", "robots has no 'nosuch'"), ("rrru3", "has the mjcf ''"), ("mine", "has the mjcf 'mine.xml'")],
 )
 def test_files_that_the_check_has_no_places_in_are_refused(file, message):
-    with pytest.raises(ConfigError, match=message):
-        check(_CONFIG | {"withheld": {"field": [], "effects": [], "files": [file]}})
+    section = {"field": [], "effects": [], "files": []} | _NOT_AS_THEY_ARE
+    for key in ("files", "as_robots_are_files"):
+        with pytest.raises(ConfigError, match=message):
+            check(_CONFIG | {"withheld": section | {key: [file]}})

@@ -10,10 +10,12 @@ import pytest
 from rrru.campaign import measurements as rows
 from rrru.effects.library import find
 from rrru.errors import UnreachableError
-from rrru.studies.withheld import foreign
+from rrru.studies.withheld import foreign, several
 from rrru.studies.withheld.chunks import Member
+from rrru.studies.withheld.draw import MANY
 from rrru.studies.withheld.faults import KINDS, Fault, draw_fault, kinds_of
-from rrru.studies.withheld.members import robot_of
+from rrru.studies.withheld.members import drawn, robot_of
+from rrru.studies.withheld.noise import NoiseLaw
 from rrru.studies.withheld.parts import parts
 from rrru.studies.withheld.plants import mujoco
 from rrru.studies.withheld.verdicts import NONE, PREFIX
@@ -148,8 +150,41 @@ def test_a_fault_that_nobody_has_is_none():
     assert not Fault("base_on_springs", (1.0, 1.0, 0.0, 0.0), {}).beyond(known.mechanism)
 
 
+# with one cause and one from outside; with several
+@pytest.mark.parametrize(("file", "number"), [("hexapod_file", 1), ("arm6_file", 2), ("hexapod_file", 3)])
+def test_a_robot_of_a_file_as_robots_are_has_several_causes_of_its_own(file, number):
+    known, member = conditions(file), Member("as_robots_are", file, number)
+    robot, measurements = drawn(member, known)
+    assert robot == drawn(member, known)[0] and robot.plant == "own" and robot.noise
+    outside = [one for one in robot.acting if one.outside]
+    assert len(outside) == (number % 3 == 1) and 1 <= len(robot.acting) - len(outside) <= 6
+    for one in robot.acting:
+        assert 0.9 * MANY[0] < one.strength < 1.1 * MANY[1]
+        alone = foreign.gap_over_noise(replace(robot, acting=(one,)), known)
+        np.testing.assert_allclose(alone, one.strength, rtol=1e-9)
+    told = robot.answer(known)
+    assert robot_of(told["drawn"]) == robot and told["weakest"] == min(one.strength for one in robot.acting)
+    assert told["truth"] == "+".join(sorted(one.truth for one in robot.acting))
+    assert set(robot.numbers(known)) == {one.effect for one in robot.acting if not one.outside}
+    # noise as it was drawn, beyond the stated one
+    off = rows.measured(measurements) - rows.measured(foreign.noise_free(robot, known))
+    assert off.std() > 1.05 * known.noise_mm
+    listed = parts(robot, "none", _budget(), known.noise_rms_mm).set_index("part")
+    for one in robot.acting:
+        assert listed.loc[one.effect, "strength"] == one.strength
+    assert listed.loc["scatter", "strength"] == NoiseLaw(**robot.noise).beyond
+
+
+def test_axes_of_a_robot_of_a_file_as_robots_are_are_found_by_its_calibration():
+    known = conditions("arm6_file")
+    robot = several.bare(Member("as_robots_are", "arm6_file", 0), np.random.default_rng(4), known)
+    assert len(robot.offsets) == len(known.mechanism.candidates) and min(map(abs, robot.offsets)) > 0.0
+    left = foreign.residual(foreign.noise_free(robot, known), known)
+    assert np.linalg.norm(left, axis=1).max() < 0.1 * known.noise_mm
+
+
 def _budget():
     """A budget without parts."""
     import pandas as pd
 
-    return pd.DataFrame(columns=["part", "kind", "rms_mm", "probability"])
+    return pd.DataFrame(columns=["part", "kind", "rms_mm", "share", "share_low", "share_high", "probability"])

@@ -137,6 +137,7 @@ def test_answers_are_scored_against_the_truth():
 def test_other_ways_are_tried_on_the_first_robots_of_the_label_check():
     section = {"robots": 7, "per_effect": 1, "effects": ["backlash"], "per_noise": 0, "many": 0, "background": 0}
     section |= {"chunk": 4, "methods": 5, "mujoco": 0, "own": 0, "files": []}
+    section |= {"as_robots_are": 0, "as_robots_are_files": []}
     found = rivalled(section)
     assert set(found) <= set(chunks(section))
     assert [name for names in found.values() for name in names] == [f"label_{k:04d}" for k in range(5)]

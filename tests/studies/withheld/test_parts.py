@@ -30,9 +30,14 @@ def _robot(*acting, background=(), **noise):
 
 
 def _budget(*found):
-    """Rows of a budget from (part, kind, rms over noise, probability)."""
+    """Rows of a budget from (part, kind, rms over noise, probability), of a gap of 5 times the noise.
+
+    The intervals are those of rms from half of what is found to twice as much.
+    """
     frame = pd.DataFrame(found, columns=["part", "kind", "rms_mm", "probability"])
-    return frame.assign(rms_mm=frame["rms_mm"] * _NOISE_RMS_MM)
+    share = frame["rms_mm"].astype(float).abs() * frame["rms_mm"] / 5.0**2
+    ends = {"share": share, "share_low": share / 4.0, "share_high": share * 4.0}
+    return frame.assign(rms_mm=frame["rms_mm"] * _NOISE_RMS_MM, **ends)
 
 
 def test_parts_stand_beside_their_true_sizes():
@@ -66,6 +71,8 @@ def test_parts_stand_beside_their_true_sizes():
         np.testing.assert_allclose(over.loc[part].to_numpy(), numbers, atol=1e-12, err_msg=part)
         assert table.loc[part, "named"] == named, part
     np.testing.assert_allclose(table["true_rms_mm"], table["strength"] * _NOISE_RMS_MM)
+    for end, factor in (("found_low_mm", 0.5), ("found_high_mm", 2.0)):
+        np.testing.assert_allclose(table[end], factor * table["found_rms_mm"], atol=1e-12)
     assert table["kind"].value_counts().to_dict() == {
         "effect": 4,
         "outside": 1,
@@ -115,6 +122,20 @@ def test_many_causes_need_those_that_matter_and_nothing_invented(entries, right)
     assert is_enough(_listed(*entries), 10.0) is right
 
 
+@pytest.mark.parametrize(
+    ("entries", "right"),
+    [
+        # the group's first member is in the verdict, the other acts
+        ([("a", "effect", 4.0, False), ("b", "effect", 0.0, True)], True),
+        ([("a", "background", 1.0, False), ("b", "effect", 0.0, True)], True),
+        ([("c", "effect", 4.0, True), ("b", "effect", 0.0, True)], False),
+        ([("a", "effect", 4.0, False), ("b", "effect", 0.0, True), ("c", "effect", 0.0, True)], False),
+    ],
+)
+def test_a_group_is_right_where_one_of_its_members_acts(entries, right):
+    assert is_enough(_listed(*entries), 5.0, [("b", "a")]) is right
+
+
 def _score(check, robot, truth, verdict, right, strength):
     """A row of `withheld_scores`."""
     base = {"kind": "full", "truth_leg": 0, "leg_right": np.nan, "probability": 0.9, "oracle_detects": False}
@@ -125,13 +146,22 @@ def _score(check, robot, truth, verdict, right, strength):
 def _part(robot, part, kind, strength, found, named):
     """A row of `withheld_parts`, of a noise of 1 mm."""
     own = {"robot": robot, "part": part, "kind": kind, "strength": strength, "named": named, "probability": 1.0}
-    return {"check": "many", "true_rms_mm": strength, "found_rms_mm": found} | own
+    ends = {"found_low_mm": 0.5 * found, "found_high_mm": 1.5 * found}
+    return {"check": "many", "true_rms_mm": strength, "found_rms_mm": found} | ends | own
 
 
-def _figures(scores, listed=()):
+def _cause(robot, effect, probability, decision, strength, group=""):
+    """A row of `withheld_causes`."""
+    own = {"robot": robot, "effect": effect, "probability": probability, "decision": decision, "group": group}
+    return {"check": "many", "acts": strength > 0.0, "strength": strength} | own
+
+
+def _figures(scores, listed=(), causes=()):
     """Robots and value by group and figure."""
     limits = pd.DataFrame(columns=TABLES["withheld_limits"].names)
-    table = summary(pd.DataFrame(scores), limits, pd.DataFrame(listed, columns=TABLES["withheld_parts"].names))
+    more = (("parts", listed), ("causes", causes))
+    frames = (pd.DataFrame(rows, columns=TABLES[f"withheld_{name}"].names) for name, rows in more)
+    table = summary(pd.DataFrame(scores), limits, *frames)
     return check("withheld_summary", table).set_index(["group", "figure"])
 
 
@@ -168,7 +198,7 @@ def test_parts_of_many_causes_are_counted():
         robots,
         [
             _part("many_0000", "backlash", "effect", 8.0, 9.9, True),
-            _part("many_0000", "axis_tilt", "effect", 3.1, 2.0, False),
+            _part("many_0000", "axis_tilt", "effect", 3.1, 2.2, False),
             _part("many_0000", "servo_lag", "effect", 0.0, 0.5, True),
             _part("many_0000", "joint_axis_error", "background", 9.0, 9.0, True),
             _part("many_0000", "unexplained", "unexplained", 0.0, 0.0, True),
@@ -177,20 +207,51 @@ def test_parts_of_many_causes_are_counted():
             _part("many_0001", "backlash", "effect", 2.5, 2.6, True),
             _part("many_0001", "scatter", "scatter", 2.2, 1.0, True),
         ],
+        [
+            _cause("many_0000", "backlash", 0.99, "named", 8.0),
+            _cause("many_0000", "axis_tilt", 0.4, "group", 3.1, "leg_asymmetry | axis_tilt"),
+            _cause("many_0000", "leg_asymmetry", 0.45, "group", 0.0, "leg_asymmetry | axis_tilt"),
+            _cause("many_0000", "servo_lag", 0.8, "named", 0.0),
+            _cause("many_0000", "joint_axis_error", 0.9, "named", 9.0),
+            _cause("many_0001", "backlash", 0.3, "group", 2.5, "backlash | servo_lag | link_flexure"),
+            _cause("many_0001", "servo_lag", 0.3, "group", 0.0, "backlash | servo_lag | link_flexure"),
+            _cause("many_0001", "link_flexure", 0.2, "group", 0.0, "backlash | servo_lag | link_flexure"),
+            _cause("many_0001", "base_placement", 0.02, "excluded", 0.3),
+        ],
     )
-    within = "found within 25 %"
+    within, covered = "found within 25 %", "found within 25 % or in its 95 % interval"
+    majors = "causes in the library, 0.3 of the gap or more"
     expected = {
-        ("causes in the library, 0.3 of the gap or more", "named"): (2, 0.5),
-        ("causes named", "not there"): (4, 0.25),
-        ("largest cause, where in the library", "named"): (1, 1.0),
-        ("parts >= 2 x noise", within): (6, 4 / 6),
-        ("parts >= 2 x noise, nothing from outside", within): (3, 2 / 3),
-        ("parts >= 2 x noise, a cause from outside", within): (3, 2 / 3),
-        ("a cause from outside >= 2 x noise", "unexplained"): (1, 0.0),
-        ("nothing from outside", "unexplained"): (1, 1.0),
+        (majors, "named"): (2, 0.5, 0.92),
+        (majors, "named, or in a group of two"): (2, 1.0, 0.96),
+        (majors, "named, or in a group"): (2, 1.0, np.nan),
+        (majors, "named alone, no group"): (2, 0.5, np.nan),
+        ("causes and groups named", "not there"): (5, 0.2, 0.02),
+        ("groups named", "mean number of members"): (2, 2.5, np.nan),
+        ("largest cause, where in the library", "named"): (1, 1.0, np.nan),
+        ("largest cause, where in the library", "named, or in a group of two"): (1, 1.0, 0.97),
+        ("parts >= 2 x noise", within): (6, 4 / 6, np.nan),
+        ("parts >= 2 x noise", covered): (6, 5 / 6, 0.95),
+        ("parts >= 2 x noise, nothing from outside", within): (3, 2 / 3, np.nan),
+        ("parts >= 2 x noise, nothing from outside", covered): (3, 1.0, np.nan),
+        ("parts >= 2 x noise, a cause from outside", within): (3, 2 / 3, np.nan),
+        ("parts >= 2 x noise, a cause from outside", covered): (3, 2 / 3, np.nan),
+        ("a cause from outside >= 2 x noise", "unexplained"): (1, 0.0, 0.92),
+        ("nothing from outside", "unexplained"): (1, 1.0, 0.05),
     }
     for key, values in expected.items():
-        np.testing.assert_allclose(table.loc[key, ["robots", "value"]].astype(float), values, err_msg=str(key))
+        found = table.loc[key, ["robots", "value", "asked"]].astype(float)
+        np.testing.assert_allclose(found, values, err_msg=str(key))
+    # a cause of less than half of the noise is neither right nor wrong
+    statements = table.xs("causes of 0.5 x noise or more, or that do not act", level="group")
+    assert (statements["robots"] == 8).all()
+    assert statements.loc["expected calibration error", "asked"] == 0.03
+    off = [0.01, 0.6, 0.45, 0.8, 0.1, 0.7, 0.3, 0.2]
+    np.testing.assert_allclose(statements.loc["Brier score", "value"], np.mean(np.square(off)))
+    np.testing.assert_allclose(statements.loc["log loss", "value"], -np.mean(np.log(1.0 - np.array(off))))
+    # 0.99 and 0.9 of two that act, 0.4 and 0.45 of one, 0.3 and 0.3 of one, 0.2 and 0.8 of none
+    sums = abs(1.89 - 2.0) + abs(0.85 - 1.0) + abs(0.6 - 1.0) + 0.2 + 0.8
+    np.testing.assert_allclose(statements.loc["expected calibration error", "value"], sums / 8.0)
 
 
 def test_a_budget_comes_with_every_diagnosis_and_finds_what_scatters():

@@ -28,6 +28,8 @@ from tests.studies.withheld.conditions import CONDITIONS, bare
 
 _LIBRARY = library(CONDITIONS.mechanism)
 _PART = {"part": "backlash", "kind": "effect", "rms_mm": 0.07, "probability": 0.99}
+_PART |= {"share": 0.8, "share_low": 0.7, "share_high": 0.9}
+_STATED = {"effect": "backlash", "probability": 0.99, "decision": "named", "group": ""}
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +59,11 @@ def _scored(robots, verdicts, states):
     told = answers[["robot", "kind"]].merge(told, on="robot")
     corrected = pd.DataFrame([state_row(name, *state, _LIBRARY) for name, state in states.items()])
     budget = pd.DataFrame([{"robot": name} | _PART for name in robots])
-    scored = score_chunk(answers, measurements, told, corrected, budget, {"": Known(CONDITIONS)})
+    stated = pd.DataFrame([{"robot": name} | _STATED for name in robots])
+    scored = score_chunk(answers, measurements, told, stated, corrected, budget, {"": Known(CONDITIONS)})
     for name, frame in scored._asdict().items():
         check(f"withheld_{name}", frame)
+    assert scored.causes.set_index("robot")["acts"].equals(pd.Series({name: name == "faulty" for name in robots}))
     return scored.scores.set_index("robot")
 
 
@@ -241,8 +245,8 @@ def test_the_summary_counts_whom_it_says():
     limit = pd.DataFrame(
         [{"check": "label", "robot": r, "weakest": weak.get(r, np.nan), "imitated_share": 0.1} for r in scores["robot"]]
     )
-    parts = pd.DataFrame(columns=TABLES["withheld_parts"].names)
-    table = check("withheld_summary", summary(scores, limit, parts)).set_index(["group", "figure"])
+    nothing = (pd.DataFrame(columns=TABLES[f"withheld_{name}"].names) for name in ("parts", "causes"))
+    table = check("withheld_summary", summary(scores, limit, *nothing)).set_index(["group", "figure"])
     expected = {
         ("one effect, gap >= 1.5 x noise", "named exactly"): (2, 0.5),
         ("nothing acts", "false alarms"): (2, 0.5),

@@ -3,7 +3,8 @@ from rrru.studies.withheld.chunks import chunks, described, rivalled, statement_
 CHECKS.append("rrru.studies.withheld.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
-WITHHELD_TABLES = [f"withheld_{name}" for name in ("verdicts", "scores", "limits", "parts", "summary", "confusion")]
+WITHHELD_NAMES = ("verdicts", "scores", "limits", "parts", "causes", "summary", "confusion")
+WITHHELD_TABLES = [f"withheld_{name}" for name in WITHHELD_NAMES]
 WITHHELD_ADVICE = ["withheld_advice", "withheld_advice_summary"]
 # the chunks that have robots whose cause is hidden
 WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.check == "label" for member in members)]
@@ -12,13 +13,13 @@ STATEMENTS = statement_chunks(config["withheld"]["sentences"])
 WITHHELD_FIGURES = {
     "withheld": (
         "rrru.studies.withheld.figures:withheld",
-        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+        ["withheld_scores", "withheld_confusion", "withheld_parts", "withheld_causes"],
     )
 }
 PLANTS_FIGURES = {
     "withheld_plants": (
         "rrru.studies.withheld.figures:withheld_plants",
-        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+        ["withheld_scores", "withheld_confusion", "withheld_parts", "withheld_causes"],
     )
 }
 FIGURES["withheld"] = WITHHELD_FIGURES
@@ -66,7 +67,10 @@ rule withheld_diagnose:
     input:
         **named(["withheld_measurements"], under("withheld/{chunk}")),
     output:
-        **named(["withheld_verdicts", "withheld_states", "withheld_budget"], under("withheld/{chunk}")),
+        **named(
+            [f"withheld_{name}" for name in ("verdicts", "stated", "states", "budget")],
+            under("withheld/{chunk}"),
+        ),
     log:
         f"{RESULTS}/logs/withheld_diagnose/{{chunk}}.log",
     params:
@@ -84,11 +88,14 @@ rule withheld_diagnose:
 rule withheld_score:
     input:
         **named(
-            [f"withheld_{name}" for name in ("answers", "measurements", "verdicts", "states", "budget")],
+            [f"withheld_{name}" for name in ("answers", "measurements", "verdicts", "stated", "states", "budget")],
             under("withheld/{chunk}"),
         ),
     output:
-        **named(["withheld_scores", "withheld_limits", "withheld_parts"], under("withheld/{chunk}")),
+        **named(
+            [f"withheld_{name}" for name in ("scores", "limits", "parts", "causes")],
+            under("withheld/{chunk}"),
+        ),
     log:
         f"{RESULTS}/logs/withheld_score/{{chunk}}.log",
     params:
@@ -134,7 +141,7 @@ rule withheld_summary:
     input:
         **{
             name: [under(f"withheld/{chunk}")(name) for chunk in WITHHELD]
-            for name in ("withheld_verdicts", "withheld_scores", "withheld_limits", "withheld_parts")
+            for name in (f"withheld_{name}" for name in WITHHELD_NAMES[:5])
         },
         field=[part("gap_verdicts", campaign) for campaign in config["withheld"]["field"]],
         field_answers=config["withheld"]["field_answers"] or [],
