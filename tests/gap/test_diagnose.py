@@ -35,6 +35,7 @@ DETAILS = {
     "gap_identifiability",
     "gap_budget",
     "gap_attribute",
+    "gap_remainder",
     "gap_sets",
     "gap_shrink",
     "gap_parameters",

@@ -81,5 +81,5 @@ def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_
     frame["measured_x_mm"] -= 0.08 * (4.0 * passed**3 - 3.0 * passed)
     found = diagnosed(frame, details=True)
     assert found.verdict["effects"] == "unexplained"
-    notes = found.tables["gap_attribute"].set_index("effect")["note"]
-    assert notes["unexplained"].startswith("follows the time")
+    best = found.tables["gap_remainder"].iloc[0]
+    assert best["follows"] == "the time" and best["explained"] > 0.9

@@ -85,6 +85,7 @@ _CASES = [
         ({}, {}, _FACTS),
     ),
     ("something is unexplained", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
+    ("the unexplained follows", ({}, _UNKNOWN, _OUTSIDE), ({}, {}, _OUTSIDE)),
     ("probability of this answer", ({}, {}, _FACTS), ({}, {}, _OUTSIDE)),
     ("probability", ({}, {}, _FACTS), ({}, {}, _NONE)),
     ("it does not repeat", ({"share": "0"}, {}, _FACTS), ({"share": "14"}, {}, _FACTS)),
