@@ -226,7 +226,7 @@ def _looks_like(rows):
     size = f"{rounded(best['rms_mm'])} mm rms"
     if best["explained"] < OPTIONS.min_followed_share:
         return [
-            f"What is unexplained follows no single variable that was tried: {best['follows']} comes next, a smooth "
+            f"The unexplained part follows no single variable that was tried: {best['follows']} comes next, a smooth "
             f"function of it predicts {percent(best['explained'])} at left-out points."
         ]
     how = "steps with" if not np.isfinite(best["scale"] or np.nan) else "a smooth function of"
@@ -235,7 +235,7 @@ def _looks_like(rows):
         scale, unit = np.degrees(scale), "degrees"
     over = f", which changes over about {rounded(scale)} {unit}," if how.startswith("a") else ""
     return [
-        f"What is unexplained follows {best['follows']}: {how} it{over} predict{'' if how[0] == 's' else 's'} "
+        f"The unexplained part follows {best['follows']}: {how} it{over} predict{'' if how[0] == 's' else 's'} "
         f"{percent(best['explained'])} of it at left-out points ({size})."
     ]
 

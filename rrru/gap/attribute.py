@@ -129,7 +129,7 @@ def _noise_columns(case, linear, known):
 
 
 def _best_shapes(linear, blocks):
-    """Those of some blocks of columns that leave least of the data beside the calibration, one of each effect."""
+    """Of each effect the block of columns that leaves least of the data together with the calibration."""
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     best = {}
     for key, columns in blocks.items():

@@ -81,7 +81,7 @@ class Candidates:
 
     def _left(self, terms, strengths, level):
         """Gram matrix (K, K), moments (K,) and across (K, x): what a set leaves is the first less across across^T."""
-        gram, across, moment, problem, scale = self._evidence.columns_beside(terms, strengths, level)
+        gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, strengths, level)
         if problem is None:
             return gram, moment, across
         own = gram[problem.index] - across[problem.index] @ across.T

@@ -224,8 +224,8 @@ class ModelEvidence:
         return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
 
     @_on_complete
-    def columns_beside(self, terms, strengths, level):
-        """All columns beside the broad term of a set, and the problem of the set's others.
+    def remaining_columns(self, terms, strengths, level):
+        """All columns other than the broad term of a set, and the problem of the set's others.
 
         Gram matrix (K, K) of all columns; across (K, z): what the broad term takes of it, its product with its
         transpose; moments (K,) after that; the Projected problem at the level (an index), and the prior deviations of

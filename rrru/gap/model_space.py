@@ -5,7 +5,7 @@ and again: sets with a term more, with one less, and with one term in place of a
 legs or in another shape. It ends when no such set has a share of the posterior worth mentioning: what is left out then
 is several worse steps away from all that matters. This is the neighbourhood search of C. Hans, A. Dobra and M. West,
 "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in the order of their weight in
-place of a random one; the sets kept are those of Occam's window (D. Madigan and A. Raftery, JASA 89, 1994).
+place of a random one; the sets retained are those of Occam's window (D. Madigan and A. Raftery, JASA 89, 1994).
 
 A neighbour is evaluated where it may matter by what its term adds at the strengths of the others, which stay. Two
 searches start from opposite ends, from nothing and from as many effects as the data bear. How far the probabilities of
@@ -186,8 +186,8 @@ class ModelSpace:
             if hopeless and not climb:
                 break
             if evidence[level] >= evidence.max() - (0.0 if hopeless else OPTIONS.window_nats):
-                beside = (one for one in (level - 1, level + 1) if one in allowed and evidence[one] == -np.inf)
-                waiting += [one for one in beside if one not in waiting]
+                nearest = (one for one in (level - 1, level + 1) if one in allowed and evidence[one] == -np.inf)
+                waiting += [one for one in nearest if one not in waiting]
         self._know(Hypothesis(tuple(terms), evidence, best))
         if climb or not hopeless:
             self._climbed.add(key)

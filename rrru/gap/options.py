@@ -197,7 +197,7 @@ class DiagnosisOptions:
     # --- what the unexplained part looks like ---
     # scales of a smooth function over the range of its variable: from ten waves to one; assumed
     remainder_scales: tuple[float, ...] = (0.05, 0.1, 0.2, 0.4, 0.8)
-    # values of the variable that such a function is told by; bounds the time
+    # inducing points of such a function; bounds the time
     remainder_points: int = 40
     # it follows a variable where that predicts this share of it at left-out points: more than all others together
     min_followed_share: float = 0.5
@@ -231,7 +231,7 @@ class DiagnosisOptions:
     # efforts of the robot's file say how much; assumed
     default_fast_pass_mm_s: float = 300.0
     default_added_payload_kg: float = 5.0
-    # a payload that nobody states is at most this share of what the robot itself moves, and at least so much; assumed
+    # a payload that is not stated is at most this share of what the robot itself moves, and at least so much; assumed
     max_payload_per_moved_mass: float = 0.5
     min_added_payload_kg: float = 0.1
     # share of a drive's effort that a payload may bring it to: the rest is for acceleration and friction; assumed

@@ -18,7 +18,7 @@ NO_PAYLOAD, WITHIN_LIMITS = "no run with a payload is proposed", "runs are propo
 
 @dataclass(frozen=True)
 class StatedLimits:
-    """Largest payload, largest speed of the tool and longest driving time of a run; None where nobody states it."""
+    """Largest payload, largest speed of the tool and longest driving time of a run; None where it is not stated."""
 
     payload_kg: float | None = None
     speed_mm_s: float | None = None
@@ -83,7 +83,7 @@ class RunLimits:
 def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits, str]:
     """The RunLimits of a Case with `rrru.robots.dynamics.Masses`, and why no payload is proposed, else "".
 
-    A payload that nobody states is what the drives' efforts of the robot's file leave at the campaign's points, else
+    A payload that is not stated is what the drives' efforts of the robot's file leave at the campaign's points, else
     `OPTIONS.default_added_payload_kg`; of both no more than a share of what the robot itself moves.
     """
     robot = case.mechanism
@@ -109,7 +109,7 @@ def run_limits(case: Any, masses: Any, stated: StatedLimits) -> tuple[RunLimits,
         driven = float(np.nan_to_num(case.measurements["payload_kg"].to_numpy(dtype=float)).max())
         return replace(limits, added_kg=added, payload_kg=max(_rounded_down(plausible, 1), driven)), ""
     if not why or plausible < spare:
-        why = f"the robot moves {moved:.2g} kg itself" if moved else "nobody states what the robot itself weighs"
+        why = f"the robot moves {moved:.2g} kg itself" if moved else "the mass of the robot itself is not stated"
     return replace(limits, added_kg=0.0), f"{NO_PAYLOAD}, {why}: state limits.payload_kg"
 
 

@@ -101,7 +101,7 @@ def decide(beliefs, library, small=frozenset()):
             best = max(answers, key=answers.get)
             effects, unexplained = tuple(sorted(best[0])), best[1]
     chosen = frozenset(effects), unexplained
-    # beside something unexplained more may act, which that may be
+    # with something unexplained more effects may act, as a part of that
     answers = {key for key in sets if key == chosen or (unexplained and key[1] and key[0] >= chosen[0])}
     probability = sum(p for key, p in sets.items() if key in answers)
     open_ones = {name: p for name, p in each.items() if name not in effects} | {"none": none, "unexplained": unknown}

@@ -55,7 +55,7 @@ def test_without_limits_a_payload_is_proposed_where_the_robot_moves_at_least_twi
     assert small.loaded_kg(0.0) == 0.0
     assert why == "no run with a payload is proposed, the robot moves 2 kg itself: state limits.payload_kg"
     unknown, why = run_limits(case, NO_MASSES, StatedLimits())
-    assert unknown.loaded_kg(0.0) == 0.0 and "nobody states what the robot itself weighs" in why
+    assert unknown.loaded_kg(0.0) == 0.0 and "the mass of the robot itself is not stated" in why
     heavy = run_limits(case_of(line.assign(payload_kg=5.0), {}), MASSES, StatedLimits())[0]
     assert heavy.loaded_kg(5.0) == 6.0
 
