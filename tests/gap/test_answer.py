@@ -213,8 +213,8 @@ def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_o
     follows = [("the value of axis2", 0.71, np.radians(12.0), "rad", 0.21), ("the time", 0.2, 60.0, "s", 0.1)]
     facts_of = answered(effects="unexplained", leg=0, follows=follows)
     assert (
-        "The unexplained part follows the value of axis2: a smooth function of it, which changes over about 12 degrees, "
-        "predicts 71 % of it at left-out points (0.21 mm rms)." in facts_of["sentences"]
+        "The unexplained part follows the value of axis2: a smooth function of it, which changes over about 12 "
+        "degrees, predicts 71 % of it at left-out points (0.21 mm rms)." in facts_of["sentences"]
     )
     jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
     unclear = answered(effects="unexplained", leg=0, follows=[("the time", 0.3, 60.0, "s", 0.1)])
