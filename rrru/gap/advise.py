@@ -69,7 +69,7 @@ def advise(attribution, verdict, masses, stated=None, sizes=None):
     )
     runs = runs.drop_duplicates("run").head(OPTIONS.max_advised_runs)[[*_COLUMNS]].reset_index(drop=True)
     told = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
-    open_still = not told and verdict.probability < OPTIONS.min_sure_probability
+    open_still = not told and verdict.sure < OPTIONS.min_sure_probability
     listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
     undecided = contests[0].separates if open_still else ""
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))

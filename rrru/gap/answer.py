@@ -382,7 +382,9 @@ def _next(facts):
         return said
     if facts["unexplained"]:
         return ["Next: no run is advised, since the library has nothing to test; see where the gap lies."]
-    if facts["probability"] >= OPTIONS.min_sure_probability:
+    decided = not (facts["groups"] or facts["confusable_with"])
+    least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
+    if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:
         return ["Next: nothing more needs to be measured for this answer."]
     return ["Next: no further run that was tried in computation would settle it."]
 

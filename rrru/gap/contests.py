@@ -24,8 +24,8 @@ def contests_of(attribution, verdict, sizes):
 
     First the members of each group, the set with its most probable one against the set with another one in its place;
     then the verdict against the most probable answer with, or without, the doubtful cause that makes most of the gap;
-    then the verdict against its nearest rivals. Of a verdict with something unexplained the groups alone: what is in no
-    library makes no data. sizes: by effect the rms in mm of its part of the gap.
+    then, of a verdict that is not sure, that against its nearest rivals. Of a verdict with something unexplained the
+    groups alone: what is in no library makes no data. sizes: by effect the rms in mm of its part of the gap.
     """
     found = {}
     for pair in _pairs(attribution.posterior, verdict, sizes):
@@ -56,8 +56,10 @@ def _pairs(posterior, verdict, sizes):
             _of(posterior, effects, *(((doubtful,), ()) if acts else ((), (doubtful,)))),
             posterior.best_where(lambda names: (doubtful in names) != acts),
         )
+    if verdict.sure >= OPTIONS.min_sure_probability:
+        return
     rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
-    if not rivals and verdict.probability < OPTIONS.min_sure_probability:
+    if not rivals:
         rivals = [names for names, flag in posterior.sets() if not flag and names != effects]
     for names in rivals:
         yield posterior.best_of(effects), posterior.best_of(names)

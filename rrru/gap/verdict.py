@@ -34,7 +34,7 @@ class Verdict:
     that no effect explains; probability: that exactly these act; leg: the one that is at fault, from 1 on, else 0;
     possible: what else may act, "unexplained" and "none" among it, the most probable first; rivals: other answers that
     the data leave open, each (names, unexplained, probability); groups: of causes that cannot be told apart; no_answer:
-    why the fit allows none, else empty.
+    why the fit allows none, else empty; sure: probability of the least sure of the decisions on single causes.
     """
 
     effects: tuple
@@ -45,6 +45,7 @@ class Verdict:
     rivals: tuple
     groups: tuple = ()
     no_answer: str = ""
+    sure: float = 0.0
 
     @property
     def label(self):
@@ -107,6 +108,12 @@ def decide(beliefs, library, small=frozenset()):
     open_ones = {name: p for name, p in each.items() if name not in effects} | {"none": none, "unexplained": unknown}
     taken = {"unexplained"} if unexplained else set() if effects else {"none"}
     least = OPTIONS.min_possible_probability
+    grouped = {name for group in groups for name in group.names}
+    # one cause of a group is as sure as it is among its rivals
+    decisions = [
+        p if name in effects else 1.0 - p for name, p in each.items() if name in effects or name not in grouped
+    ]
+    decisions += [1.0 - open_ones[name] for name in ("none", "unexplained") if name not in taken]
     possible = sorted((-p, name) for name, p in open_ones.items() if p > least and name not in taken)
     rivals = [(*key, p) for key, p in sets.items() if key not in answers]
     return Verdict(
@@ -117,6 +124,7 @@ def decide(beliefs, library, small=frozenset()):
         tuple(name for _, name in possible),
         tuple(rival for rival in rivals if rival[2] > OPTIONS.min_rival_probability_ratio * probability),
         groups,
+        sure=float(min(decisions)),
     )
 
 

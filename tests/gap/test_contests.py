@@ -72,4 +72,4 @@ def test_beside_something_unexplained_a_group_alone_is_contested():
 
 
 def test_nothing_is_contested_where_all_is_certain():
-    assert _contests({("a",): 0.99, (): 0.01}, effects=("a",), probability=0.99) == []
+    assert _contests({("a",): 0.99, (): 0.01}, effects=("a",), sure=0.99) == []

@@ -209,7 +209,7 @@ def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_s
     assert none.limited == "runs are proposed within the limits payload_kg 0"
     light = advise(found, verdict, Masses(0.5, 0.1, 0.1))
     assert light.undecided == none.undecided and light.limited.startswith("no run with a payload is proposed, ")
-    sure = advise(found, replace(verdict, probability=0.95), MASSES, StatedLimits(payload_kg=0.0))
+    sure = advise(found, replace(verdict, sure=0.95), MASSES, StatedLimits(payload_kg=0.0))
     assert sure.undecided == ""
 
 
