@@ -206,24 +206,24 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
-            if found_small := _small(fitted, dict((term.effect, share) for term, share in ordered), verdict):
-                small |= found_small
+            # once, of all that may act: what is left out then would be a part of what is left
+            if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
                 continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
         ruled_out |= worse
         attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
 
 
-def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> set[str]:
+def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
     """Effects of a verdict that may be a part of what is unexplained; shares: of the gap, of each effect."""
     if not verdict.unexplained:
-        return set()
+        return frozenset()
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
     residual = attribution.case.residual(attribution.calibrated)[attribution.case.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
-    alike, left_mm = followed_alike(remainder_rows(attribution), attribution.case.effects, tuple(shares))
+    alike, left_mm = followed_alike(attribution, remainder_rows(attribution), tuple(shares))
     least = OPTIONS.min_size_per_remainder * left_mm
-    return found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least}
+    return frozenset(found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least})
 
 
 def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:

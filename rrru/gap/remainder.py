@@ -20,7 +20,6 @@ from rrru.gap.options import OPTIONS
 from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
-TIME, PLACE, DRIVE = "the time", "the place", "the value of "
 NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
 # deviations of the function over the rms of what is left
 _AMPLITUDES = (0.3, 1.0, 3.0)
@@ -62,24 +61,38 @@ def remainder_rows(attribution):
     return pd.DataFrame(result, columns=COLUMNS)
 
 
-def followed_alike(rows, library, names):
-    """Which of some effects, by name, follow the variable that most of the remainder follows, and its rms in mm.
+def followed_alike(attribution, rows, names):
+    """Which of some effects of the fit do what the remainder does, and the remainder's rms in mm.
 
-    rows: of `gap_remainder`. Laws of the time follow the time, those of a drive's value the drives' values. The place
-    tells the drives' values, too: what needs nothing but these, as errors of assembly, follows it.
+    rows: of `gap_remainder`; names: of effects. Where one variable predicts most of the remainder, an effect is such a
+    one if its law knows that variable alone and most of its own part is a function as smooth as the one found: laws
+    that need the time for the time, laws that need nothing but the drives' values for these and for the place.
     """
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
         return (), 0.0
-    if best["follows"] == TIME:
-        chosen = [name for name in names if "time_s" in library[name].needs]
-    elif best["follows"] == PLACE:
-        chosen = [name for name in names if not library[name].needs]
-    elif best["follows"].startswith(DRIVE):
-        chosen = [name for name in names if getattr(library[name], "of_drive_value", False)]
-    else:
-        chosen = []
-    return tuple(chosen), float(best["rms_mm"]) if chosen else 0.0
+    case, linear, state = attribution.case, attribution.evidence.linear, attribution.state
+    on_robot = case.on_robot
+    variable = next(one for one in _variables(case, on_robot) if one.follows == best["follows"])
+    scaled = dict(_functions(variable))
+    functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
+    design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
+    found = []
+    for key, coordinates in state.effects.items():
+        part = (linear.columns[key] @ coordinates)[on_robot].ravel()
+        fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
+        if (
+            key[0] in names
+            and _knows(case.effects[key[0]], best["follows"])
+            and ((part - fitted) ** 2).sum() < (1.0 - OPTIONS.min_followed_share) * (part**2).sum()
+        ):
+            found.append(key[0])
+    return tuple(found), float(best["rms_mm"]) if found else 0.0
+
+
+def _knows(effect, follows):
+    """Whether a law knows the variable, in words, and no other but those that it determines."""
+    return "time_s" in effect.needs if follows == "the time" else not effect.needs
 
 
 def _variables(case, rows):
@@ -88,11 +101,11 @@ def _variables(case, rows):
     words, units = drive_words(case.mechanism), case.mechanism.parts.units
     names = words.all_names
     found = [
-        _Variable(f"{DRIVE}{name}", motion.drive[at, k : k + 1], unit, k)
+        _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
         for k, (name, unit) in enumerate(zip(names, units, strict=False))
     ]
-    found.append(_Variable(PLACE, motion.position_mm[at], "mm"))
-    found.append(_Variable(TIME, motion.time_s[at][:, None], "s"))
+    found.append(_Variable("the place", motion.position_mm[at], "mm"))
+    found.append(_Variable("the time", motion.time_s[at][:, None], "s"))
     found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
     speed = case.points["speed_mm_s"].to_numpy(dtype=float)[rows]
     found.append(_Variable("the speed", speed[:, None], "mm/s"))
@@ -109,16 +122,7 @@ def _predicted(variable, left, drive, fold, noise_mm):
     best = -np.inf, None, np.nan
     size = float(np.sqrt((left**2).mean()))
     for scale, functions in _functions(variable):
-        if variable.steps:
-            design = drive * functions[:, None, :]
-        elif variable.drive is not None:
-            own = drive[:, :, variable.drive]
-            # the function has the drive's unit, its size is that of what it makes
-            own = own / max(float(np.sqrt((own**2).mean())), 1e-300)
-            design = own[:, :, None] * functions[:, None, :]
-        else:
-            design = functions[:, None, None, :] * np.eye(3)[:, :, None]
-            design = design.reshape(len(left), 3, -1)
+        design = _design(variable, functions, drive)
         unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
         problem = _Regression(design * unit, left, noise_mm)
         for amplitude in _AMPLITUDES:
@@ -127,6 +131,18 @@ def _predicted(variable, left, drive, fold, noise_mm):
                 best = evidence, (problem, amplitude), scale
     problem, amplitude = best[1]
     return problem.left_out(fold, amplitude), best[2]
+
+
+def _design(variable, functions, drive):
+    """What functions (m, f) of a variable make of the positions (m, 3, k); drive (m, 3, K): derivative by drives."""
+    if variable.steps:
+        return drive * functions[:, None, :]
+    if variable.drive is not None:
+        own = drive[:, :, variable.drive]
+        # the function has the drive's unit, its size is that of what it makes
+        own = own / max(float(np.sqrt((own**2).mean())), 1e-300)
+        return own[:, :, None] * functions[:, None, :]
+    return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
 
 
 def _functions(variable):

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from rrru.gap.options import OPTIONS
-from rrru.gap.remainder import DRIVE, PLACE, TIME, _Regression, followed_alike, remainder_rows
+from rrru.gap.remainder import _Regression, followed_alike, remainder_rows
 from rrru.robots.rrru3 import Rrru3
 
 NOISE_MM = 0.02
@@ -99,20 +99,23 @@ def test_the_evidence_is_that_of_the_dense_normal_density():
         assert problem.log_evidence(amplitude) == pytest.approx(dense(amplitude) - dense(0.0), rel=1e-9)
 
 
-def test_laws_of_the_same_variable_are_found_by_what_they_need():
-    library = {
-        "drift": SimpleNamespace(needs=("time_s",), of_drive_value=False),
-        "gear": SimpleNamespace(needs=(), of_drive_value=True),
-        "flex": SimpleNamespace(needs=("force_n",), of_drive_value=False),
+def test_effects_that_make_what_the_variable_makes_are_found():
+    """A slow drift follows the time as the remainder does; waves of a drive do not, nor does a law of other needs."""
+    found = _attribution(_MADE["the time"], 1)
+    motion = found.case.motion
+    made = {
+        ("drift", 0): (motion.time_s / motion.time_s.max())[:, None, None] * np.ones((1, 3, 1)),
+        ("waves", 0): np.sin(60.0 * motion.drive[:, :1])[:, :, None] * np.ones((1, 3, 1)),
+        ("bend", 0): (motion.position_mm / 300.0)[:, :, None] ** 2,
+        ("shake", 0): np.sin(motion.time_s)[:, None, None] * np.ones((1, 3, 1)),
     }
-    for follows, expected in (
-        (TIME, ("drift",)),
-        (f"{DRIVE}leg 1", ("gear",)),
-        (PLACE, ("gear",)),
-        ("the payload", ()),
-    ):
-        rows = pd.DataFrame({"follows": [follows], "explained": [0.8], "rms_mm": [0.3]})
-        names, size = followed_alike(rows, library, tuple(library))
-        assert names == expected and size == (0.3 if expected else 0.0)
-    weak = pd.DataFrame({"follows": [TIME], "explained": [0.9 * OPTIONS.min_followed_share], "rms_mm": [0.3]})
-    assert followed_alike(weak, library, tuple(library)) == ((), 0.0)
+    needs = {"drift": ("time_s",), "waves": (), "bend": (), "shake": ("time_s",)}
+    found.case.effects = {name: SimpleNamespace(needs=own) for name, own in needs.items()}
+    found.evidence.linear.columns = made
+    found.state = SimpleNamespace(effects={key: np.ones(1) for key in made})
+    rows = remainder_rows(found)
+    names, size = followed_alike(found, rows, tuple(needs))
+    assert names == ("drift",) and size == rows["rms_mm"].iloc[0] > 0.0
+    assert followed_alike(found, rows, ("waves", "bend", "shake")) == ((), 0.0)
+    weak = rows.assign(explained=0.9 * OPTIONS.min_followed_share)
+    assert followed_alike(found, weak, ("drift",)) == ((), 0.0)
