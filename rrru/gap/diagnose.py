@@ -216,7 +216,8 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
 
 def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
     """Effects of a verdict that may be a part of what is unexplained; shares: of the gap, of each effect."""
-    if not verdict.unexplained:
+    # shares are of positions on the robot: reflectors elsewhere may show what hardly moves these
+    if not verdict.unexplained or attribution.case.beside.any():
         return frozenset()
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
     residual = attribution.case.residual(attribution.calibrated)[attribution.case.on_robot]
