@@ -87,7 +87,7 @@ class Motion:
         return self.load_slopes()
 
     @cached_property
-    def kept(self) -> dict[Any, Any]:
+    def cache(self) -> dict[Any, Any]:
         """What laws have made of this motion alone, so that it is made once."""
         return {}
 

@@ -22,7 +22,7 @@ _WIDE, _LINE_MM, _ROW_MM = 116, 3.7, 3.9
 _MAP_MM, _MOST_MM = 74.0, 238.0
 _BUDGET_MM = 16.0
 # steps of the arrows' scale: more numbers run into one another
-_TICKS = 5
+_TICKS, _FEW_TICKS = 5, 3
 # legs are named for effects at least this probable; numbers stand inside bars longer than this
 _NAMED_FROM, _INSIDE_FROM = 0.05, 0.6
 # more runs than this have no room for their trajectories' names, and for all their numbers
@@ -35,10 +35,11 @@ _JOINT = "\N{NO-BREAK SPACE}"
 @style.printed
 def gap(tables, options):
     """The gap between the calibrated sim and the measurement. On top its budget: the share of its mean square that
-    each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; parts that
-    are confounded do not add up to 1. The probability in the headline is that of exactly these causes. (a) Where:
+    each effect makes, that does not repeat, and that nothing explains, with 95 % intervals as thin lines; covariances
+    of confounded parts (hatched) and the sampling of the noise (dotted) complete them to 1. The probability in the
+    headline is that of exactly these causes, of a group alone that one of it acts. (a) Where:
     measured minus calibrated sim at the points from above and from the side, magnified as stated. (b) Why: probability
-    of every effect, those of the verdict in colour, those that cannot be told apart hatched. (c) Remaining gap: on runs
+    of every effect, those of the verdict in colour, those of a group hatched. (c) Remaining gap: on runs
     that were not fitted on, under the calibrated and the corrected sim, with the share closed. (d) Residual of every
     point.
     """
@@ -47,7 +48,7 @@ def gap(tables, options):
         frames[name] = choose.of_campaign(tables, name, campaign, "gap")
     verdict, causes, shrink = frames["gap_verdicts"].iloc[0], _ordered(frames["gap_attribute"]), frames["gap_shrink"]
     words = {"drives": options["drives"], "noun": options["drive_noun"]}
-    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, words)
+    points, headline = _sized(tables["gap_points"], campaign), _headline(verdict, causes, words)
     used = points[points["used"]]
     figure, panels = _page(sum(map(len, headline)), len(causes), shrink["trajectory"].nunique(), used)
     _write(panels["headline"], headline)
@@ -117,7 +118,7 @@ def _page(lines, causes, trajectories, used):
     return figure, panels
 
 
-def _headline(verdict, words):
+def _headline(verdict, causes, words):
     """Lines of the verdict itself, and of what is to be known and done about it."""
     groups = {names.split(" | ")[0]: names.replace(" | ", " or ") for names in verdict["groups"].split("; ")}
     name = _named("+".join(groups.get(one, one) for one in verdict["effects"].split("+")))
@@ -125,12 +126,16 @@ def _headline(verdict, words):
     if verdict["no_answer"]:
         return wrap(f"no cause is named: {verdict['no_answer']}", int(0.8 * _WIDE)), []
     closed = _NOTHING.get(verdict["effects"]) or _share(verdict, " of it closed")
-    sure = _probability(verdict["probability"], "= ", " ")
+    # of a group alone that one of it acts, else of exactly these
+    alone = causes.loc[causes["effect"] == verdict["effects"], "group_probability"].dropna()
+    sure = _probability(alone.iloc[0] if len(alone) else verdict["probability"], "= ", " ")
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")
     facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst spot {place} mm"]
     facts += [f"{verdict['dropped_points']} outliers left out"] if verdict["dropped_points"] else []
-    facts += [f"confusable with {_named(verdict['confusable_with'])}"] if verdict["confusable_with"] else []
+    grouped = causes.loc[causes["decision"] == "group", "effect"].tolist()
+    others = [one for one in verdict["confusable_with"].split(", ") if one and one not in grouped]
+    facts += [f"confusable with {_named(', '.join(others))}"] if others else []
     follow = wrap("; ".join(facts), _WIDE)
     follow += wrap(f"next: {verdict['next_runs']}", _WIDE) if verdict["next_runs"] else []
     # no line ends within an interval
@@ -206,6 +211,7 @@ def _shrink(axes, shrink, verdict):
     axes.set_yticks(place, ["all" if name == "*" else choose.plain(name) for name in names])
     most = 1.08 * np.nanmax([*np.concatenate(values), verdict["noise_rms_mm"]])
     axes.set(xlim=(0.0, most), ylim=(len(names) - 0.5, -0.5))
+    axes.xaxis.set_major_locator(MaxNLocator(_FEW_TICKS))
     axes.set(xlabel=f"{_KINDS[kind]} gap, rms (mm)", ylabel="trajectory")
     axes.set_title("(c) remaining gap")
     axes.grid(True, axis="x")

@@ -1,8 +1,12 @@
 """The budget of a gap as one stacked bar with the intervals of its parts."""
 
+import numpy as np
+
 from rrru.figures import style
 
 _COLOURS = {"scatter": "#aaaaaa", "runs": "#cccccc", "unexplained": "#d55e00", "calibration": "#eeeeee"}
+# what completes the parts to the whole: products of two of them, and what the draw of the noise leaves
+_RESTS = {"covariance": "/////", "sampling": "....."}
 _EFFECTS = (style.BLUE, "#56b4e9", "#009e73", "#cc79a7", "#f0e442", "#0072b2")
 # parts of a smaller share are not drawn, or not named; names stand inside of parts wider than this for each letter
 _LEAST, _NAMED, _LETTER = 0.01, 0.03, 0.0125
@@ -11,7 +15,8 @@ _LEAST, _NAMED, _LETTER = 0.01, 0.03, 0.0125
 def draw(axes, rows):
     """Parts of `gap_budget` one after the other: effects by share, then what does not repeat, runs and the unknown.
 
-    A thin line in each part is its 95 % interval, counted from the part's beginning.
+    A thin line in each part is its 95 % interval, counted from the part's beginning. Covariances of parts (hatched) and
+    the sampling of the noise (dotted) complete them to 1; negative ones extend to the left of 0.
     """
     shown = rows[(rows["share"] > _LEAST) & ~rows["kind"].isin(["covariance", "sampling"])]
     effects = shown[shown["kind"] == "effect"].sort_values("share", ascending=False)
@@ -33,7 +38,27 @@ def draw(axes, rows):
             axes.text(middle, -0.36 if below else 0.34, text, **place)
             below = not below
         start += part["share"]
-    axes.set(xlim=(0.0, max(start, 1.0)), ylim=(-0.75, 0.75), yticks=[])
+    least = _rests(axes, rows, start)
+    axes.set(xlim=(min(least[0], 0.0), max(start, least[1], 1.0)), ylim=(-0.75, 0.75), yticks=[])
     axes.set(xlabel="share of the gap's mean square", ylabel="budget")
     for side in ("left", "right", "top"):
         axes.spines[side].set_visible(False)
+
+
+def _rests(axes, rows, start):
+    """Draw covariances and sampling as one part each from `start` on, negative ones to the left of 0; both ends."""
+    ends = {1.0: start, -1.0: 0.0}
+    for kind, hatch in _RESTS.items():
+        share = float(rows.loc[rows["kind"] == kind, "share"].sum())
+        if abs(share) <= _LEAST:
+            continue
+        sign = float(np.sign(share))
+        look = {"facecolor": "white", "edgecolor": "#777777", "hatch": hatch, "linewidth": 0.6}
+        axes.barh(0.0, share, left=ends[sign], height=0.6, **look)
+        if abs(share) > _NAMED:
+            place = {"ha": "center", "va": "bottom", "fontsize": 7.0, "in_layout": False}
+            axes.text(
+                ends[sign] + 0.5 * share, 0.34, f"{kind} {100.0 * share:.0f} %".replace("-", "\N{MINUS SIGN}"), **place
+            )
+        ends[sign] += share
+    return ends[-1.0], ends[1.0]

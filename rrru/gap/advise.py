@@ -68,8 +68,8 @@ def advise(attribution, verdict, masses, stated=None, sizes=None):
         ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
     )
     runs = runs.drop_duplicates("run").head(OPTIONS.max_advised_runs)[[*_COLUMNS]].reset_index(drop=True)
-    told = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
-    open_still = not told and verdict.sure < OPTIONS.min_sure_probability
+    some_gain = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
+    open_still = not some_gain and verdict.sure < OPTIONS.min_sure_probability
     listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
     undecided = contests[0].separates if open_still else ""
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
@@ -87,8 +87,8 @@ def _runs(attribution, contests, masses, limits):
         now, added = worth(attribution, contest.truth, contest.imitator, planned)
         start = now.nats()
         for run, one in zip(choice, added, strict=True):
-            told = {"contest": number, "separates": contest.separates, "now_nats": start}
-            result.append(run | told | {"gain_nats": (now + one).nats() - start})
+            about = {"contest": number, "separates": contest.separates, "now_nats": start}
+            result.append(run | about | {"gain_nats": (now + one).nats() - start})
     return result
 
 
@@ -138,8 +138,7 @@ def _poses(attribution, contest, masses, limits):
         if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
             count, most = len(chosen), gain
             words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
-            told = contest.separates, now.nats(), gain
-            row = *words, speed, load, count * OPTIONS.points_per_pass, *told
+            row = *words, speed, load, count * OPTIONS.points_per_pass, contest.separates, now.nats(), gain
             listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
             best = [{"contest": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
     return best

@@ -9,6 +9,7 @@ from rrru.effects.causes import cause_texts
 from rrru.gap.options import OPTIONS
 from rrru.gap.result_notes import REPEATABILITY_UNKNOWN
 from rrru.gap.run_limits import NO_PAYLOAD, WITHIN_LIMITS
+from rrru.gap.verdict import POSSIBLE
 from rrru.robots.drive_words import DriveWords
 
 SCHEMA = 1
@@ -32,6 +33,7 @@ _WORDS = DriveWords()
 _READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
 _READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
 _LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
+_UNSURE = "No cause is probable enough to be named; the most probable answer follows."
 _RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
 
 
@@ -156,6 +158,7 @@ def _effect(name, tables, budget, drives):
         "name": name,
         **vars(cause_texts(name, drives, one)),
         "probability": _clipped(cause["probability"]),
+        "decision": cause["decision"],
         "legs": legs,
         "place": drives.place(*one) if one else "",
         **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
@@ -166,12 +169,15 @@ def _effect(name, tables, budget, drives):
 
 def _group(names, tables, budget):
     """Facts of causes that cannot be told apart."""
-    each = tables["gap_attribute"].set_index("effect")["probability"]
+    causes = tables["gap_attribute"].set_index("effect").loc[names]
     shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
-    probabilities = [_clipped(float(each[name])) for name in names]
-    # they exclude each other, or nearly so
-    together = {"probability": _clipped(sum(probabilities)), "share": sum(shares.get(name, 0.0) for name in names)}
-    return {"names": names, "probabilities": probabilities, **together}
+    return {
+        "names": names,
+        "probabilities": [_clipped(float(one)) for one in causes["probability"]],
+        "probability": _clipped(float(causes["group_probability"].iloc[0])),
+        # they exclude each other, or nearly so
+        "share": sum(shares.get(name, 0.0) for name in names),
+    }
 
 
 def _no_answer(facts):
@@ -193,14 +199,19 @@ def _missed(facts):
 
 def _causes(facts):
     """What makes the gap, and how sure that is."""
-    told = _shares_told(facts)
+    with_shares = _shares_told(facts)
     groups = {group["names"][0]: group for group in facts["groups"]}
     single = [effect for effect in facts["effects"] if effect["name"] not in groups]
-    single = [effect for effect in single if not (told and _is_small(effect, facts))]
-    said = [_by_share(facts, groups)] if told and len(facts["effects"]) > 1 else []
-    said += [_cause(effect, "" if number else " of that", told) for number, effect in enumerate(single)]
-    said += [_of_group(group, told) for group in groups.values()]
-    if not told and said:
+    small = [effect["name"] for effect in single if with_shares and _is_small(effect, facts)]
+    if len(small) == len(facts["effects"]):
+        # of causes that are all small none is more worth a sentence than the others
+        small = []
+    said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
+    said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
+    single = [effect for effect in single if effect["name"] not in small]
+    said += [_cause(effect, "" if number else " of that", with_shares) for number, effect in enumerate(single)]
+    said += [_of_group(group, with_shares) for group in groups.values()]
+    if not with_shares and said:
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
         said.append(f"{why}: their shares of the gap cannot be determined.")
@@ -246,26 +257,24 @@ def _is_small(effect, facts):
     return effect["share"] is not None and (small or effect["share"] < OPTIONS.min_cause_share)
 
 
-def _by_share(facts, groups):
-    """All causes in a line, each with its share, the small ones counted."""
-    listed, small = [], 0
+def _by_share(facts, groups, small):
+    """All causes in a line, each with its share, the small ones of so many counted."""
+    listed = []
     for effect in facts["effects"]:
         if group := groups.get(effect["name"]):
             listed.append((group["share"], " or ".join(map(readable, group["names"]))))
-        elif _is_small(effect, facts):
-            small += 1
-        else:
+        elif not (small and _is_small(effect, facts)):
             listed.append((effect["share"] or 0.0, readable(effect["name"])))
     words = [f"{name} {percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
     words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
     return f"Causes by their share of the gap: {', '.join(words)}."
 
 
-def _of_group(group, told):
+def _of_group(group, with_shares):
     """Causes of which one acts, and which these data cannot tell apart."""
     names = [readable(name) for name in group["names"]]
     each = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
-    share = f"; together they make {percent(group['share'])} of the gap" if told else ""
+    share = f"; together they make {percent(group['share'])} of the gap" if with_shares else ""
     return (
         f"One of these acts, and these data cannot tell which: {each} (probability that one does: "
         f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."

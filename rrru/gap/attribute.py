@@ -118,14 +118,21 @@ def _noise_columns(case, linear, known):
     number needs to be left; where it is not and the library explains everything, what the calibration leaves has to do.
     """
     blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
-    few = {key: one for key, one in blocks.items() if not case.library[key[0]].coordinates.broad}
-    fitting = _best_shapes(linear, few)
-    laws = {key: one for key, one in fitting.items() if key[0] not in UNKNOWN}
-    for chosen in (blocks, few, fitting, laws):
+    for chosen in _fewer_blocks(linear, blocks, case.library):
         columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
         if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size):
             return columns
     return columns if known else linear.base
+
+
+def _fewer_blocks(linear, blocks, library):
+    """Blocks of columns by (effect, shape), in steps fewer of them."""
+    yield blocks
+    few = {key: one for key, one in blocks.items() if not library[key[0]].coordinates.broad}
+    yield few
+    fitting = _best_shapes(linear, few)
+    yield fitting
+    yield {key: one for key, one in fitting.items() if key[0] not in UNKNOWN}
 
 
 def _best_shapes(linear, blocks):
@@ -254,9 +261,9 @@ def _rounds(case, calibrated, prior, stated):
     hypothesis = None
     for _ in range(OPTIONS.max_search_rounds):
         space = ModelSpace(evidence.on_library(), prior)
-        searches = [space.search(hypothesis.terms if hypothesis else ())]
+        first, confirmed = space.search(hypothesis.terms if hypothesis else ()), False
+        beliefs = space.posterior([first])
         while True:
-            beliefs = space.posterior(searches)
             hypothesis, level = beliefs.best()
             shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
             unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
@@ -268,10 +275,10 @@ def _rounds(case, calibrated, prior, stated):
             tried, its_level = named or (hypothesis, level)
             ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
             ended |= settled and (tried is hypothesis or not tried.terms)
-            if len(searches) > 1 or not ended:
+            if confirmed or not ended:
                 break
             # an answer stands once a search from the other end has found nothing better
-            searches.append(space.search(space.fullest()))
+            beliefs, confirmed = space.confirmed(first), True
         if ended:
             break
         seen.add(frozenset(hypothesis.terms))
@@ -290,10 +297,9 @@ def _rounds(case, calibrated, prior, stated):
         evidence = case.evidence(linear)
     else:
         space = ModelSpace(evidence.on_library(), prior)
-        searches = [space.search(hypothesis.terms)]
-    if len(searches) == 1:
-        searches.append(space.search(space.fullest()))
-    beliefs = space.posterior(searches)
+        first, confirmed = space.search(hypothesis.terms), False
+    if not confirmed:
+        beliefs = space.confirmed(first)
     hypothesis, level = beliefs.best()
     result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
     # estimate and hypothesis are of one set, whether the rounds have ended or gone round

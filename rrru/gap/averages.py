@@ -29,7 +29,7 @@ class Average:
         self.evidence = float(0.5 * self._half @ self._half - np.log(np.diag(self._factor)).sum())
 
     @cached_property
-    def kept(self):
+    def others(self):
         """Which columns (K,) other terms of a set may have."""
         result = np.full(len(self._moment), True)
         result[self._index] = result[self._apart] = False
@@ -40,7 +40,7 @@ class Average:
         """What the average takes of the other columns (K, z): their Gram matrix less it times its transpose is left."""
         columns = self._size[:, None] * self._gram[self._index]
         half = solve_triangular(self._factor, columns, lower=True, check_finite=False)
-        return np.where(self.kept[:, None], half.T, 0.0)
+        return np.where(self.others[:, None], half.T, 0.0)
 
     @cached_property
     def moment(self):

@@ -25,7 +25,7 @@ def contests_of(attribution, verdict, sizes):
     First the members of each group, the set with its most probable one against the set with another one in its place;
     then the verdict against the most probable answer with, or without, the doubtful cause that makes most of the gap;
     then, of a verdict that is not sure, that against its nearest rivals. Of a verdict with something unexplained the
-    groups alone: what is in no library makes no data. sizes: by effect the rms in mm of its part of the gap.
+    groups alone: an effect outside of the library makes no data. sizes: by effect the rms in mm of its part of the gap.
     """
     found = {}
     for pair in _pairs(attribution.posterior, verdict, sizes):
@@ -51,7 +51,7 @@ def _pairs(posterior, verdict, sizes):
         return
     if doubtful := _doubtful(posterior, verdict, sizes):
         acts = doubtful in effects
-        # without a cause others may do what it does: its rival is what is then the most probable
+        # without a cause others may do what it does: its rival is the most probable answer without it
         yield (
             _of(posterior, effects, *(((doubtful,), ()) if acts else ((), (doubtful,)))),
             posterior.best_where(lambda names: (doubtful in names) != acts),
@@ -86,6 +86,6 @@ def _contest(favoured, other):
     names = [label(sorted(hypothesis.effects), False) for hypothesis, _ in (favoured, other)]
     if names[0] == names[1]:
         return None
-    # a rival may be one only beside something small that is unknown
+    # a rival may be one only together with something small that is unknown
     larger = len(favoured[0].terms) >= len(other[0].terms)
     return Contest(" / ".join(names), *((favoured, other) if larger else (other, favoured)))

@@ -51,6 +51,8 @@ def _attribute_rows(attribution, verdict):
     result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
     rows = pd.DataFrame(result)
     rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
+    groups = map(verdict.group_of, rows["effect"])
+    rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
     return rows
 
 

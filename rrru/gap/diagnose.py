@@ -59,13 +59,14 @@ class MeasuredRobot:
 @dataclass(frozen=True)
 class Diagnosis:
     """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
-    corrected sim; attribution: everything that the search found.
+    corrected sim; attribution: everything that the search found; decided: the Verdict itself.
     """
 
     verdict: dict[str, Any]
     tables: dict[str, pd.DataFrame]
     state: State
     attribution: Attribution
+    decided: Verdict
 
 
 def sim(mechanism: Any) -> Any:
@@ -113,7 +114,7 @@ def diagnose(
     tables["gap_remainder"] = remainder_rows(attribution) if unexplained else NO_REMAINDER
     if details:
         tables |= details_of(attribution, verdict, steps, residual, generator, settings.draws)
-    return Diagnosis(row, tables, attribution.state, attribution)
+    return Diagnosis(row, tables, attribution.state, attribution, verdict)
 
 
 def _found(attribution: Attribution) -> Iterator[str]:
@@ -206,7 +207,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
             ordered = order_by_share(fitted)
-            # once, of all that may act: what is left out then would be a part of what is left
+            # decided once, with all effects fitted: one that is left out would be a part of the remainder
             if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
                 continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
@@ -215,7 +216,7 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
 
 
 def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
-    """Effects of a verdict that may be a part of what is unexplained; shares: of the gap, of each effect."""
+    """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
     # shares are of positions on the robot: reflectors elsewhere may show what hardly moves these
     if not verdict.unexplained or attribution.case.beside.any():
         return frozenset()

@@ -2,10 +2,11 @@
 
 From a starting set on, the neighbours of the most probable set whose neighbours are not known yet are evaluated, again
 and again: sets with a term more, with one less, and with one term in place of another, be it the same effect on other
-legs or in another shape. It ends when no such set has a share of the posterior worth mentioning: what is left out then
-is several worse steps away from all that matters. This is the neighbourhood search of C. Hans, A. Dobra and M. West,
-"Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in the order of their weight in
-place of a random one; the sets retained are those of Occam's window (D. Madigan and A. Raftery, JASA 89, 1994).
+legs or in another shape, then also with one term less. It ends when no such set has a share of the posterior worth
+mentioning: a set left out then is several worse steps away from all that matters. This is the neighbourhood search of
+C. Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in
+the order of their weight in place of a random one; the sets retained are those of Occam's window (D. Madigan and A.
+Raftery, JASA 89, 1994).
 
 A neighbour is evaluated where it may matter by what its term adds at the strengths of the others, which stay. Two
 searches start from opposite ends, from nothing and from as many effects as the data bear. How far the probabilities of
@@ -35,10 +36,7 @@ def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
     are ruled out.
     """
     space = ModelSpace(evidence, prior, without, most)
-    searches = [space.search(())]
-    if len(space.library) > 1:
-        searches.append(space.search(space.fullest()))
-    return space.posterior(searches)
+    return space.confirmed(space.search(()))
 
 
 @dataclass
@@ -72,12 +70,24 @@ class ModelSpace:
     def _candidates(self):
         return Candidates(self._evidence, self._terms)
 
+    def confirmed(self, first):
+        """The Posterior after a search and one from the other end; where these differ, after one from both answers."""
+        searches = [first, self.search(self.fullest())]
+        found = self.posterior(searches)
+        if found.apart > OPTIONS.max_searches_apart:
+            best = [max(one.reached, key=lambda key: self._known[key].height) for one in searches]
+            both = {term.effect: term for key in best for term in self._known[key].hypothesis.terms}
+            searches.append(self.search(tuple(both.values())[: self._most]))
+            found = self.posterior(searches)
+        return found
+
     def posterior(self, searches):
-        """The Posterior over all sets that have been evaluated, with what sets apart the searches."""
+        """The Posterior over all sets that have been evaluated, with what sets the two best searches apart."""
         found = list(self._known.values())
         result = Posterior.of(found)
         causes = self.library.keys() - UNKNOWN.keys()
         each = [Posterior.of([self._known[key] for key in one.reached]) for one in searches]
+        each = sorted(each, key=lambda beliefs: -beliefs.total)[:2]
         marginals = np.array([[beliefs.marginal(name) for name in sorted(causes)] for beliefs in each])
         apart = float(np.ptp(marginals, axis=0).max(initial=0.0))
         expanded = {key: None for one in searches for key in one.expanded}
@@ -166,6 +176,13 @@ class ModelSpace:
         for _, neighbour, scales in chosen[: OPTIONS.max_neighbours]:
             self._evaluate(neighbour, level, scales)
             found.reach(neighbour)
+            if {term.effect for term in neighbour} == centre.hypothesis.effects:
+                # an effect on other legs or in another shape may do what another one was needed for
+                for out in range(len(neighbour) - 1):
+                    rest = [k for k in range(len(neighbour)) if k != out]
+                    smaller = tuple(neighbour[k] for k in rest)
+                    self._evaluate(smaller, level, scales[rest])
+                    found.reach(smaller)
 
     def _evaluate(self, terms, level, strengths, climb=False):
         """Evaluate a set of terms unless it is known: at a level, and at those next to it as long as they matter.

@@ -130,14 +130,14 @@ class DiagnosisOptions:
     min_named_probability: float = 0.7
     # with something unexplained an effect that makes less of the gap by itself may be a part of that; the usual 5 %
     min_share_with_unexplained: float = 0.05
-    # what is unexplained and follows the same variable as an effect: the effect has to be so many times as large, or it
-    # may be a part of that which has the law's form by chance; assumed
+    # an effect that does what the remainder does has to be so many times as large, or it may be a part of that which
+    # has the law's form by chance; assumed
     min_size_per_remainder: float = 2.0
     # causes of less probability are excluded; the usual 5 %
     min_possible_probability: float = 0.05
     # causes of a group act together less often than this share of what independent ones do; assumed
     max_joint_probability_ratio: float = 0.5
-    # a longer list of causes that cannot be told apart says nothing; assumed
+    # a longer list of rivals says nothing; assumed
     max_group_size: int = 3
     # something unexplained is more probable than not
     min_unexplained_probability: float = 0.5

@@ -48,9 +48,9 @@ class Posterior:
         Single effects stay, however improbable: tables show what each does alone.
         """
         least = max(one.height for one in weighed) - OPTIONS.negligible_nats
-        kept = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]
-        weights, flags = (np.array([getattr(one, name) for one in kept]) for name in ("log_weights", "unexplained"))
-        return cls(tuple(one.hypothesis for one in kept), weights, flags, apart, expanded)
+        chosen = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]
+        weights, flags = (np.array([getattr(one, name) for one in chosen]) for name in ("log_weights", "unexplained"))
+        return cls(tuple(one.hypothesis for one in chosen), weights, flags, apart, expanded)
 
     @property
     def total(self):

@@ -21,7 +21,7 @@ from rrru.robots.drive_words import drive_words
 
 COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
 NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
-# deviations of the function over the rms of what is left
+# deviations of the function over the rms of the remainder
 _AMPLITUDES = (0.3, 1.0, 3.0)
 _JITTER = 1e-8
 
@@ -43,7 +43,7 @@ def remainder_rows(attribution):
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
-    over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of what is predicted.
+    over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
     """
     case = attribution.case
     rows = case.on_robot
@@ -117,7 +117,7 @@ def _variables(case, rows):
 def _predicted(variable, left, drive, fold, noise_mm):
     """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
 
-    left, fold (m, 3), (m,): what is to be predicted; drive (m, 3, K): derivative by the actuator values.
+    left (m, 3): the remainder; fold (m,): of its rows; drive (m, 3, K): derivative by the actuator values.
     """
     best = -np.inf, None, np.nan
     size = float(np.sqrt((left**2).mean()))

@@ -76,7 +76,7 @@ class RunLimits:
         return float(1.0 / highest) if highest > 0.0 else np.inf
 
     def allows(self, speed_mm_s: float, payload_kg: float, seconds: float = np.nan) -> bool:
-        """Whether a run keeps the limits; what is NaN is unknown and keeps them."""
+        """Whether a run stays within the limits; NaN is unknown and does."""
         return not (speed_mm_s > self.speed_mm_s or payload_kg > self.payload_kg or seconds > self.seconds)
 
 

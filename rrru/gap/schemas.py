@@ -123,8 +123,9 @@ Probability of each effect as a cause of the gap, none and unexplained included.
 campaign
 effect                 str    name in the library or of the user's, none or unexplained
 probability            float  that it is at work, 0 to 1; several may be at once
-decision               str    named: from a probability of 0.7 on; group: one of several that cannot be told apart, one
-    of which is as probable; possible: above 0.05; excluded {named, group, possible, excluded}
+decision               str    named: from a probability of 0.7 on; group: one of several confounded ones, of which
+    one acts as probably; possible: above 0.05; excluded {named, group, possible, excluded}
+group_probability      float? that one of its group is at work; null where it is in none
 legs                   str    on each leg its own value, one value on all (same), or the one leg; empty where legs
     make no difference
 log_evidence           float? of the best hypothesis with this effect over none, natural logarithm

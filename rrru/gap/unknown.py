@@ -50,9 +50,9 @@ class Unknown:
 
     def _once(self, motion, make):
         """The functions along a motion, made once."""
-        if self.name not in motion.kept:
-            motion.kept[self.name] = make()
-        return motion.kept[self.name]
+        if self.name not in motion.cache:
+            motion.cache[self.name] = make()
+        return motion.cache[self.name]
 
 
 def _unit(values):

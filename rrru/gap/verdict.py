@@ -1,4 +1,4 @@
-"""The decision of a diagnosis: which causes are named, which cannot be told apart, and which leg is at fault.
+"""The decision of a diagnosis: which causes are named, which are confounded, and which leg is at fault.
 
 A decision is not a probability. A cause is named where it acts with a probability of at least
 `OPTIONS.min_named_probability`: naming a cause that does not act then costs as much as missing this many
@@ -22,7 +22,7 @@ NAMED, GROUPED, POSSIBLE, EXCLUDED = "named", "group", "possible", "excluded"
 
 @dataclass(frozen=True)
 class Group:
-    """Causes that these data cannot tell apart, the most probable first, and the probability that one of them acts."""
+    """Confounded causes, of which one acts, the most probable first, and the probability that one of them acts."""
 
     names: tuple
     probability: float
@@ -32,8 +32,8 @@ class Group:
 class Verdict:
     """effects: names in order of share, () for none, of a group the most probable one; unexplained: something is left
     that no effect explains; probability: that exactly these act; leg: the one that is at fault, from 1 on, else 0;
-    possible: what else may act, "unexplained" and "none" among it, the most probable first; rivals: other answers that
-    the data leave open, each (names, unexplained, probability); groups: of causes that cannot be told apart; no_answer:
+    possible: what may act and has no name, "unexplained" and "none" among it, the most probable first; rivals: other
+    answers that the data leave open, each (names, unexplained, probability); groups: of confounded causes; no_answer:
     why the fit allows none, else empty; sure: probability of the least sure of the decisions on single causes.
     """
 
@@ -54,16 +54,25 @@ class Verdict:
 
     @property
     def confusable_with(self):
-        """What these data cannot tell from the answer: other causes of its groups, and what is possible besides."""
+        """Causes that may act and are not in the answer: the others of its groups, and those that are possible."""
         grouped = [name for group in self.groups for name in group.names[1:]]
-        return tuple(dict.fromkeys([*grouped, *self.possible]))
+        return tuple(name for name in dict.fromkeys([*grouped, *self.possible]) if name not in self.effects)
+
+    def group_of(self, name):
+        """The Group that a cause belongs to, None for none."""
+        return next((group for group in self.groups if name in group.names), None)
 
     def decision(self, name):
-        """The decision on a cause: NAMED, GROUPED, POSSIBLE or EXCLUDED."""
-        if any(name in group.names for group in self.groups):
+        """The decision on a cause: NAMED, GROUPED, POSSIBLE or EXCLUDED.
+
+        Causes of the most probable answer where none is probable enough for a name are POSSIBLE.
+        """
+        if self.group_of(name):
             return GROUPED
+        if name in self.possible:
+            return POSSIBLE
         chosen = name in self.effects or (name == "unexplained" and self.unexplained) or name == self.label
-        return NAMED if chosen else POSSIBLE if name in self.possible else EXCLUDED
+        return NAMED if chosen else EXCLUDED
 
 
 def without_answer(why):
@@ -80,8 +89,9 @@ def decide(beliefs, library, small=frozenset()):
     """Verdict of a Posterior; library: the effects that may be named, by name; small: those that are not, see below.
 
     Nothing is named as long as "none" has a probability of 0.2: a false alarm costs more than a gap too small to
-    matter. Something is unexplained where that is more probable than not; an effect that makes a small part of the gap
-    may then be a part of that.
+    matter. Where something acts and no cause is probable enough, the most probable answer with a cause stands, and its
+    causes are called possible. Something is unexplained where that is more probable than not; an effect that makes a
+    small part of the gap may then be a part of that.
     """
     sets, unknown = beliefs.sets(), beliefs.probability_unexplained
     none = sets.get(_NONE, 0.0)
@@ -101,14 +111,17 @@ def decide(beliefs, library, small=frozenset()):
             answers = {key: p for key, p in sets.items() if key != _NONE}
             best = max(answers, key=answers.get)
             effects, unexplained = tuple(sorted(best[0])), best[1]
+    named = {name for name in effects if each[name] >= OPTIONS.min_named_probability}
     chosen = frozenset(effects), unexplained
     # with something unexplained more effects may act, as a part of that
     answers = {key for key in sets if key == chosen or (unexplained and key[1] and key[0] >= chosen[0])}
     probability = sum(p for key, p in sets.items() if key in answers)
-    open_ones = {name: p for name, p in each.items() if name not in effects} | {"none": none, "unexplained": unknown}
+    grouped = {name for group in groups for name in group.names}
+    firsts = {group.names[0] for group in groups}
+    open_ones = {name: p for name, p in each.items() if name not in named | firsts}
+    open_ones |= {"none": none, "unexplained": unknown}
     taken = {"unexplained"} if unexplained else set() if effects else {"none"}
     least = OPTIONS.min_possible_probability
-    grouped = {name for group in groups for name in group.names}
     # one cause of a group is as sure as it is among its rivals
     decisions = [
         p if name in effects else 1.0 - p for name, p in each.items() if name in effects or name not in grouped
@@ -139,11 +152,10 @@ def _groups(beliefs, names, each):
         for name in left[1:]:
             if len(members) < OPTIONS.max_group_size and all(_exclude(beliefs, each, name, one) for one in members):
                 members.append(name)
-        together = beliefs.any_of(members)
-        # as few as make it probable enough
+        # as few as make it sure
         while len(members) > 2 and beliefs.any_of(members[:-1]) >= OPTIONS.min_sure_probability:
             members.pop()
-            together = beliefs.any_of(members)
+        together = beliefs.any_of(members)
         if len(members) > 1 and together >= OPTIONS.min_named_probability:
             found.append(Group(tuple(members), float(together)))
             left = [name for name in left if name not in members]

@@ -198,7 +198,11 @@ SECTIONS = (
         "withheld",
         "How far the diagnosis may be trusted",
         "Virtual robots whose causes were withheld from the diagnosis and counted afterwards.",
-        figures=(("withheld", "Answers beside the truth"), ("withheld_plants", "MuJoCo's robots beside our own")),
+        figures=(
+            ("withheld", "Answers and the truth"),
+            ("withheld_causes", "How often stated probabilities hold"),
+            ("withheld_plants", "MuJoCo's robots and our own"),
+        ),
         tables=(
             Shown("withheld_summary", "Counts"),
             Shown("withheld_advice_summary", "Does the advised run settle it?"),

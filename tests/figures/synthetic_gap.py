@@ -80,7 +80,7 @@ def gap_attribute(
     }
     rows["thermal_growth"] |= {"probability": 0.0, "log_evidence": np.nan}
     for row in rows.values():
-        row["decision"] = "excluded"
+        row |= {"decision": "excluded", "group_probability": np.nan}
     for name, probability, legs in likely:
         decision = "named" if probability >= 0.7 else "possible"
         rows[name] |= {"probability": probability, "legs": legs, "decision": decision}

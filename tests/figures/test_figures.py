@@ -38,6 +38,7 @@ WITHOUT_UNIT = (
         "truth",
         "stated probability",
         "share of robots",
+        "share that acts",
         "gap over noise, rms",
     ),
     *(
@@ -66,7 +67,7 @@ WITHOUT_UNIT = (
 )
 SMALLEST_PT = 7.0
 # figures that know no campaign
-STUDIES = ("withheld", "withheld_plants", "printers", "methods", "circle")
+STUDIES = ("withheld", "withheld_causes", "withheld_plants", "printers", "methods", "circle")
 DELTA = ("delta_images", "delta_errors", "delta_observability")
 PTT = tuple(name for name in FIGURES if name.startswith("ptt_"))
 REAL = ("steps", "spectrum", "lengths")

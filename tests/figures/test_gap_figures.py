@@ -73,12 +73,35 @@ def test_both_views_hold_every_point_and_share_x(name, first, stretch, frames, t
 
 
 def test_the_budget_stands_first_and_its_parts_lie_end_to_end(frames):
-    """Effects by share, then what does not repeat and the unknown; what they share is no part, nor what noise left."""
+    """Effects by share, then what does not repeat and the unknown, then what completes them to the whole."""
     axes = draw("gap", frames).axes[1]
     bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
-    np.testing.assert_allclose([width for _, width in bars], [0.6, 0.2, 0.1, 0.05], atol=1e-12)
-    np.testing.assert_allclose([start for start, _ in bars], [0.0, 0.6, 0.8, 0.9], atol=1e-12)
-    assert written(axes) == ["link flexure 60 %", "backlash 20 %", "scatter 10 %", "unexplained 5 %"]
+    np.testing.assert_allclose([width for _, width in bars], [0.6, 0.2, 0.1, 0.05, 0.04], atol=1e-12)
+    np.testing.assert_allclose([start for start, _ in bars], [0.0, 0.6, 0.8, 0.9, 0.95], atol=1e-12)
+    named = ["link flexure 60 %", "backlash 20 %", "scatter 10 %", "unexplained 5 %", "covariance 4 %"]
+    assert written(axes) == named
+
+
+def test_negative_covariances_extend_the_budget_to_the_left(frames):
+    """The parts to the right less those to the left are the whole."""
+    budget = frames["gap_budget"]
+    shared = budget["share"].mask(budget["kind"] == "covariance", -0.2).mask(budget["kind"] == "sampling", 0.245)
+    axes = draw("gap", frames | {"gap_budget": budget.assign(share=shared)}).axes[1]
+    bars = [(bar.get_x(), bar.get_width()) for bar in axes.patches]
+    assert (0.0, -0.2) in bars and axes.get_xlim()[0] == pytest.approx(-0.2)
+    # but for the calibration's 0.5 %, too little to be drawn
+    assert sum(width for _, width in bars) == pytest.approx(0.995)
+
+
+def test_a_group_alone_has_its_own_probability_in_the_headline(frames):
+    causes = frames["gap_attribute"].copy()
+    grouped = causes["effect"].isin(["link_flexure", "drive_compliance"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.91
+    changes = {"effects": "link_flexure", "groups": "link_flexure | drive_compliance", "probability": 0.5, "leg": 0}
+    verdicts = frames["gap_verdicts"].assign(**changes)
+    bold, *rest = written(draw("gap", frames | {"gap_attribute": causes, "gap_verdicts": verdicts}).axes[0])
+    assert bold.startswith("link flexure or drive compliance (p = 0.91): 0.37 mm gap")
+    assert "confusable" not in " ".join(rest)
 
 
 def test_causes_are_ordered_and_the_verdict_s_are_in_colour(frames):
@@ -213,8 +236,8 @@ def test_shares_are_of_the_scores():
 
 def test_reliability_of_causes_is_drawn_check_by_check_with_the_number_of_statements():
     frames = made_up.withheld_tables()
-    figure = draw("withheld", frames)
-    for check, title in (("label", "causes, label withheld"), ("as_robots_are", "causes, as robots are")):
+    figure = draw("withheld_causes", frames)
+    for check, title in (("label", "label withheld"), ("as_robots_are", "as robots are")):
         axes = panel(figure, title)
         causes = frames["withheld_causes"].query(f"check == '{check}'")
         *numbers, whole = written(axes)
@@ -230,10 +253,14 @@ def test_the_checks_are_drawn_one_by_one_and_an_empty_table_is_refused():
     for check in scores["check"].unique():
         name = "withheld_plants" if check in PLANTS else "withheld"
         figure = draw(name, made_up.withheld_tables(scores[scores["check"] == check]))
-        count = 5 if check in ("many", "noise", "as_robots_are", *PLANTS) else 3 if check == "field" else 4
+        count = 4 if check in ("many", "noise", "as_robots_are", *PLANTS) else 3
         assert len(figure.axes) == count
-    with pytest.raises(ConfigError, match="withheld_scores"):
-        draw("withheld", made_up.withheld_tables(scores.iloc[:0]))
+        if check != "field":
+            assert len(draw("withheld_causes", made_up.withheld_tables(scores[scores["check"] == check])).axes) == 1
+    nothing = made_up.withheld_tables(scores.iloc[:0])
+    for name, table in (("withheld", "withheld_scores"), ("withheld_causes", "withheld_causes")):
+        with pytest.raises(ConfigError, match=table):
+            draw(name, nothing)
 
 
 def test_parts_are_drawn_found_against_true():

@@ -28,11 +28,11 @@ SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_tex
 _LEGS = DriveWords()
 
 
-def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), **verdict):
+def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), causes=None, **verdict):
     """Facts of a made-up diagnosis as a file holds them; drives: the robot's DriveWords."""
     tables = {
         "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
-        "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN),
+        "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN) if causes is None else causes,
         "gap_parameters": pd.DataFrame(
             [
                 ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, 0.00101, 0.00145, False),
@@ -92,12 +92,15 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         assert words in said
 
 
-def test_causes_that_cannot_be_told_apart_are_one_sentence_with_their_probabilities():
-    facts_of = answered(effects="backlash+link_flexure", groups="link_flexure | servo_lag")
+def test_confounded_causes_are_one_sentence_with_their_probabilities():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN)
+    grouped = causes["effect"].isin(["link_flexure", "servo_lag"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.97
+    facts_of = answered(effects="backlash+link_flexure", groups="link_flexure | servo_lag", causes=causes)
     said = facts_of["sentences"]
     assert "Causes by their share of the gap: link flexure or servo lag 60 %, backlash 20 %." in said
     (group,) = [one for one in said if one.startswith("One of these acts")]
-    assert "link flexure 0.98, servo lag 0.02 (probability that one does: more than 0.99)" in group
+    assert "link flexure 0.98, servo lag 0.02 (probability that one does: 0.97)" in group
     assert "together they make 60 % of the gap" in group and "The corrected model has link flexure." in group
     assert not any(" is link flexure" in one for one in said)
     assert any(one.startswith("Probability that it acts: backlash 0.97.") for one in said)
@@ -112,6 +115,20 @@ def test_a_small_cause_is_counted_and_has_no_sentence(share, rms):
     said = answered(budget)["sentences"]
     assert "Causes by their share of the gap: link flexure 60 %, 1 small one." in said
     assert not any(" is backlash" in one for one in said)
+
+
+def test_a_cause_that_is_small_and_alone_has_its_sentence():
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    budget = budget.assign(rms_mm=budget["rms_mm"].mask(budget["part"] == "backlash", 0.009))
+    said = answered(budget, effects="backlash", leg=0)["sentences"]
+    assert any(" is backlash" in one for one in said)
+
+
+def test_where_no_cause_is_named_the_most_probable_answer_says_so():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN).replace({"decision": {"named": "possible"}})
+    said = answered(causes=causes)["sentences"]
+    assert said[1] == "No cause is probable enough to be named; the most probable answer follows."
+    assert said[1] not in answered()["sentences"]
 
 
 @pytest.mark.parametrize(("sure", "told"), [(0.49, False), (0.51, True)])

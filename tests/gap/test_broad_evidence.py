@@ -361,7 +361,7 @@ def test_an_average_is_an_integral_over_the_coefficients():
     gram0 = gram = columns.T @ columns
     made = Average(gram, columns.T @ data, index, size)
     averaged = np.eye(9) + (columns[:, index] * size**2) @ columns[:, index].T
-    assert np.flatnonzero(made.kept).tolist() == others.tolist()
+    assert np.flatnonzero(made.others).tolist() == others.tolist()
     ratio = multivariate_normal.logpdf(data, cov=averaged) - multivariate_normal.logpdf(data, cov=np.eye(9))
     assert made.evidence == pytest.approx(ratio, rel=1e-9)
     for values in generator.normal(size=(4, 2)):
@@ -373,7 +373,7 @@ def test_an_average_is_an_integral_over_the_coefficients():
     whole = made.rest(others)
     assert gram[0, 0] == pytest.approx(whole[0][1, 1]) and moment[0] == pytest.approx(whole[1][1])
     assert (made.across[index] == 0.0).all()
-    assert np.flatnonzero(Average(gram0, columns.T @ data, index, size, [0]).kept).tolist() == [3]
+    assert np.flatnonzero(Average(gram0, columns.T @ data, index, size, [0]).others).tolist() == [3]
     values = generator.normal(size=2)
     design = np.concatenate([columns[:, index], np.diag(1.0 / size)])
     target = np.concatenate([data - columns[:, others] @ values, np.zeros(3)])

@@ -78,7 +78,8 @@ def test_the_answer_does_not_depend_on_where_the_search_begins():
 def test_a_search_that_is_cut_short_says_so(monkeypatch):
     evidence, _ = _evidence((strong("axis_tilt", 2.0), strong("servo_lag", 1.0)), tuple(EFFECTS))
     monkeypatch.setattr("rrru.gap.model_space.OPTIONS", _Short())
-    found = explore(evidence, Prior())
+    space = ModelSpace(evidence, Prior())
+    found = space.posterior([space.search(()), space.search(space.fullest())])
     assert found.apart > OPTIONS.max_searches_apart or found.expanded < 0.5
 
 

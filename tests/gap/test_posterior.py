@@ -239,6 +239,14 @@ def test_causes_that_exclude_each_other_are_a_group():
     assert verdict.confusable_with == ("backlash",)
 
 
+def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_is_called_possible():
+    single = [((PLAY,), 0.2, False), ((LAG,), 0.2, False), ((TILT,), 0.1, False)]
+    verdict = _decided(((LAG, PLAY), 0.36, False), *single, ((), 0.14, True))
+    assert set(verdict.effects) == {"servo_lag", "backlash"} and verdict.groups == ()
+    assert {verdict.decision(name) for name in verdict.effects} == {"possible"} and verdict.sure < 0.7
+    assert not set(verdict.confusable_with) & set(verdict.effects)
+
+
 def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():
     """Two of 0.6 each, independent: neither is named with the other in one breath."""
     verdict = _decided(

@@ -3,8 +3,8 @@
 Play, soft or slow servos, soft links, clearance and warming have a law in the library. A base that is not level and a
 load that nobody told of only change the weight: they show where the servos are soft, so that the drives' compliance is
 the answer (were the tracker level and the base not, that would be a matter of the frame). One leg's length and a tilted
-axis are numbers of a full calibration, no cause. A base on springs and friction that grows with the square of the
-speed have no law of those that are tried.
+axis are numbers of a full calibration, no cause. A base on springs is a pedestal that turns and does not shift.
+Friction that grows with the square of the speed has no law of those that are tried.
 """
 
 from collections.abc import Callable
@@ -81,7 +81,7 @@ KINDS = {
     "soft_servo_under_a_load": _named("drive_compliance", load_kg=(0.5, 2.0)),
     "length": Kind(None, "", "lengths", 0.5),
     "tilted_axis": Kind(None, "", "tilts", 1e-3),
-    "base_on_springs": Kind(_leaning_base, None),
+    "base_on_springs": Kind(_leaning_base, "pedestal_compliance"),
     "speed_friction": Kind(_speed_friction, None),
 }
 # causes from outside that act in a robot of any kind, by the name of their kind

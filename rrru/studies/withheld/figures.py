@@ -7,8 +7,7 @@ from matplotlib.ticker import LogLocator, MultipleLocator
 
 from rrru.errors import ConfigError
 from rrru.figures import style
-from rrru.studies.withheld.causes import BIN_EDGES, calibration_error, counted
-from rrru.studies.withheld.summary import wilson
+from rrru.studies.withheld.summary import BIN_EDGES, causes_calibration_error, counted, wilson
 from rrru.studies.withheld.verdicts import AS_ROBOTS_ARE, PLANTS, PREFIX, UNEXPLAINED, is_outside
 
 NONE, OUTSIDE, SEVERAL = "none", "outside the library", "two or more"
@@ -36,8 +35,8 @@ _KINDS = {
 _LEAST_MM = 0.003
 _STRENGTH_EDGES = np.array([0.1, 0.3, 0.6, 1.0, 1.5, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0])
 _NO_GAP = 0.01
-# panels of reliability side by side; above the shares the numbers of statements in bins, their sum and the edge
-_PER_LINE = 3
+# panels of reliability in a row, and its height; above the shares numbers of statements in bins, their sum, the edge
+_PER_LINE, _LINE_MM = 3, 72.0
 _COUNTS_AT, _ERROR_AT, _TOP = 1.08, 1.36, 1.52
 # shares closed below this are drawn on the edge
 _LOWEST_CLOSED = -0.2
@@ -49,9 +48,9 @@ _ORACLE = {"color": style.BLACK, "marker": "o", "markerfacecolor": "white", "lin
 @style.printed
 def withheld_plants(tables, options):
     """Robots of files with the same causes, driven by MuJoCo and by our own plant, whose laws are those of the
-    diagnosis; as the figure of the other checks: confusion tables, how often causes act that have a stated probability,
-    then the share of right verdicts against the gap over the noise, and the share of the gap closed as predicted and in
-    truth. Last the parts of the gaps, found against true, filled where the verdict names them.
+    diagnosis; as the figure of the other checks: confusion tables, then the share of right verdicts against the gap
+    over the noise, and the share of the gap closed as predicted and in truth. Last the parts of the gaps, found against
+    true, filled where the verdict names them.
     """
     return _check(tables, PLANTS, PLANTS)
 
@@ -60,16 +59,34 @@ def withheld_plants(tables, options):
 def withheld(tables, options):
     """The diagnosis where the answer was withheld. Confusion tables: counts, shaded by their share of the row,
     right answers framed; of the effect check, the row is the effect that was taken out of the library. Unexplained
-    counts alone or beside a name. Then a reliability diagram of each check: the share of causes that act against the
-    stated probability that they do, with 95 % intervals; above it the number of statements in each bin, their sum and
-    the expected calibration error. Statements on causes that make less than half of the noise are left out.
-    Then the share of right verdicts against the gap over the noise, beside a test that knows the true law (1 % false
-    alarms), with 95 % intervals, and the share of the gap closed as predicted and in truth. Last the parts of gaps that
-    many causes make, or noises that are not as stated: found against true, filled where the verdict names them (scatter
-    and runs: where they are more probable than not), 25 % off between the dotted lines, what is missed or not there on
-    the edges.
+    counts alone or together with a name. Then the share of right verdicts against the gap over the noise, and of a test
+    that knows the true law (1 % false alarms), with 95 % intervals, and the share of the gap closed as predicted and in
+    truth. Last the parts of gaps that many causes make, or noises that are not as stated: found against true, filled
+    where the verdict names them (scatter and runs: where they are more probable than not), 25 % off between the dotted
+    lines, missed parts and parts that are not there on the edges.
     """
     return _check(tables, [name for name in _CHECKS if name not in PLANTS], _PARTED)
+
+
+@style.printed
+def withheld_causes(tables, options):
+    """How often causes act that have a stated probability: a reliability diagram of each check, with 95 % intervals.
+    Above it the number of statements in each bin, their sum and the expected calibration error. A statement is one on a
+    single cause of a robot, named or not; those on causes that make less than half of the noise are left out.
+    """
+    stated = {name: counted(tables["withheld_causes"].query("check == @name")) for name in _CHECKS}
+    stated = {name: causes for name, causes in stated.items() if len(causes)}
+    if not stated:
+        raise ConfigError("withheld: table withheld_causes has no statement")
+    columns = min(len(stated), _PER_LINE)
+    lines = -(-len(stated) // columns)
+    figure = style.new(style.DOUBLE_MM, _LINE_MM * lines + 8.0)
+    grid = figure.add_gridspec(lines, columns)
+    for place, mark, (name, causes) in zip(grid, "abcdefghi", stated.items(), strict=False):
+        axes = figure.add_subplot(place)
+        _reliability(axes, causes, _CHECKS[name][1])
+        axes.set_title(f"({mark}) {_CHECKS[name][0]}")
+    return figure
 
 
 def _check(tables, checks, parted):
@@ -82,26 +99,15 @@ def _check(tables, checks, parted):
     cells = _cells(confusion[confusion["check"].isin(checks[:2])])
     names = sorted({*cells["row"], *cells["column"]} - {NONE, UNEXPLAINED, OUTSIDE, SEVERAL})
     maps = [_map(cells[cells["check"] == name], names) for name in checks[:2]]
-    stated = {name: counted(tables["withheld_causes"].query("check == @name")) for name in checks}
-    stated = {name: causes for name, causes in stated.items() if len(causes)}
-    columns = min(len(stated), _PER_LINE)
-    lines = -(-len(stated) // columns) if stated else 0
-    heights = [4.1 * max(len(counts) for counts in maps) + 38.0, 52.0 * lines, 58.0, 58.0 if parted else 0.0]
-    heights = {k: height for k, height in enumerate(heights) if height}
-    figure = style.new(style.DOUBLE_MM, sum(heights.values()) + 8.0)
-    grid = figure.add_gridspec(len(heights), 1, height_ratios=list(heights.values()))
-    parts = dict(zip(heights, grid, strict=True))
-    marks = iter("abcdefghijklmnopq")
+    heights = [4.1 * max(len(counts) for counts in maps) + 38.0, 58.0, *([58.0] if parted else [])]
+    figure = style.new(style.DOUBLE_MM, sum(heights) + 8.0)
+    parts = figure.add_gridspec(len(heights), 1, height_ratios=heights)
+    marks = iter("abcdefgh")
     for place, name, counts in zip(parts[0].subgridspec(1, len(maps)), checks, maps, strict=False):
         axes = figure.add_subplot(place)
         _confusion(axes, counts, name == "effect")
         axes.set_title(f"({next(marks)}) robots, {_CHECKS[name][0]}")
-    if stated:
-        for place, (name, causes) in zip(parts[1].subgridspec(lines, columns), stated.items(), strict=False):
-            axes = figure.add_subplot(place)
-            _reliability(axes, causes, _CHECKS[name][1])
-            axes.set_title(f"({next(marks)}) causes, {_CHECKS[name][0]}")
-    panels = [figure.add_subplot(part) for part in parts[2].subgridspec(1, 2)]
+    panels = [figure.add_subplot(part) for part in parts[1].subgridspec(1, 2)]
     for axes, draw in zip(panels, (_strength, _closed), strict=True):
         draw(axes, scores, checks)
         axes.set_title(f"({next(marks)}) {axes.get_title(loc='left')}")
@@ -109,7 +115,7 @@ def _check(tables, checks, parted):
         axes.grid(True)
     style.legend_above(figure, panels, columns=4)
     if parted:
-        below = [figure.add_subplot(part) for part in parts[3].subgridspec(1, len(parted))]
+        below = [figure.add_subplot(part) for part in parts[2].subgridspec(1, len(parted))]
         for axes, name in zip(below, parted, strict=True):
             _parts(axes, tables["withheld_parts"].query("check == @name"))
             axes.set_title(f"({next(marks)}) parts, {_CHECKS[name][0]}")
@@ -170,10 +176,10 @@ def _reliability(axes, causes, look):
     _shares(axes, causes.assign(acts=causes["acts"].astype(bool)), ("probability", "acts"), BIN_EDGES, None, look)
     number, _ = np.histogram(causes["probability"], BIN_EDGES)
     for middle, count in zip((BIN_EDGES[1:] + BIN_EDGES[:-1]) / 2.0, number, strict=True):
-        axes.text(middle, _COUNTS_AT, f"{count}", rotation=90, ha="center", va="bottom", fontsize=6.0)
-    error = calibration_error(causes["probability"], causes["acts"])
-    told = f"{len(causes)} statements, error {error:.3f}"
-    axes.text(0.5, _ERROR_AT, told, ha="center", va="bottom", fontsize=6.0)
+        axes.text(middle, _COUNTS_AT, f"{count}", rotation=90, ha="center", va="bottom", fontsize=7.0)
+    error = causes_calibration_error(causes["probability"], causes["acts"])
+    counts = f"{len(causes)} statements, error {error:.3f}"
+    axes.text(0.5, _ERROR_AT, counts, ha="center", va="bottom", fontsize=7.0)
     axes.set(xlabel="stated probability", ylabel="share that acts", xlim=(-0.03, 1.03), ylim=(-0.05, _TOP))
     axes.xaxis.set_major_locator(MultipleLocator(0.2))
     axes.set_yticks(np.linspace(0.0, 1.0, 6))

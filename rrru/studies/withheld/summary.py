@@ -7,6 +7,13 @@ from rrru.studies.withheld import causes as on_causes
 from rrru.studies.withheld.chunks import noise_of
 from rrru.studies.withheld.verdicts import AS_ROBOTS_ARE, PLANTS, in_order, is_outside
 
+# strength over the noise from which on a cause counts as one that acts
+LEAST_STRENGTH = 0.5
+# bins of equal width of a probability
+BIN_EDGES = np.arange(11) / 10.0
+# probabilities of a log loss are at least this far from 0 and 1
+_LEAST_PROBABILITY = 0.001
+
 # of a calibration error: fewer robots in a bin are off by more than a wrong probability by their number alone
 _BINS, _PER_BIN = 10, 20
 _NEAR = 0.05
@@ -101,13 +108,57 @@ _FILE = (
     _HELD,
 )
 _MANY = (("all", "what matters named, nothing that is not there", "", "right", None), _CALIBRATED)
+
+
+def counted(causes):
+    """The rows of `withheld_causes` whose statement is counted.
+
+    The cause makes half of the noise or more by itself, or does not act: of causes that make less no answer is wrong.
+    """
+    return causes[~causes["acts"].astype(bool) | (causes["strength"] >= LEAST_STRENGTH)]
+
+
+def bins(probability):
+    """Number of the bin (n,) of probabilities (n,)."""
+    return np.clip(np.digitize(probability, BIN_EDGES) - 1, 0, len(BIN_EDGES) - 2)
+
+
+def causes_calibration_error(probability, acts):
+    """Expected calibration error of probabilities (n,) of what acts (n,), NaN for no statement.
+
+    It is the sum over bins of equal width of
+
+        (n_b / n) |mean probability in the bin - share in the bin that acts|
+
+    (M. Naeini, G. Cooper and M. Hauskrecht, AAAI 2015).
+    """
+    probability, acts = np.asarray(probability, dtype=float), np.asarray(acts, dtype=float)
+    if not len(acts):
+        return np.nan
+    off = np.bincount(bins(probability), weights=probability - acts, minlength=len(BIN_EDGES) - 1)
+    return float(np.abs(off).sum() / len(acts))
+
+
+def brier_score(probability, acts):
+    """Mean square difference of probabilities (n,) from 1 for what acts (n,) and 0 for what does not."""
+    probability, acts = np.asarray(probability, dtype=float), np.asarray(acts, dtype=float)
+    return float(((probability - acts) ** 2).mean()) if len(acts) else np.nan
+
+
+def log_loss(probability, acts):
+    """Mean negative natural logarithm of the probability (n,) of what is true, clipped to 0.001 to 0.999."""
+    probability, acts = np.asarray(probability, dtype=float), np.asarray(acts, dtype=bool)
+    clipped = np.clip(probability, _LEAST_PROBABILITY, 1.0 - _LEAST_PROBABILITY)
+    return float(-np.log(np.where(acts, clipped, 1.0 - clipped)).mean()) if len(acts) else np.nan
+
+
 # statements on single causes: figure, its function of probabilities and what acts, what every check is meant to reach
 _STATEMENTS = (
-    ("expected calibration error", on_causes.calibration_error, 0.03),
-    ("Brier score", on_causes.brier_score, None),
-    ("log loss", on_causes.log_loss, None),
+    ("expected calibration error", causes_calibration_error, 0.03),
+    ("Brier score", brier_score, None),
+    ("log loss", log_loss, None),
 )
-_COUNTED = f"causes of {on_causes.LEAST_STRENGTH:g} x noise or more, or that do not act"
+_COUNTED = f"causes of {LEAST_STRENGTH:g} x noise or more, or that do not act"
 _LINES = "causes and groups named"
 # how a cause is named: figure and column; `named` is a verdict's effects, the first member of a group among them
 _NAMED, _IN_PAIR = ("named", "named"), ("named, or in a group of two", "in_pair")
@@ -184,11 +235,11 @@ def summary(scores, limits, parts, causes):
 
 def _on_causes(causes, asked):
     """Rows on the statements about single causes and on the causes and groups that are named; asked: by _LINES."""
-    counted, lines = on_causes.counted(causes), on_causes.named_lines(causes)
-    figures = [(name, of(counted["probability"], counted["acts"]), wanted) for name, of, wanted in _STATEMENTS]
+    some, lines = counted(causes), on_causes.named_lines(causes)
+    figures = [(name, of(some["probability"], some["acts"]), wanted) for name, of, wanted in _STATEMENTS]
     groups = lines[lines["size"] > 1]
     return [
-        *(_plain(_COUNTED, name, len(counted), value, wanted) for name, value, wanted in figures),
+        *(_plain(_COUNTED, name, len(some), value, wanted) for name, value, wanted in figures),
         _row(lines, _LINES, "not there", "", "invented", asked.get((_LINES, "not there"))),
         _plain("groups named", "mean number of members", len(groups), groups["size"].mean()),
     ]

@@ -30,7 +30,7 @@ def robot():
 def _arm(measurements, probability=0.5, runs=(), poses=None):
     """An Arm of a made-up diagnosis."""
     tables = {"gap_next_runs": pd.DataFrame(runs), "gap_next_poses": pd.DataFrame(poses or {})}
-    return advice.Arm(measurements, (), Diagnosis({"probability": probability}, tables, None, None))
+    return advice.Arm(measurements, (), Diagnosis({"probability": probability}, tables, None, None, None))
 
 
 def test_every_candidate_is_driven_as_it_was_planned(robot):

@@ -1,6 +1,7 @@
 """Statements on single causes beside the truth: what is stated, what is counted, and how good probabilities are."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -8,26 +9,23 @@ import pytest
 
 from rrru.gap.diagnose import MeasuredRobot, diagnose
 from rrru.gap.settings import GapSettings
-from rrru.studies.withheld.causes import (
-    brier_score,
-    calibration_error,
-    causes_of,
-    counted,
-    group_size,
-    groups_of,
-    log_loss,
-    named_lines,
-)
+from rrru.gap.verdict import Group, Verdict
+from rrru.studies.withheld.causes import causes_of, group_size, groups_of, named_lines
 from rrru.studies.withheld.robots import Acting
-from rrru.studies.withheld.stated import decision, stated
+from rrru.studies.withheld.stated import stated
+from rrru.studies.withheld.summary import brier_score, causes_calibration_error, counted, log_loss
 from tests.schemas import check
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
-_VERDICT = {
-    "effects": "backlash+axis_tilt+unexplained",
-    "groups": "axis_tilt | leg_asymmetry; servo_lag | base_placement",
-    "confusable_with": "leg_asymmetry, base_placement, link_flexure, none",
-}
+_VERDICT = Verdict(
+    ("backlash", "axis_tilt", "servo_lag"),
+    True,
+    0.5,
+    0,
+    ("link_flexure", "none"),
+    (),
+    (Group(("axis_tilt", "leg_asymmetry"), 0.9), Group(("servo_lag", "base_placement"), 0.8)),
+)
 
 
 @pytest.mark.parametrize(
@@ -43,8 +41,11 @@ _VERDICT = {
         ("thermal_growth", "excluded", ""),
     ],
 )
-def test_a_decision_is_read_from_the_verdict(effect, said, group):
-    assert decision(effect, _VERDICT) == {"decision": said, "group": group}
+def test_a_decision_is_that_of_the_verdict(effect, said, group):
+    case = SimpleNamespace(effects={effect: None})
+    attribution = SimpleNamespace(case=case, posterior=SimpleNamespace(marginal=lambda _: 0.5))
+    row = stated("robot", SimpleNamespace(attribution=attribution, decided=_VERDICT)).iloc[0]
+    assert (row["decision"], row["group"]) == (said, group)
 
 
 def test_a_diagnosis_states_all_effects_that_it_tests_and_their_posterior_probability():
@@ -100,19 +101,19 @@ def test_calibration_error_has_bins_of_equal_width_weighted_by_their_counts():
         inside = (probability >= k / 10) & ((probability < (k + 1) / 10) | (k == 9))
         if inside.any():
             whole += inside.mean() * abs(probability[inside].mean() - acts[inside].mean())
-    np.testing.assert_allclose(calibration_error(probability, acts), whole, rtol=1e-12)
+    np.testing.assert_allclose(causes_calibration_error(probability, acts), whole, rtol=1e-12)
     assert whole > 0.03
     # half too sure by 0.1, and one of four that act where all were said to
-    assert calibration_error([0.9] * 4 + [1.0] * 4, [1, 1, 1, 1, 1, 0, 0, 0]) == pytest.approx(
+    assert causes_calibration_error([0.9] * 4 + [1.0] * 4, [1, 1, 1, 1, 1, 0, 0, 0]) == pytest.approx(
         abs(4 * 0.9 + 4 * 1.0 - 5.0) / 8.0
     )
-    assert np.isnan(calibration_error([], []))
+    assert np.isnan(causes_calibration_error([], []))
 
 
 def test_probabilities_that_are_true_have_no_calibration_error():
     generator = np.random.default_rng(6)
     probability = generator.uniform(size=40_000)
-    assert calibration_error(probability, generator.uniform(size=40_000) < probability) < 0.01
+    assert causes_calibration_error(probability, generator.uniform(size=40_000) < probability) < 0.01
 
 
 def test_scores_of_probabilities():

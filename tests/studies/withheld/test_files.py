@@ -147,7 +147,9 @@ def test_a_fault_that_nobody_has_is_none():
     most = law.parameters.parameters[0].high
     assert Fault("soft_servo", (1.01 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
     assert not Fault("soft_servo", (0.99 * most, 0.0, 0.0, 0.0, 0.0, 0.0), {}).beyond(known.mechanism)
-    assert not Fault("base_on_springs", (1.0, 1.0, 0.0, 0.0), {}).beyond(known.mechanism)
+    assert Fault("base_on_springs", (1.0, 1.0, 0.0, 0.0), {}).beyond(known.mechanism)
+    # the library has no law of it, and so no bound
+    assert not Fault("speed_friction", (10.0,) * 6, {}).beyond(known.mechanism)
 
 
 # with one cause and one from outside; with several

@@ -233,7 +233,7 @@ _CASES = [
 # kinds that say nothing that could be false
 _NEVER = {
     *("these data cannot rule out", "next, nothing would settle it", "the fit did not converge"),
-    *("runs are limited", "causes by share"),
+    *("runs are limited", "causes by share", "no cause is sure"),
     *("an effect is not tested", "the file is not corrected", "how the file was driven", "a part of a sentence"),
     "a reflector is assumed",
     *("the effects are confounded", "a zero is confounded", "a zero is not determined", "a weight is confounded"),

@@ -13,13 +13,14 @@ STATEMENTS = statement_chunks(config["withheld"]["sentences"])
 WITHHELD_FIGURES = {
     "withheld": (
         "rrru.studies.withheld.figures:withheld",
-        ["withheld_scores", "withheld_confusion", "withheld_parts", "withheld_causes"],
-    )
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
+    ),
+    "withheld_causes": ("rrru.studies.withheld.figures:withheld_causes", ["withheld_causes"]),
 }
 PLANTS_FIGURES = {
     "withheld_plants": (
         "rrru.studies.withheld.figures:withheld_plants",
-        ["withheld_scores", "withheld_confusion", "withheld_parts", "withheld_causes"],
+        ["withheld_scores", "withheld_confusion", "withheld_parts"],
     )
 }
 FIGURES["withheld"] = WITHHELD_FIGURES

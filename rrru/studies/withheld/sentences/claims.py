@@ -49,6 +49,7 @@ _SENTENCES = {
     "the effects are confounded": r"The effects are confounded with each other: their shares .*",
     "shares overlap": r"These shares overlap.*",
     "something is unexplained": rf"(?:Another|It is systematic, and no effect .*:) (?P<share>{_NUMBER}) % .*",
+    "no cause is sure": r"No cause is probable enough to be named; .*",
     "the unexplained follows": r"The unexplained part follows .*",
     "causes by share": r"Causes by their share of the gap: (?P<listed>.*)\.",
     "a group of causes": r"One of these acts, and these data cannot tell which: (?P<listed>.*) "

@@ -438,6 +438,7 @@ _JUDGES = {
     "the effects are confounded": _undecided,
     "shares overlap": _overlap,
     "something is unexplained": _unexplained,
+    "no cause is sure": _undecided,
     "the unexplained follows": _unexplained,
     "causes by share": _undecided,
     "a cause by its share": _by_its_share,
