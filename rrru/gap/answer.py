@@ -131,6 +131,11 @@ def percent(share):
     return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
 
 
+def small_percent(share):
+    """A share in per cent that is not rounded to nothing."""
+    return "less than 1 %" if 0.0 < share < 0.005 else percent(share)
+
+
 def share_with_interval(part, follow=""):
     """The share of a part of the budget, or of an effect, with its 95 % interval."""
     return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
@@ -265,7 +270,7 @@ def _by_share(facts, groups, small):
             listed.append((group["share"], " or ".join(map(readable, group["names"]))))
         elif not (small and _is_small(effect, facts)):
             listed.append((effect["share"] or 0.0, readable(effect["name"])))
-    words = [f"{name} {percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
+    words = [f"{name} {small_percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
     words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
     return f"Causes by their share of the gap: {', '.join(words)}."
 
@@ -274,7 +279,7 @@ def _of_group(group, with_shares):
     """Causes of which one acts, and which these data cannot tell apart."""
     names = [readable(name) for name in group["names"]]
     each = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
-    share = f"; together they make {percent(group['share'])} of the gap" if with_shares else ""
+    share = f"; together they make {small_percent(group['share'])} of the gap" if with_shares else ""
     return (
         f"One of these acts, and these data cannot tell which: {each} (probability that one does: "
         f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."
@@ -370,7 +375,9 @@ def _open(facts):
     named = [effect["name"] for effect in facts["effects"]]
     contests = [_apart(run["separates"]) for run in facts["next"]]
     asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
-    others = dict.fromkeys([*facts["confusable_with"], *(name for name in asked if name not in named)])
+    # of groups there is a sentence
+    grouped = [name for group in facts["groups"] for name in group["names"]]
+    others = dict.fromkeys(name for name in [*facts["confusable_with"], *asked] if name not in [*named, *grouped])
     listed = [_OUTSIDE.get(name, readable(name)) for name in others]
     doubted = {name for sides in contests if not all(sides) for name in set().union(*sides)}
     listed += [f"that {readable(name)} does not act" for name in named if name in doubted]

@@ -154,7 +154,7 @@ def _inside(text, stated):
     for one in re.finditer(rf"(?:^|, )(?P<name>[a-z ]+) {_P}(?=,|$)", stated.get("each", "")):
         result.append(Claim("probability of a cause", text, one.groupdict()))
     if "listed" in stated and "share" in text.split(":")[0]:
-        names = (re.sub(r" \d+ %$", "", one) for one in stated["listed"].split(", "))
+        names = (re.sub(r"( less than)? \d+ %$", "", one) for one in stated["listed"].split(", "))
         result += [Claim("a cause by its share", text, {"name": name}) for name in names if not name[0].isdigit()]
     if "probability" in stated:
         result.append(Claim("probability", text, stated))
