@@ -1,11 +1,11 @@
 """What the unexplained part of a gap looks like: which variable it follows, how smoothly, and how large it is.
 
-A Gaussian process of one variable at a time is fitted to what the verdict's model leaves: a function f of a drive's
-value, which makes J f of the positions (J: derivative by the drive), or a function of the place, the time, the payload
-or the speed for each axis, or steps with the sense of motion of the drives. Its covariance is a^2 exp(-d^2 / (2 l^2))
-of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian Processes for Machine
-Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. What it predicts of a fold, a fifth
-of all stretches of five points, comes from the others.
+A Gaussian process of one variable at a time is fitted to what the verdict's model and its calibration leave: a function
+f of a drive's value, which makes J f of the positions (J: derivative by the drive), or a function of the place, the
+time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its covariance is
+a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian
+Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. What it
+predicts of a fold, a fifth of all stretches of five points, comes from the others.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,9 @@ def remainder_rows(attribution):
     """
     case = attribution.case
     rows = case.on_robot
-    left, drive = case.residual(attribution.state)[rows], attribution.evidence.linear.drive[rows]
+    linear = attribution.evidence.linear
+    # under a smooth discrepancy a fit leaves to that what the calibration could take away
+    left, drive = _without_calibration(case.residual(attribution.state), linear, rows), linear.drive[rows]
     stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
     beyond = (left**2).sum() - left.size * case.noise_mm**2
@@ -79,7 +81,7 @@ def followed_alike(attribution, rows, names):
     design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
     found = []
     for key, coordinates in state.effects.items():
-        part = (linear.columns[key] @ coordinates)[on_robot].ravel()
+        part = _without_calibration(linear.columns[key] @ coordinates, linear, on_robot).ravel()
         fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
         if (
             key[0] in names
@@ -88,6 +90,15 @@ def followed_alike(attribution, rows, names):
         ):
             found.append(key[0])
     return tuple(found), float(best["rms_mm"]) if found else 0.0
+
+
+def _without_calibration(values, linear, rows):
+    """What the calibration leaves of values (m, 3) at some rows, by plain least squares there."""
+    own = values[rows]
+    columns = linear.base[rows].reshape(own.size, -1)
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    fitted = columns / size @ np.linalg.lstsq(columns / size, own.ravel(), rcond=1e-9)[0]
+    return own - fitted.reshape(own.shape)
 
 
 def _knows(effect, follows):

@@ -44,7 +44,9 @@ def _attribution(make, seed=0, count=240):
         points=pd.DataFrame({"speed_mm_s": np.full(count, 80.0)}),
         residual=lambda _state: left,
     )
-    evidence = SimpleNamespace(linear=SimpleNamespace(drive=response))
+    # three offsets of all positions are the calibration
+    base = np.broadcast_to(np.eye(3), (count, 3, 3))
+    evidence = SimpleNamespace(linear=SimpleNamespace(drive=response, base=base))
     return SimpleNamespace(case=case, evidence=evidence, state=None)
 
 
@@ -119,3 +121,9 @@ def test_effects_that_make_what_the_variable_makes_are_found():
     assert followed_alike(found, rows, ("waves", "bend", "shake")) == ((), 0.0)
     weak = rows.assign(explained=0.9 * OPTIONS.min_followed_share)
     assert followed_alike(found, weak, ("drift",)) == ((), 0.0)
+
+
+def test_what_the_calibration_could_take_away_is_no_part_of_it():
+    found = remainder_rows(_attribution(_MADE["the time"], 1))
+    moved = remainder_rows(_attribution(lambda *given: np.add(_MADE["the time"](*given), [0.5, -0.3, 0.2]), 1))
+    pd.testing.assert_frame_equal(found, moved, rtol=1e-6)
