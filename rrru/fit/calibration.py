@@ -199,6 +199,8 @@ def assess(estimate: Estimate, noise_mm: float | None = None) -> Calibration:
     if noise_mm is not None and estimated <= noise_mm * (1.0 + 3.0 / np.sqrt(2.0 * freedom)):
         noise, noise_from = noise_mm, "given"
     standard_errors = np.full(len(parameters), np.nan)
+    if not len(free):
+        return Calibration(estimate, noise, noise_from, standard_errors, identifiability)
     names, scale, columns = np.array(parameters.names)[free], parameter_scale(mechanism)[free], jacobian[..., free]
     reduced = analyse_columns(names, scale, columns)
     if robust:

@@ -155,6 +155,13 @@ def test_a_bounded_parameter_has_no_standard_error_and_the_others_are_those_with
     )
 
 
+def test_where_all_parameters_are_at_bounds_none_has_a_standard_error(rich_poses):
+    points, theta = rich_poses
+    tight = Rrru3(angle_limit_rad=1e-4, length_limit_mm=0.02)
+    fit = calibrate(TargetPositions(tight, theta, _campaign(points, theta).measured_mm, points))
+    assert fit.at_bound.all() and np.isnan(fit.standard_errors).all() and fit.rms_mm > 0.1
+
+
 def test_two_points_leave_a_direction_unseen():
     robot = Rrru3()
     points = np.array([[-400.0, 50.0, 600.0], [-300.0, 20.0, 700.0]])
