@@ -45,6 +45,12 @@ def _lasso(measurements, known, settings):
     return _most_probable(rivals.lasso(campaign, stream(settings.seed, "lasso", known.campaign)))
 
 
+def _spike_and_slab(measurements, known, settings):
+    """The same by the spike and slab."""
+    campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
+    return _most_probable(rivals.spike_and_slab(campaign, stream(settings.seed, "spike_and_slab", known.campaign)))
+
+
 def _gaussian_process(measurements, known, settings):
     """No effects, no probabilities, the share closed."""
     campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
@@ -56,4 +62,10 @@ def _most_probable(probabilities):
     return max(sorted(probabilities), key=probabilities.get), probabilities, np.nan
 
 
-_WAYS = {"diagnosis": _diagnosis, "bic": _bic, "lasso": _lasso, "gaussian_process": _gaussian_process}
+_WAYS = {
+    "diagnosis": _diagnosis,
+    "bic": _bic,
+    "lasso": _lasso,
+    "spike_and_slab": _spike_and_slab,
+    "gaussian_process": _gaussian_process,
+}

@@ -12,6 +12,7 @@ _NOTES = {
     "diagnosis": "",
     "bic": "linear signatures, up to two effects; cannot say unexplained",
     "lasso": "linear signatures, BIC, 50 resamplings of the points; cannot say unexplained",
+    "spike_and_slab": "linear signatures, Gibbs sampler; cannot say unexplained",
     "gaussian_process": "of place, direction, time, speed, payload; names nothing",
 }
 _LEAST_PROBABILITY, _STRONG = 1e-3, 1.5

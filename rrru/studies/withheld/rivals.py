@@ -1,8 +1,9 @@
 """Other ways to find the cause of a gap, from the same campaign, linearisation and stated noise as the diagnosis.
 
 Bayes' information criterion of linear signatures (G. Schwarz, Annals of Statistics 6, 1978), the lasso with that
-criterion (H. Zou, T. Hastie, R. Tibshirani, Annals of Statistics 35, 2007) over resampled points, and a Gaussian
-process for whatever is left (M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63, 2001), which names nothing.
+criterion (H. Zou, T. Hastie, R. Tibshirani, Annals of Statistics 35, 2007) over resampled points, a spike and slab on
+linear signatures by Gibbs sampling (E. George, R. McCulloch, JASA 88, 1993), and a Gaussian process for whatever is
+left (M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63, 2001), which names nothing.
 """
 
 import warnings
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from rrru.campaign import measurements as rows
 from rrru.fit.calibration import calibrate
@@ -23,6 +25,10 @@ from rrru.gap.terms import EACH, signatures, variants
 from rrru.studies.withheld.verdicts import NONE, in_order
 
 _RESAMPLED, _FOLDS = 50, 5
+# Gibbs sweeps over all effects, the first of which are dropped; probability that an effect acts; standard deviations of
+# its coefficients on columns of unit length, in units of the noise
+_SWEEPS, _DROPPED, _ACTS = 1500, 300, 0.1
+_SLABS = np.geomspace(3.0, 1000.0, 6)
 # a set's columns are as many as they have singular values above this share of the largest
 _RANK = 1e-5
 # what the calibration leaves less of than this share is not seen
@@ -116,6 +122,60 @@ def lasso(campaign, generator):
             model.fit(_unit(columns[drawn], base), data)
         found[_label(owner[model.coef_ != 0.0].tolist())] += 1
     return {effects: count / _RESAMPLED for effects, count in found.items()}
+
+
+def spike_and_slab(campaign, generator):
+    """Share by set of effects of a Gibbs sampler's sweeps in which just these have coefficients other than zero.
+
+    Each effect acts with the same probability, in one of its shapes and choices of legs and with one of `_SLABS` for
+    all its coefficients, each alike; coefficients are averaged out.
+    """
+    terms = list(campaign.columns)
+    numbers = np.split(
+        np.arange(sum(one.shape[1] for one in campaign.columns.values())),
+        np.cumsum([one.shape[1] for one in campaign.columns.values()])[:-1],
+    )
+    basis, _ = np.linalg.qr(campaign.base)
+    unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
+    gram, moment = unit.T @ unit, unit.T @ (campaign.data - basis @ (basis.T @ campaign.data))
+    choices = {}
+    for number, term in enumerate(terms):
+        choices.setdefault(term.effect, []).append(number)
+    state, found = {}, Counter()
+    for sweep in range(_SWEEPS):
+        for effect, own in choices.items():
+            rest = [one for name, one in state.items() if name != effect]
+            slab = state[effect][1] if effect in state else generator.choice(_SLABS)
+            log = [_marginal(gram, moment, numbers, [*rest, (number, slab)]) for number in own]
+            log = np.array([_marginal(gram, moment, numbers, rest) + np.log(len(own) * (1.0 / _ACTS - 1.0)), *log])
+            chosen = _drawn(log, generator)
+            state.pop(effect, None)
+            if chosen:
+                log = [_marginal(gram, moment, numbers, [*rest, (own[chosen - 1], one)]) for one in _SLABS]
+                state[effect] = own[chosen - 1], _SLABS[_drawn(np.array(log), generator)]
+        if sweep >= _DROPPED:
+            found[_label(state)] += 1
+    return {effects: count / (_SWEEPS - _DROPPED) for effects, count in found.items()}
+
+
+def _drawn(log, generator):
+    """A number drawn by the logarithms (n,) of weights."""
+    weights = np.exp(log - log.max())
+    return int(generator.choice(len(weights), p=weights / weights.sum()))
+
+
+def _marginal(gram, moment, numbers, chosen):
+    """Log marginal likelihood over that of no term of chosen (number of a term, slab), the coefficients averaged out.
+
+    gram (k, k), moment (k,): of all columns; numbers: of the columns of each term.
+    """
+    if not chosen:
+        return 0.0
+    index = np.concatenate([numbers[number] for number, _ in chosen])
+    scale = np.concatenate([np.full(len(numbers[number]), slab) for number, slab in chosen])
+    factor = np.linalg.cholesky(scale[:, None] * gram[np.ix_(index, index)] * scale + np.eye(len(index)))
+    half = solve_triangular(factor, scale * moment[index], lower=True, check_finite=False)
+    return 0.5 * half @ half - np.log(np.diag(factor)).sum()
 
 
 def gaussian_process(campaign):

@@ -144,8 +144,8 @@ strength               float  true rms of the gap that it makes alone over that 
 What each way to find a cause says about robots whose cause is hidden; made without knowing any answer.
 --
 robot
-method                 str    diagnosis; bic: Bayes' information criterion; lasso; gaussian_process: names nothing
-    {diagnosis, bic, lasso, gaussian_process}
+method                 str    diagnosis; bic: Bayes' information criterion; lasso; spike_and_slab;
+    gaussian_process: names nothing {diagnosis, bic, lasso, spike_and_slab, gaussian_process}
 effects                str    its answer, as in gap_verdicts; empty where it names nothing
 probabilities          str    probability by set of effects, as JSON; all that is unexplained is one set; empty where it
     names nothing
@@ -156,7 +156,7 @@ seconds                float  computing time on this machine
 Ways to find the cause of a gap on the same robots, campaigns and stated noise. Here for its seconds, which differ from
 run to run; the rest does not.
 --
-method                 str    as in withheld_beliefs {diagnosis, bic, lasso, gaussian_process}
+method                 str    as in withheld_beliefs {diagnosis, bic, lasso, spike_and_slab, gaussian_process}
 robots                 int    robots, all of the check label
 right                  float? share of robots whose answer is right, see withheld_scores; null where nothing is named
 right_low              float? lower end of its 95 % Wilson interval

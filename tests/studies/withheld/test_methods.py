@@ -2,10 +2,13 @@
 
 import json
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.linalg import null_space
+from scipy.stats import multivariate_normal
 
 from rrru.gap.diagnose import MeasuredRobot
 from rrru.gap.settings import GapSettings
@@ -14,6 +17,7 @@ from rrru.studies.withheld import draw, rivals
 from rrru.studies.withheld.beliefs import beliefs
 from rrru.studies.withheld.chunks import chunks, rivalled
 from rrru.studies.withheld.methods import compare
+from rrru.studies.withheld.verdicts import in_order
 from tests.schemas import check
 from tests.studies.withheld.conditions import CONDITIONS, bare
 
@@ -80,6 +84,30 @@ def test_the_lasso_keeps_what_acts(campaign, effects):
         assert max(found, key=found.get) == "none"
 
 
+def test_the_spike_and_slab_is_the_sum_over_all_states(campaign, monkeypatch):
+    """Of three effects in one shape on all legs with two sizes of their coefficients, by explicit covariances."""
+    slabs = np.array([2.0, 8.0])
+    monkeypatch.setattr(rivals, "_SLABS", slabs)
+    few = replace(campaign, columns={term: campaign.columns[term] for term in map(Term, _SETTINGS.effects)})
+    made = _said(few, ["axis_tilt"], 0.12)
+    left = null_space(made.base.T).T
+    weights = {}
+    for sizes in product((0.0, *slabs), repeat=3):
+        covariance = np.eye(len(left))
+        for size, columns in zip(sizes, made.columns.values(), strict=True):
+            part = left @ columns
+            covariance += size**2 * (part / np.linalg.norm(part, axis=0)) @ (part / np.linalg.norm(part, axis=0)).T
+        log = multivariate_normal(np.zeros(len(left)), covariance).logpdf(left @ made.data)
+        acting = np.array(sizes) > 0.0
+        log += np.where(acting, np.log(0.1 / 2), np.log(0.9)).sum()
+        name = in_order("+".join(np.array(_SETTINGS.effects)[acting])) or "none"
+        weights[name] = np.logaddexp(weights.get(name, -np.inf), log)
+    total = np.logaddexp.reduce(list(weights.values()))
+    found = rivals.spike_and_slab(made, np.random.default_rng(4))
+    for name, log in weights.items():
+        assert found.get(name, 0.0) == pytest.approx(np.exp(log - total), abs=0.06), (found, name)
+
+
 def test_a_gaussian_process_predicts_what_is_smooth_and_not_what_is_not(campaign):
     position = campaign.case.motion.position_mm[campaign.case.at]
     smooth = 20.0 * np.sin(position[:, [2, 0, 1]] / 120.0)
@@ -91,8 +119,8 @@ def test_a_gaussian_process_predicts_what_is_smooth_and_not_what_is_not(campaign
 
 def test_all_ways_find_a_strong_cause(faulty):
     table = check("withheld_beliefs", beliefs(faulty[1], _known("faulty"), _SETTINGS)).set_index("method")
-    assert list(table.index) == ["diagnosis", "bic", "lasso", "gaussian_process"]
-    for method in ("diagnosis", "bic", "lasso"):
+    assert list(table.index) == ["diagnosis", "bic", "lasso", "spike_and_slab", "gaussian_process"]
+    for method in ("diagnosis", "bic", "lasso", "spike_and_slab"):
         probabilities = json.loads(table.loc[method, "probabilities"])
         np.testing.assert_allclose(sum(probabilities.values()), 1.0, atol=1e-9)
         assert "backlash" in table.loc[method, "effects"]
