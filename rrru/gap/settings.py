@@ -4,7 +4,6 @@ from dataclasses import dataclass, field, replace
 from math import comb
 
 import numpy as np
-from scipy.special import betaln
 
 from rrru.effects.library import HOLDS, NAMES, find
 from rrru.errors import ConfigError
@@ -20,11 +19,10 @@ class Prior:
     """Beliefs before the data: a mixture of robots with few effects and of robots as they are, with many small ones.
 
     counts: of robots with few, probabilities of zero, one, two and three effects; each effect more is as much rarer as
-    the third is after the second. each: of robots as they are, the probability that an effect acts, for each alike:
-    the mean of a beta distribution, so that on a robot on which many act one more is less of a surprise (J. Scott and
-    J. Berger, Annals of Statistics 38, 2010); share: of robots as they are. unexplained: probability of something
-    unexplained besides. tolerance: share of what a set explains up to which a remaining discrepancy still counts as
-    the laws' own inaccuracy.
+    the third is after the second. each: of robots as they are, the probability that an effect acts, for each alike and
+    whatever else acts; share: of robots as they are. unexplained: probability of something unexplained besides.
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    inaccuracy.
     """
 
     counts: tuple = (0.3, 0.55, 0.13, 0.02)
@@ -36,8 +34,7 @@ class Prior:
     def log_set(self, count, library):
         """Logarithm of the probability of one set of so many effects of a library of so many."""
         few = self.log_count(count) - np.log(comb(library, count))
-        rarity = (1.0 - self.each) / self.each
-        as_they_are = betaln(1.0 + count, rarity + library - count) - betaln(1.0, rarity)
+        as_they_are = count * np.log(self.each) + (library - count) * np.log1p(-self.each)
         with np.errstate(divide="ignore"):
             log_few, log_as_they_are = np.log([1.0 - self.share, self.share])
         return float(np.logaddexp(log_few + few, log_as_they_are + as_they_are))
