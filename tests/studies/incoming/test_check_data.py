@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from rrru.campaign.ingest.campaign_file import ingest
@@ -256,6 +256,10 @@ def test_what_cannot_be_checked_is_told_without_a_traceback(arguments, said, mon
     data=st.one_of(st.binary(max_size=200), st.text(alphabet="xyzXYZ/,;\t\n [m]1.-", max_size=200).map(str.encode)),
     ending=st.sampled_from([".csv", ".txt", ".xlsx", ".parquet", ""]),
 )
+# a byte order mark and nothing else
+@example(data=b"\xfe\xff", ending=".csv")
+@example(data=b"\xfe\xff", ending=".txt")
+@example(data=b"\xef\xbb\xbf\n", ending=".csv")
 def test_any_file_at_all_is_told(data, ending, tmp_path, monkeypatch):
     monkeypatch.chdir(ROOT)
     path = Path(tmp_path, f"any{ending}")
