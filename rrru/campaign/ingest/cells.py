@@ -108,8 +108,6 @@ def table(names, rows, numbers, problems, commas=frozenset()):
 
 def decode(data, problems, allowed=_TEXT, others=()):
     """Text of the bytes; a UTF-8 byte-order mark is accepted. others: encodings that are tried beside UTF-8."""
-    if not data.strip():
-        problems.refuse_now(value="an empty file", allowed=allowed)
     if known := looks_like(data):
         problems.refuse_now(value=known, allowed=allowed)
     wide = data.startswith(_UTF16)
@@ -127,6 +125,9 @@ def decode(data, problems, allowed=_TEXT, others=()):
             value = f"byte 0x{data[error.start]:02x} in line {line}, which is not UTF-{16 if wide else 8}"
     else:
         problems.refuse_now(value=value, allowed=_OTHER_ENCODING)
+    # a byte-order mark may be all that a file holds
+    if not text.strip():
+        problems.refuse_now(value="an empty file", allowed=allowed)
     before, zero, _ = text.partition("\0")
     if zero:
         problems.refuse_now(value=f"byte 0 in line {before.count(chr(10)) + 1}", allowed=allowed)

@@ -62,9 +62,6 @@ def guess_format(path, problems):
         return None
     text = decode(path.read_bytes(), problems, others=("utf-16", "cp1252"))
     lines = [line for line in text.splitlines() if line.strip()]
-    if not lines:
-        # the reader says that the file is empty
-        return None
     if any(line.startswith("//") for line in lines):
         return "spatial_analyzer"
     at = next((i for i, line in enumerate(lines[:HEADER_LINES]) if names_axes(_fields(line))), 0)
