@@ -116,6 +116,9 @@ def passes(measurements, mechanism):
     start, other = low + shares[:, :3] * (high - low), low + shares[:, 3:] * (high - low)
     distance = np.linalg.norm(other - start, axis=1, keepdims=True)
     far = distance[:, 0] > OPTIONS.pass_length_mm
+    if not far.any():
+        # the box is smaller than a pass
+        return _none(mechanism)
     start = start[far]
     end = start + OPTIONS.pass_length_mm * (other[far] - start) / distance[far]
     turn, reached = None, mechanism.planned(points_of(start, end).reshape(-1, 3))

@@ -250,3 +250,10 @@ def test_points_at_which_the_corrected_model_has_no_pose_are_left_out_of_what_ru
     assert reached.count == posed.sum()
     assert np.isfinite(reached.linearise(state, []).data).all()
     assert reachable(case, plain) is case
+
+
+def test_a_box_smaller_than_a_pass_has_none():
+    frame = measure(plan=plan_of(trajectories=LINES[1:]))
+    known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
+    near = frame[np.abs(known - known[0]).max(axis=1) < 0.5 * OPTIONS.pass_length_mm / np.sqrt(3.0)]
+    assert len(near) > 1 and len(poses.passes(near, SIM)) == 0
