@@ -21,7 +21,7 @@ compare: .venv/ready
 # what is in a file of measurements: make check-data FILE=tracker.csv ROBOT=rrru3 [COMMANDS=commands.csv] [CONFIG=mine.yaml]
 check-data: .venv/ready
 	$(if $(FILE),,$(error say which file: make check-data FILE=tracker.csv ROBOT=rrru3))
-	@$(BIN)/python -m rrru.studies.incoming.check_data "$(FILE)" $(if $(ROBOT),--robot "$(ROBOT)") \
+	@$(BIN)/python -m rrru.studies.data_check.check_data "$(FILE)" $(if $(ROBOT),--robot "$(ROBOT)") \
 	  $(if $(COMMANDS),--commands "$(COMMANDS)") $(if $(CONFIG),--configfile $(CONFIG))
 
 test: .venv/ready

@@ -34,12 +34,12 @@ import pandas as pd
 from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import ROBOTS, SCENES, draw_truth, exact_readings, measure, virtual_campaign
 from rrru.campaign.measurements import series
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose, sim
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.settings import GapSettings
 from rrru.errors import FitError
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.gap.case import GEOMETRY
-from rrru.gap.diagnose import MeasuredRobot, diagnose, sim
-from rrru.gap.make_case import make_case
-from rrru.gap.settings import GapSettings
 from rrru.seeds import stream
 
 FOLDER = RESULTS / "benchmarks" / "coverage"

@@ -16,12 +16,12 @@ import yaml
 
 from benchmarks import harness
 from benchmarks.harness import RESULTS, Task
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
 from rrru.studies import config as parts
-from rrru.studies.withheld.chunks import Member
-from rrru.studies.withheld.draw import draw
-from rrru.studies.withheld.robots import Conditions
+from rrru.studies.blind_validation.chunks import Member
+from rrru.studies.blind_validation.draw import draw
+from rrru.studies.blind_validation.robots import Conditions
 
 # kind of campaign, points of a line and of the spiral
 SIZES = {222: ("paper", 26, 40), 732: ("full", 26, 40), 5008: ("full", 178, 273)}

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks import harness, searchers
 from benchmarks.harness import Task
 from benchmarks.objective import campaign, mean_by_fsolve, population
-from rrru.fit.calibration import calibrate
+from rrru.calibration.calibrate import calibrate
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 

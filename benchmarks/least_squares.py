@@ -13,8 +13,8 @@ from benchmarks import harness
 from benchmarks.harness import Call, Task
 from benchmarks.kinematics import legs, ur10
 from benchmarks.objective import Batch, by_fsolve, campaign
+from rrru.calibration.calibrate import estimate_deviations
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import estimate_deviations
 
 _POINTS, _NOISE_MM, _SAME = 100, 0.02, 1e-5
 _DIFFERENCES = "SciPy, finite differences, our forward kinematics"

@@ -21,10 +21,10 @@ import pandas as pd
 
 from benchmarks.harness import RESULTS
 from benchmarks.virtual_campaigns import draw_truth, measure, pose_campaign
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.verdict_text import answer
 from rrru.errors import FitError
-from rrru.gap.answer import answer
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
 from rrru.robots.drive_words import drive_words
 from rrru.seeds import stream
 

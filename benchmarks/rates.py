@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 from benchmarks.harness import Call
-from rrru.robots.compiled import fma
+from rrru.kinematics.compiled import fma
 
 LIMIT = "limit: its arithmetic at this core's rates"
 # a leg's closure: 12 multiply-adds, 9 products and sums, a root; the three equations: 19 and 20, a division; before

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from rrru.plant import mujoco_model
-from rrru.plant.mujoco_robot import MujocoRobot
-from rrru.plant.mujoco_run import Machine
+from rrru.simulation import mujoco_model
+from rrru.simulation.mujoco_robot import MujocoRobot
+from rrru.simulation.mujoco_run import Machine
 from rrru.studies import setup
 
 ROOT = Path(__file__).resolve().parents[1]

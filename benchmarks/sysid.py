@@ -40,14 +40,14 @@ from benchmarks.recorded import (
 )
 from benchmarks.sysid_table import TABLE, beside
 from rrru.campaign import measurements as rows
-from rrru.gap.corrected_model import write_corrected
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
-from rrru.plant import mujoco_causes, mujoco_model
-from rrru.robots.dynamics import Masses
+from rrru.diagnosis.correction.corrected_model import write_corrected
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
+from rrru.simulation import mujoco_causes, mujoco_model
 from rrru.store import tables
 from rrru.studies import setup
-from rrru.studies.circle.models import errors
+from rrru.studies.end_to_end.models import errors
 
 # seeds from 0 on; the first few are also fitted in the other structure
 ROBOTS, WRONG, OUT = 6, 2, ROOT / "results/tables/sysid.parquet"

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.heldout import HeldOut
+from rrru.diagnosis.state import Linear
 from rrru.estimation.noise_model import NoiseModel
-from rrru.gap.evidence import ModelEvidence
-from rrru.gap.heldout import HeldOut
-from rrru.gap.state import Linear
 
 _SHARED, _PLACE = 4, 3
 

@@ -20,15 +20,15 @@ from scipy.spatial.transform import Rotation
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
+from rrru.diagnosis.make_problem import make_case
 from rrru.effects.library import find
 from rrru.effects.motion import standing
 from rrru.effects.protocol import ActiveEffect, gives_way
-from rrru.gap.make_case import make_case
-from rrru.robots.dynamics import Masses, carried_kg, level_axes
+from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.dynamics import Masses, carried_kg, level_axes
+from rrru.kinematics.point_masses import PLATFORM
 from rrru.robots.from_dh import from_dh
-from rrru.robots.geometric_numbers import Reads
 from rrru.robots.hexapod import hexapod
-from rrru.robots.lumps import PLATFORM
 from rrru.robots.rrru3 import Rrru3
 from rrru.seeds import stream
 

@@ -9,7 +9,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
-from rrru.robots import singularity  # noqa: E402
+from rrru.kinematics import singularity  # noqa: E402
 from rrru.robots.rrru3 import Rrru3  # noqa: E402
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.geometric_numbers import Reads
-from rrru.robots.readings import Readings, place_on_platform
+from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
 # rows kept for a test: no fit uses them, the robot was there nevertheless

@@ -6,7 +6,8 @@ d_i: distance of reading i from its prediction; m: median of d for noise of unit
 own scale (Hampel, Journal of the American Statistical Association 69, 1974). What predicts depends on what is known:
 
 - residuals of a fit along runs: the median of four neighbours, since what a model lacks is smooth (`isolated`);
-- residuals of a fit in no order: the model, and the median of the nearest places (`rrru.fit.lengths.standing_out`);
+- residuals of a fit in no order: the model, and the median of the nearest places
+  (`rrru.calibration.lengths.standing_out`);
 - before a model is fitted: curves through the neighbours and running medians, since readings hold all errors of the
   robot, which bend, jump and ripple (`rrru.campaign.ingest.outliers`), or the usual distance of two reflectors
   (`rrru.campaign.ingest.bodies`).

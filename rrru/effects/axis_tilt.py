@@ -11,7 +11,7 @@ calibration. It enters as a twist at the legs' feet, six numbers.
 
 The whole leg leans with its axis, and its U-joint with it: the platform, which three parallel legs hold upright, turns
 as well (up to a like angle), and more so near a constraint singularity. Eq. (8) does not know of this; the full spatial
-closure does. To first order (`rrru.robots.twist_map`) the platform's motion is linear in the tilts.
+closure does. To first order (`rrru.kinematics.parameter_jacobian`) the platform's motion is linear in the tilts.
 
 Assumptions: rigid seat, constant over the campaign; axes of the other joints parallel to the drive axis as built.
 

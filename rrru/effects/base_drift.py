@@ -17,8 +17,8 @@ hundredths of a millimetre and microradians in an hour.
 import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.kinematics.legs import WORLD
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.legs import WORLD
 
 _KINDS = (("speed", "mm/s", 0.01), ("rate", "rad/s", 1e-5))
 _TYPICAL = np.repeat([1e-5, 1e-8], 3)

@@ -6,7 +6,7 @@ motor's side does not see its wind-up, so that the arm errs by
     dtheta_i = k_i tau_i
 
 where tau_i is the torque of all loads about drive axis i, positive in the sense of theta
-(`rrru.robots.dynamics.loads`):
+(`rrru.kinematics.dynamics.loads`):
 
     tau_i = W . dx/dtheta_i + (m_a + m_f) / 2 g L1 cos(theta_i) - (m_a / 3 + m_f / 2) L1^2 theta_i''
 

@@ -22,8 +22,8 @@ Transactions on Pattern Analysis and Machine Intelligence 9, 1987. Sizes assumed
 import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.kinematics.legs import WORLD
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.legs import WORLD
 
 _KINDS = (("shift", "mm", 100.0), ("turn", "rad", 0.1))
 _PARAMETERS = ParameterSet(

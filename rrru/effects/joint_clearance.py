@@ -1,7 +1,8 @@
 """Joint clearance: the U-joint's pin lies on the side of its bore towards which the leg pushes.
 
 With the force f_i that leg i transmits along the unit direction g_i (compression positive,
-`rrru.robots.dynamics.loads`), the bore (the platform) lags behind the pin (the forearm) by the radial clearance c_i:
+`rrru.kinematics.dynamics.loads`), the bore (the platform) lags behind the pin (the forearm) by the radial clearance
+c_i:
 
     shift_i = -c_i sign(f_i) g_i,   or, softer,   shift_i = -c_i tanh(f_i / f_0) g_i
 

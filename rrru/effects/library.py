@@ -12,8 +12,8 @@ import numpy as np
 
 from rrru.effects.protocol import ActiveEffect, Contribution, Effect, plain_coordinates
 from rrru.errors import ConfigError
-from rrru.objects import load_object
 from rrru.parameters import ParameterSet
+from rrru.plugins import load_object
 
 # the order of tables and draws; what is not named here follows by its file's name
 _ORDER = (

@@ -1,8 +1,8 @@
 """Link flexure: links that push a platform give way along their length, links and bearings of an arm across its joints.
 
 Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive,
-`rrru.robots.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression shortens
-it:
+`rrru.kinematics.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression
+shortens it:
 
     dL3_i = -k_i f_i
 
@@ -14,8 +14,8 @@ A member that is itself driven, as a hexapod's leg, is no forearm: a spring alon
 whatever of the leg it is, and both are `drive_compliance`.
 
 Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
-leg is one two-force member from elbow to U-joint (`held_n` of `rrru.robots.dynamics.Loads`). Both are tried; `held` is
-0 or 1, or a share between.
+leg is one two-force member from elbow to U-joint (`held_n` of `rrru.kinematics.dynamics.Loads`). Both are tried; `held`
+is 0 or 1, or a share between.
 
 An arm has no such members: its links bend, and its bearings tilt. At every turning joint all that it carries turns by
 
@@ -35,8 +35,8 @@ identification using local models applied to industrial robots, Automatica 47, 2
 import numpy as np
 
 from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.kinematics.legs import unit_twist
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.legs import unit_twist
 
 _SIZE = ("flexure", "mm/N", 0.0, 0.1)
 _BEND = ("bending", "rad/(N mm)", 0.0, 1e-6)

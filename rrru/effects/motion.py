@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from rrru.effects.protocol import LOADS, Motion
-from rrru.robots.dynamics import drive_rates, load_slopes, loads
+from rrru.kinematics.dynamics import drive_rates, load_slopes, loads
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Course:
 
 
 def make_motion(robot, masses, course, stands=None):
-    """Motion along a Course: rates and loads of the nominal robot with `rrru.robots.dynamics.Masses`.
+    """Motion along a Course: rates and loads of the nominal robot with `rrru.kinematics.dynamics.Masses`.
 
     Where the velocity is NaN the rates are; the loads then count the platform as at rest, and an unknown payload as
     none. The loads are those at the commanded position, or where the robot `stands`, from the TwistMap there and

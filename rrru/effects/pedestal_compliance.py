@@ -21,9 +21,9 @@ the sizes are assumed.
 import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.kinematics.dynamics import level_axes
+from rrru.kinematics.legs import WORLD
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.dynamics import level_axes
-from rrru.robots.legs import WORLD
 
 _SOURCE = "bending of what the robot stands on, size assumed"
 _KINDS = (("tilt", "rad/(N mm)", 0.0, 1e-7), ("shift", "mm/(N mm)", -1e-4, 1e-4))

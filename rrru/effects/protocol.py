@@ -11,7 +11,7 @@ import numpy.typing as npt
 from rrru.parameters import Parameter, ParameterSet
 
 _ALONG = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-# fields of a Motion that are loads, and what these are of `rrru.robots.dynamics.Loads`
+# fields of a Motion that are loads, and what these are of `rrru.kinematics.dynamics.Loads`
 LOADS = {
     "force_n": "member_n",
     "held_force_n": "held_n",
@@ -28,7 +28,7 @@ PATH = "path_drive"
 class Contribution:
     """What one effect changes at the n points: twists (n or 1, sites, 6) at the robot's sites, or 0 for nothing.
 
-    A twist is a shift in mm and a rotation vector in rad, in the site's own frame; see `rrru.robots.legs`.
+    A twist is a shift in mm and a rotation vector in rad, in the site's own frame; see `rrru.kinematics.legs`.
     """
 
     twists: np.ndarray | float = 0.0
@@ -53,8 +53,8 @@ class Motion:
     that follows drives, likewise; across (n, J, 3): moments in N mm across the axes of an arm's turning joints, in the
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
     how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
-    temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.robots.dynamics`; approach (n,
-    K): where the path does not determine from which side a drive comes to a reading, the expected sense of its
+    temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.kinematics.dynamics`; approach
+    (n, K): where the path does not determine from which side a drive comes to a reading, the expected sense of its
     approach (-1 from above, 1 from below, 0 for even odds), NaN where the path determines it.
     """
 

@@ -17,8 +17,8 @@ Manipulator Calibration, 1991). Typical size assumed: 0.5 mm.
 import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.kinematics.legs import TOOL
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.legs import TOOL
 
 _SOURCE = "seat of the reflector, size assumed"
 _PARAMETERS = ParameterSet(tuple(Parameter(f"offset_{axis}", "mm", 0.0, -50.0, 50.0, _SOURCE) for axis in "xyz"))

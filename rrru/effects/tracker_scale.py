@@ -23,8 +23,8 @@ aluminium) make more, sizes assumed.
 import numpy as np
 
 from rrru.effects.protocol import Effect, plain_coordinates
+from rrru.kinematics.legs import WORLD
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.legs import WORLD
 
 _PARAMETERS = ParameterSet((Parameter("scale", "1", 0.0, -1e-3, 1e-3, "refraction or temperature, size assumed"),))
 _COORDINATES = plain_coordinates(_PARAMETERS, 5e-5)

@@ -17,8 +17,8 @@ In robots with drives of both kinds it acts at those that turn.
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
 of motion. The ratio is a number of the drive's data sheet; where nobody states it, it is searched beside that of the
-data sheet, see `rrru.gap.orders`. With N = 50 the error repeats every 7.2 degrees of the arm, and a campaign must
-sample more densely than every 3.6 degrees to see it as what it is.
+data sheet, see `rrru.diagnosis.harmonic_orders`. With N = 50 the error repeats every 7.2 degrees of the arm, and a
+campaign must sample more densely than every 3.6 degrees to see it as what it is.
 
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50
 is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.

@@ -5,7 +5,8 @@ A drive of several stages, or drives of unlike gears, err at several orders N_k,
     dtheta_i = sum over k with i_k = i of s_k sin(N_k theta_i) + c_k cos(N_k theta_i)
 
 `transmission_error` is the special case of one ratio that all drives share. Which orders, on which drives, is searched
-one after another in what the calibration leaves, see `rrru.gap.spectra`; each has to earn its choice among many.
+one after another in what the calibration leaves, see `rrru.diagnosis.drive_spectra`; each has to earn its choice among
+many.
 
 Assumptions: the error depends on the angle only, not on load or direction of motion.
 

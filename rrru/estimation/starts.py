@@ -22,9 +22,9 @@ from rrru.estimation.estimate import Estimate
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import solve
-from rrru.robots.geometric_numbers import open_numbers
-from rrru.robots.legs import TOOL, WORLD
-from rrru.robots.readings import Readings, lacking, place_on_platform
+from rrru.kinematics.base_parameters import open_numbers
+from rrru.kinematics.legs import TOOL, WORLD
+from rrru.kinematics.readings import Readings, lacking, place_on_platform
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[s
 def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> dict[str, float]:
     """What has to be added to twists (1, sites, 6) for readings to fit, by name of the robot's open numbers.
 
-    The exact registration of Readings at Poses, in the names of `rrru.robots.geometric_numbers.open_numbers`. Raises
+    The exact registration of Readings at Poses, in the names of `rrru.kinematics.base_parameters.open_numbers`. Raises
     FitError where nothing determines it.
     """
     found, numbers = register_poses(robot, poses, twists, readings), robot.legs.site_numbers

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from rrru.figures.fonts import leave_out_layout
-from rrru.store.whole import whole
+from rrru.store.atomic_write import whole
 
 leave_out_layout()
 

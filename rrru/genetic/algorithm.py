@@ -14,7 +14,7 @@ from rrru.genetic.islands import migrate
 from rrru.genetic.plan import Box, directions, make_rules, migrants_of, mutants_of, mutation_sigma, uniforms_needed
 from rrru.genetic.result import GeneticResult, means
 from rrru.genetic.settings import is_number
-from rrru.robots.compiled import CompiledObjective
+from rrru.kinematics.compiled import CompiledObjective
 
 # generations whose random numbers are drawn at once: few enough to stay in the cache
 BLOCK = 100

@@ -6,8 +6,8 @@ from time import perf_counter
 import numpy as np
 import pandas as pd
 
-from rrru.fit.calibration import calibrate
-from rrru.fit.mean_distance import least_mean_distance
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 from rrru.seeds import run_seed

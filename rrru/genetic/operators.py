@@ -218,8 +218,8 @@ def has_stalled(best, stall_generations, tolerance):
 def advance(objective, legs, points, box, rules, draws, done, populations, scores, best):
     """Breed and rate as many generations as there are draws, fewer where the run stalls; returns their number.
 
-    objective: writes the values (m,) of parameters (m, p), see `rrru.robots.compiled`; box, rules: see `plan`; draws:
-    uniform (k, u), moves (k, mutants, t, p) and their sizes (k + 1,) of each generation and of the one before;
+    objective: writes the values (m,) of parameters (m, p), see `rrru.kinematics.compiled`; box, rules: see `plan`;
+    draws: uniform (k, u), moves (k, mutants, t, p) and their sizes (k + 1,) of each generation and of the one before;
     adaptive ones are written; done: generations before. populations (k + 1, n, p) and scores (k + 1, n) start with the
     last generation, best (all generations + 1,) is written behind `done`.
     """

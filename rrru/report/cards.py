@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import NOT_CORRECTED, percent, probability, readable, rounded, share_with_interval
+from rrru.diagnosis.verdict_text import NOT_CORRECTED, percent, probability, readable, rounded, share_with_interval
 from rrru.report import worth
 
 # colours of the budget's parts: effects in the order of their share, then what is no effect

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
+from rrru.calibration.campaign_fit import CalibrationSettings
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.fit.campaign_fit import CalibrationSettings
-from rrru.store import facts, tables
+from rrru.store import json_files, tables
 
 METHOD = "least_squares"
 # numbers of the instrument's frame
@@ -63,7 +63,7 @@ def read(folder, campaign, name):
         wanted = ", ".join([*missing, "verdict.json"][:3])
         raise ConfigError(f"compare: {place} lacks {wanted}; run `snakemake` for it first")
     frames = {one: tables.read(place / f"{one}.parquet") for one in _READ}
-    return Side(name, campaign, facts.read(place / "robot.json"), frames, facts.read(place / "verdict.json"))
+    return Side(name, campaign, json_files.read(place / "robot.json"), frames, json_files.read(place / "verdict.json"))
 
 
 def calibrated(folder):

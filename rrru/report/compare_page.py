@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from rrru.diagnosis.verdict_text import probability, readable, rounded
 from rrru.errors import ConfigError, RrruError
-from rrru.gap.answer import probability, readable, rounded
 from rrru.report import cells, compare, page
 from rrru.report.compare_gap import gap_difference
 from rrru.report.compare_unseen import same_points, unseen

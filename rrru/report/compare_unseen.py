@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import t
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import deviation_vector, select
 from rrru.campaign import measurements as rows
-from rrru.compensate.evaluate import model_residual
+from rrru.compensation.evaluate import model_residual
 from rrru.errors import FitError
-from rrru.fit.calibration import calibrate
-from rrru.fit.campaign_fit import deviation_vector, select
 from rrru.report.compare import METHOD
 from rrru.studies import setup
 

@@ -12,8 +12,8 @@ import jinja2
 from rrru.report import cards, cells, contents, svg
 from rrru.report.trust import trust
 from rrru.report.worth import worth
-from rrru.store import facts, tables
-from rrru.store.whole import write_text
+from rrru.store import json_files, tables
+from rrru.store.atomic_write import write_text
 from rrru.studies import glossary
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -143,7 +143,7 @@ def write(folder, path, reproduced, campaign=None):
     sources = results.sources()
     answers = []
     for name in names:
-        answer = facts.read(results.folder / "campaigns" / name / "verdict.json")
+        answer = json_files.read(results.folder / "campaigns" / name / "verdict.json")
         drawn = results.picture(f"{name}/gap_map", f"{name}: where it misses")
         found = results.worth(name, answer["noise_rms_mm"])
         source, models = sources.get(name, "virtual robot of a study"), results.models(name, Path(path).parent)

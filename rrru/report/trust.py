@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from rrru.diagnosis.verdict_text import rounded, with_interval
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.gap.answer import rounded, with_interval
 from rrru.report.cells import MINUS
 
 # a correlation that makes two numbers one, and standard errors to the end of a 95 % interval

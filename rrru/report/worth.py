@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from rrru.gap.answer import rounded
-from rrru.gap.shrink import gap_rms
+from rrru.diagnosis.shrink import gap_rms
+from rrru.diagnosis.verdict_text import rounded
 
 _AXES = "xyz"
 

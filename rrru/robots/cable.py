@@ -8,9 +8,9 @@ Lengths in mm, angles in rad.
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.general import GeneralRobot
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.legs import Joint, Leg, Legs, X, Y, Z
 from rrru.robots.hexapod import bar_parts, driven_bars
-from rrru.robots.legs import Joint, Leg, Legs, X, Y, Z
 
 
 def cable(anchors_mm, platform_mm, home_mm, stroke_mm=300.0, planar=False, name="cable", **options):

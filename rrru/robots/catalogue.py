@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.objects import load_object
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.mobility import free_motions
+from rrru.kinematics.robot import Robot
+from rrru.plugins import load_object
 from rrru.robots.delta import Delta
-from rrru.robots.free_motion import free_motions
 from rrru.robots.from_dh import from_dh
-from rrru.robots.general import GeneralRobot
 from rrru.robots.ptt3 import Ptt3
-from rrru.robots.robot import Robot
 from rrru.robots.rrru3 import Rrru3
 
 MECHANISMS: dict[str, Any] = {"rrru3": Rrru3, "ptt3": Ptt3, "delta": Delta}
@@ -67,7 +67,7 @@ def _own(name: str, section: dict[str, Any], options: Mapping[str, Any]) -> Robo
         return replace(robot, name=name, **tool, **options)
     if "dh" in section:
         return from_dh(section.pop("dh"), **section, name=name, **tool, **options)
-    from rrru.robots import from_file
+    from rrru.formats import robot_file
 
-    read, key = (from_file.from_urdf, "urdf") if "urdf" in section else (from_file.from_mjcf, "mjcf")
+    read, key = (robot_file.from_urdf, "urdf") if "urdf" in section else (robot_file.from_mjcf, "mjcf")
     return read(section.pop(key), **section, name=name, **tool, **options)

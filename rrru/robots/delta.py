@@ -24,9 +24,9 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.kinematics.dynamics import arm_load
+from rrru.kinematics.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.parameters import LEGS
-from rrru.robots.dynamics import arm_load
-from rrru.robots.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
@@ -143,6 +143,6 @@ class Delta(Tripod):
         return np.stack([np.broadcast_to(column, turned.shape) for column in columns], axis=-1)
 
     def own_load(self, masses, motion, _poses, gravity_mm_s2):
-        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
+        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.kinematics.dynamics`."""
         pulls = -np.cos(motion[0]) * gravity_mm_s2[2] - np.sin(motion[0]) * (self.radial @ gravity_mm_s2)
         return arm_load(masses, self.l1_mm, pulls, motion[2])

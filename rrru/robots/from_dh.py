@@ -3,7 +3,7 @@
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.hands import with_hands
+from rrru.kinematics.end_effectors import with_hands
 from rrru.robots.serial import FRAME, JOINT, serial
 
 _LENGTHS, _ANGLES = ("a_mm", "d_mm"), ("alpha_deg", "theta_deg", "rpy_deg")

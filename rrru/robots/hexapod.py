@@ -7,8 +7,8 @@ and one of the length, 42 numbers describe its errors. Lengths in mm, angles in 
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.robots.general import GeneralRobot
-from rrru.robots.legs import Bar, Drive, Joint, Leg, Legs, Parts, unit_twist
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.legs import Bar, Drive, Joint, Leg, Legs, Parts, unit_twist
 
 
 def hexapod(base_mm, platform_mm, height_mm, stroke_mm=100.0, name="hexapod", **options):

@@ -27,9 +27,9 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.kinematics.dynamics import PER_NEWTON
+from rrru.kinematics.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.parameters import LEGS
-from rrru.robots.dynamics import PER_NEWTON
-from rrru.robots.legs import Joint, Legs, Parts, X, Y, Z, turn_about
 from rrru.robots.three_legs import Deviation, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
@@ -162,7 +162,7 @@ class Ptt3(Tripod):
         return self._directions(self.numbers(deviations))[2]
 
     def own_load(self, masses, motion, _poses, gravity_mm_s2):
-        """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.robots.dynamics`."""
+        """Forces (n, 3) in N of the carriages' own masses along their rails; see `rrru.kinematics.dynamics`."""
         along = self.rails() @ gravity_mm_s2
         return (masses.arm_kg + 0.5 * masses.forearm_kg) * (along - motion[2]) / PER_NEWTON
 

@@ -16,12 +16,12 @@ from typing import ClassVar
 
 import numpy as np
 
+from rrru.kinematics.compiled import CompiledObjective
+from rrru.kinematics.dynamics import arm_load
+from rrru.kinematics.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
 from rrru.parameters import LEGS
 from rrru.robots import rrru3_kernels as kernels
 from rrru.robots import rrru3_objective
-from rrru.robots.compiled import CompiledObjective
-from rrru.robots.dynamics import arm_load
-from rrru.robots.legs import Joint, Leg, Legs, Parts, X, Y, Z, turn_about
 from rrru.robots.three_legs import Deviation, ThreeLegs, of_each, of_each_leg, of_three_legs, points, three_drives
 
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
@@ -223,7 +223,7 @@ class Rrru3(ThreeLegs):
         return self.passive_angles(position_mm, self.inverse(position_mm)).reshape(-1, 12)
 
     def own_load(self, masses, motion, _poses, gravity_mm_s2):
-        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.robots.dynamics`."""
+        """Torques (n, 3) in N mm of the arms' own masses about their drives; see `rrru.kinematics.dynamics`."""
         cosine, sine = self.azimuth_cos_sin
         outward, down = gravity_mm_s2[0] * cosine + gravity_mm_s2[1] * sine, gravity_mm_s2[2]
         pulls = np.cos(motion[0]) * down - np.sin(motion[0]) * outward

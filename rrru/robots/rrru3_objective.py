@@ -9,7 +9,7 @@ from functools import cache
 import numba
 import numpy as np
 
-from rrru.robots.compiled import Kernel, fma
+from rrru.kinematics.compiled import Kernel, fma
 
 # A Newton step of this size (mm^2, squared) leaves an error far below 1e-9 mm, since convergence is quadratic with a
 # constant of about 1 / (link length): (1e-4)^2 / 100 = 1e-10.
@@ -37,7 +37,7 @@ def arrays(mechanism, angles_rad, nominal_mm, measured_mm):
 
 @cache
 def kernel():
-    """The compiled objective, see `rrru.robots.compiled`."""
+    """The compiled objective, see `rrru.kinematics.compiled`."""
     return Kernel(_mean_distance)
 
 

@@ -14,10 +14,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
-from rrru.robots.drive_step import end_of
-from rrru.robots.general import GeneralRobot
-from rrru.robots.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
-from rrru.robots.lumps import Lump
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.inverse import end_of
+from rrru.kinematics.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
+from rrru.kinematics.point_masses import Lump
 
 # keys of a row: of a joint, of a fixed frame
 JOINT = ("a", "alpha", "d", "theta", "sliding", "name", "drives", "mass_kg", "com_mm")

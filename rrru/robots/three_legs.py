@@ -10,10 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from rrru.errors import ConfigError
+from rrru.kinematics import singularity, workspace
+from rrru.kinematics.legs import Drive, unit_twist
+from rrru.kinematics.robot import Robot
 from rrru.parameters import LEGS, Parameter, ParameterSet
-from rrru.robots import singularity, workspace
-from rrru.robots.legs import Drive, unit_twist
-from rrru.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,9 @@ class ThreeLegs(Robot):
         return self.nominal_legs + np.einsum("lcp,...p->...lc", self.leg_map, np.asarray(deviations, dtype=float))
 
     def singularities(self, position_mm, actuators):
-        """Translational and constraint measure and constraint determinant, each (n,); see `rrru.robots.singularity`."""
+        """Translational and constraint measure and constraint determinant, each (n,); see
+        `rrru.kinematics.singularity`.
+        """
         measures = (
             singularity.translational_measure,
             singularity.constraint_measure,

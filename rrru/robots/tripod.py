@@ -11,9 +11,9 @@ z points up and the platform hangs below. Lengths in mm, angles in rad.
 
 import numpy as np
 
-from rrru.robots.legs import Bar, Joint, Leg, X, Y
+from rrru.kinematics.legs import Bar, Joint, Leg, X, Y
+from rrru.kinematics.spheres import lower_intersection
 from rrru.robots.rrru3_kernels import tripod_mean_distance
-from rrru.robots.spheres import lower_intersection
 from rrru.robots.three_legs import ThreeLegs, of_three_legs, points
 
 # both bars of every leg

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import yaml
 
-from rrru.store.whole import write_text
+from rrru.store.atomic_write import write_text
 
 
 def write(values: dict, misfit: float, path: str | Path) -> None:

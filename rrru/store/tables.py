@@ -10,8 +10,8 @@ import pyarrow as arrow
 import pyarrow.parquet as parquet
 
 from rrru.errors import TableError
+from rrru.store.atomic_write import whole
 from rrru.store.schema import Column, Table
-from rrru.store.whole import whole
 
 _ARROW = {"int64": arrow.int64(), "float64": arrow.float64(), "str": arrow.string(), "bool": arrow.bool_()}
 # of one row group of a file, Parquet's own default

@@ -3,7 +3,7 @@
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, from_config
-from rrru.gap.options import OPTIONS
+from rrru.diagnosis.options import OPTIONS
 
 
 def advised_runs(run, poses, trajectories, motion):

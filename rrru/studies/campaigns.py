@@ -5,7 +5,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.estimation.intervals import QUANTILE_95
-from rrru.robots import workspace
+from rrru.kinematics import workspace
 
 
 def with_singularities(robot, measurements, margin):
@@ -41,7 +41,7 @@ def workspace_table(robot, measurements):
 
 
 def campaign_row(robot, section, measurements, singular, noise, notes, registration=None):
-    """The row of `campaigns`; noise: a `rrru.fit.campaign_noise.Noise`."""
+    """The row of `campaigns`; noise: a `rrru.calibration.campaign_noise.Noise`."""
     counts = measurements["status"].value_counts()
     source = f"virtual robot {section['virtual']}" if "virtual" in section else f"file {section['ingest']}"
     return {

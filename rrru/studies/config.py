@@ -7,7 +7,7 @@ import hashlib
 from pathlib import Path
 
 from rrru.errors import ConfigError
-from rrru.objects import module_file
+from rrru.plugins import module_file
 
 # what of a campaign's section only drives it, or limits what is driven next
 _DRIVEN = ("trajectories", "passes", "advised_by", "limits")
@@ -46,7 +46,8 @@ def robot(config, section):
 
 
 def limits(config, section):
-    """What further runs of a campaign's section may ask of its robot, as `rrru.gap.run_limits.StatedLimits` has it.
+    """What further runs of a campaign's section may ask of its robot, as
+    `rrru.diagnosis.design.run_limits.StatedLimits` has it.
 
     Key by key the campaign's own, else the robot's.
     """

@@ -6,11 +6,11 @@ from rrru.campaign import measurements as rows
 from rrru.campaign import trajectories
 from rrru.campaign.plan import make_plan
 from rrru.estimation.starts import register_measurements
-from rrru.plant import virtual_robot
-from rrru.plant.driven import DrivenRobot
-from rrru.plant.tracker import Sees
 from rrru.robots.catalogue import make_mechanism, tracked_set
 from rrru.seeds import stream
+from rrru.simulation import virtual_robot
+from rrru.simulation.driven import DrivenRobot
+from rrru.simulation.tracker import Sees
 
 
 def mechanism(nominal, parameter_set=None):
@@ -89,7 +89,7 @@ def real_robot(nominal, section):
     if "mujoco" not in section:
         return virtual_robot.from_config(mechanism(nominal), section)
     # a simulator is not small, and other robots do not need it
-    from rrru.plant import mujoco_robot
+    from rrru.simulation import mujoco_robot
 
     return mujoco_robot.from_config(mechanism(nominal), nominal["dimensions"], section)
 

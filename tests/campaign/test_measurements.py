@@ -8,10 +8,10 @@ from rrru.campaign.plan import make_plan
 from rrru.campaign.schemas import measurement_table
 from rrru.campaign.trajectories import Line
 from rrru.errors import TableError
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.store import tables
 from tests.schemas import TABLES, check_measurements
 

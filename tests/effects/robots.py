@@ -5,9 +5,9 @@ import numpy as np
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Line, Spiral
 from rrru.effects.library import active_effects, library
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 
 ROBOT = Rrru3()
 # a robot along lines does not stop, and has no thermometer; laws of many waves have tests of their own

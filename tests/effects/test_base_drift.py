@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects import library as effects
-from rrru.gap.settings import GapSettings
+from rrru.kinematics.legs import WORLD
+from rrru.kinematics.readings import Readings
 from rrru.robots.delta import Delta
-from rrru.robots.legs import WORLD
-from rrru.robots.readings import Readings
 from rrru.robots.rrru3 import Rrru3
-from tests.gap import arms
+from tests.diagnosis import arms
 
 _SPEED, _RATE = np.array([4e-6, -2e-6, 5e-6]), np.array([1e-8, 2e-8, -1.5e-8])
 _VALUES = np.concatenate([_SPEED, _RATE])

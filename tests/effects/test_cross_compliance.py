@@ -4,10 +4,11 @@ import numpy as np
 
 from rrru.effects.library import find, library
 from rrru.effects.motion import Course, make_motion
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.catalogue import make_mechanism
-from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
-from tests.robots import humanoid, two_arms
+from tests.formats import humanoid
+from tests.robots import two_arms
 
 COUNT = 20
 FOLLOWING = make_mechanism("two_arms", two_arms.section())

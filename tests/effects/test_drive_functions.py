@@ -5,19 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.state import State
 from rrru.effects.drive_error_function import ORDERS
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
-from rrru.gap.calibrate import calibrate
-from rrru.gap.state import State
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
-from rrru.robots.dynamics import Masses
 from rrru.robots.hexapod import hexapod
 from rrru.robots.linear_delta import LinearDelta
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
-from tests.gap import arms
+from tests.diagnosis import arms
 from tests.robots import two_arms
 
 _ANGLES = np.radians([0.0, 20.0, 120.0, 140.0, 240.0, 260.0])

@@ -9,8 +9,8 @@ from scipy.optimize import least_squares
 from rrru.effects.backlash import play
 from rrru.effects.library import NAMES, active_effects
 from rrru.effects.protocol import ActiveEffect, Contribution, Motion
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.effects.robots import (
     EFFECTS,
     FORWARD,

@@ -12,11 +12,11 @@ from rrru.campaign.trajectories import Spiral
 from rrru.effects.library import active_effects, find, library
 from rrru.effects.protocol import Contribution, Motion
 from rrru.errors import ConfigError
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.delta import Delta
-from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.effects.robots import ELSEWHERE, SLIDER_EFFECTS
 from tests.reference import tripods_slow
 

@@ -5,15 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.backlash import play
 from rrru.effects.friction_windup import wound
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
 from rrru.robots.ptt3 import Ptt3
-from tests.gap import arms
-from tests.gap.campaigns import MASSES, NOISE_MM, ROBOT, measure
+from tests.diagnosis import arms
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, measure
 
 EFFECT = find("friction_windup", ROBOT)
 _LIBRARY = ("backlash", "friction_windup", "drive_compliance", "encoder_eccentricity", "servo_lag", "axis_tilt")

@@ -7,9 +7,9 @@ import pytest
 
 from rrru.effects.library import NAMES, active_effects, find, library
 from rrru.errors import ConfigError
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.effects.robots import EFFECTS, FORWARD, ROBOT, drive, drive_error, plan_of
 
 _OWN = """

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import FORWARD, LINE, LOADED, ROBOT, SPIRAL, drive, per_leg, plan_of
 

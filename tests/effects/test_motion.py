@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from rrru.effects.motion import Course, make_motion, standing
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
-from rrru.robots.dynamics import Masses
 from rrru.robots.ptt3 import Ptt3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.effects.robots import EFFECTS, FORWARD, LINE, LOADED, ROBOT, SPIRAL, plan_of
-from tests.robots.mjcf import ARM, HEXAPOD
+from tests.formats.mjcf import ARM, HEXAPOD
 
 _PLAN = plan_of(FORWARD, LOADED, trajectories=(LINE, SPIRAL))
 

@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
-from rrru.robots.legs import WORLD
-from rrru.robots.lumps import places
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.legs import WORLD
+from rrru.kinematics.point_masses import places
 from rrru.robots.serial import serial
 
 _QUARTER = 0.5 * np.pi

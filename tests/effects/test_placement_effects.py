@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.effects.library import find
 from rrru.effects.motion import Course, make_motion
-from rrru.robots.dynamics import Masses
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.hexapod import hexapod
 from rrru.robots.rrru3 import Rrru3
 from tests.effects.robots import EFFECTS, FORWARD, LINE, ROBOT, SPIRAL, drive, per_leg, plan_of

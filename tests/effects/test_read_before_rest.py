@@ -7,12 +7,12 @@ import pandas as pd
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.motion import last_move
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.make_case import make_case
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.serial import serial
 
 _DEG = np.pi / 180.0

@@ -8,7 +8,7 @@ from rrru.robots.delta import Delta
 from rrru.robots.from_dh import from_dh
 from rrru.robots.ptt3 import Ptt3
 from rrru.robots.rrru3 import Rrru3
-from tests.gap.gantry import GANTRY, RANGES_MM, motion_of
+from tests.diagnosis.gantry import GANTRY, RANGES_MM, motion_of
 
 _SHAPE = {"time_constant": 400.0}
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.model_fit import fit_named_effects
 from rrru.effects import library as effects
-from rrru.gap.calibrate import calibrate
-from rrru.gap.model_fit import fit_named_effects
-from tests.gap import arms
+from tests.diagnosis import arms
 
 _EXPANSION = 2.3e-5
 _TEMPERATURE = 20.0 + np.array([0.0, 1.0, 4.0, 10.0, -5.0, 2.5])

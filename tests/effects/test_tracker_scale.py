@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
-from rrru.robots.legs import WORLD
-from tests.gap.campaigns import MASSES, NOISE_MM, ROBOT, case_of, measure
+from rrru.kinematics.legs import WORLD
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, case_of, measure
 
 EFFECT, SCALE = find("tracker_scale", ROBOT), 4e-4
 _LIBRARY = ("tracker_scale", "frame_misregistration", "backlash", "drive_compliance", "servo_lag", "axis_tilt")

@@ -11,14 +11,14 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.model_fit import EffectModel, fit_named_effects
+from rrru.diagnosis.state import State
 from rrru.errors import FitError
-from rrru.gap.calibrate import calibrate
-from rrru.gap.diagnose import sim
-from rrru.gap.make_case import make_case
-from rrru.gap.model_fit import EffectModel, fit_named_effects
-from rrru.gap.state import State
-from rrru.robots.dynamics import Masses
-from rrru.robots.geometric_numbers import open_numbers
+from rrru.kinematics.base_parameters import open_numbers
+from rrru.kinematics.dynamics import Masses
 from rrru.studies import setup
 from rrru.studies.real.frame_fit import FRAMES, FrameObservations, fit_frames, frame_directions, frames
 from tests.estimation.random_robots import NOISE_MM, draw_campaign

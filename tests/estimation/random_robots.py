@@ -11,11 +11,11 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
+from rrru.kinematics.base_parameters import Reads, candidates_of
+from rrru.kinematics.legs import TOOL, WORLD
+from rrru.kinematics.readings import Readings, orientation, points_read
 from rrru.robots.from_dh import from_dh
-from rrru.robots.geometric_numbers import Reads, candidates_of
 from rrru.robots.hexapod import hexapod
-from rrru.robots.legs import TOOL, WORLD
-from rrru.robots.readings import Readings, orientation, points_read
 
 NOISE_MM, NOISE_RAD = 0.03, 1e-4
 KINDS = ("arm", "column", "gantry", "hexapod")

@@ -5,6 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
 from rrru.errors import FitError
 from rrru.estimation.estimate import SearchEnd
 from rrru.estimation.explain import explain_end
@@ -12,7 +13,6 @@ from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import SolverOptions, solve
 from rrru.estimation.starts import register_measurements
-from rrru.gap.calibrate import calibrate
 from rrru.studies import setup
 from tests.estimation.from_truth import case_of, outcome_of, squares, unregistered_table
 from tests.estimation.random_robots import KINDS, NOISE_MM, draw_campaign

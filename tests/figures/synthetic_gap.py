@@ -5,7 +5,7 @@ anything.
 import numpy as np
 import pandas as pd
 
-from rrru.studies.withheld.verdicts import PLANTS
+from rrru.studies.blind_validation.verdicts import PLANTS
 from tests.schemas import TABLES, check
 
 EFFECTS = (

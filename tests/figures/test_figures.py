@@ -19,8 +19,8 @@ from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES
 from tests.places import ROOT
 from tests.schemas import TABLES
-from tests.studies.circle import synthetic_circle
 from tests.studies.delta import synthetic_delta
+from tests.studies.end_to_end import synthetic_circle
 from tests.studies.methods import synthetic_methods
 from tests.studies.printers import synthetic_printers
 from tests.studies.ptt3 import synthetic_ptt

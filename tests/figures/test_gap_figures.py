@@ -10,8 +10,8 @@ from matplotlib.colors import to_hex
 from rrru.errors import ConfigError
 from rrru.figures import style
 from rrru.store import tables
-from rrru.studies.withheld import figures as withheld
-from rrru.studies.withheld.verdicts import PLANTS
+from rrru.studies.blind_validation import figures as withheld
+from rrru.studies.blind_validation.verdicts import PLANTS
 from tests.figures import synthetic_gap as made_up
 from tests.figures import synthetic_tables as synthetic
 from tests.figures.catalogue import FIGURES

@@ -5,8 +5,8 @@ import numpy as np
 import pandas as pd
 
 from rrru.figures.solids import solids as draw
-from rrru.plant.mujoco_picture import solids
-from tests.plant.simulated import MODELS, file_of
+from rrru.simulation.mujoco_picture import solids
+from tests.simulation.simulated import MODELS, file_of
 
 
 def test_every_model_is_drawn_upright():

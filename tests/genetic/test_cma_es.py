@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.mean_distance import least_mean_distance
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
-from rrru.fit.mean_distance import least_mean_distance
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
 from rrru.robots.rrru3 import Rrru3

@@ -10,10 +10,10 @@ A bar has w w^T in place of P_i, w its line. Lengths in mm, angles in rad; in tw
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.closure import Closure
-from rrru.robots.legs import cross, turn_about
-from rrru.robots.walk import Poses, Twists, Walk, value_of
-from rrru.robots.wrenches import screw
+from rrru.kinematics.chain import Poses, Twists, Walk, value_of
+from rrru.kinematics.closure import Closure
+from rrru.kinematics.legs import cross, turn_about
+from rrru.kinematics.wrenches import screw
 
 _ARM_MM = 500.0
 _SCALE = np.repeat([_ARM_MM, 1.0], 3)

@@ -4,11 +4,12 @@ The loads' columns are linear in the nuisance parameters w, and so is the model 
 
     d = (X + sum_j w_j Y_j) c + e,    p(d) = integral of p(d | w) p(w) dw,
 
-with p(w) the mixture of `rrru.gap.weight` and p(d | w) the evidence of a linear model. `rrru.gap.weight` replaces w_j c
-by w_j times the coefficients found under weak priors, which is a linearisation and fast. Here the integral over w, one
-to four parameters, is importance sampling from a mixture of the prior and a t distribution that is fitted to earlier
-draws (Cappe, Douc, Guillin, Marin and Robert, Adaptive importance sampling in general mixture classes, Statistics and
-Computing 18, 2008). The difference of both shows how far off the linearisation is.
+with p(w) the mixture of `rrru.diagnosis.payload_nuisance` and p(d | w) the evidence of a linear model.
+`rrru.diagnosis.payload_nuisance` replaces w_j c by w_j times the coefficients found under weak priors, which is a
+linearisation and fast. Here the integral over w, one to four parameters, is importance sampling from a mixture of the
+prior and a t distribution that is fitted to earlier draws (Cappe, Douc, Guillin, Marin and Robert, Adaptive importance
+sampling in general mixture classes, Statistics and Computing 18, 2008). The difference of both shows how far off the
+linearisation is.
 """
 
 from typing import NamedTuple
@@ -16,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import multivariate_t, norm
 
-from rrru.gap.evidence_kernels import log_evidence, log_sum_exp
-from rrru.gap.weight import cases_of
+from rrru.diagnosis.evidence_kernels import log_evidence, log_sum_exp
+from rrru.diagnosis.payload_nuisance import cases_of
 
 # share of draws from the prior, which bounds the weights, and degrees of freedom of the fitted t distribution
 _PRIOR_DRAW_SHARE, _DEGREES_OF_FREEDOM = 0.2, 5.0
@@ -60,7 +61,8 @@ class ProductModel(NamedTuple):
     def make(cls, problem, blocks, steps, grams, strengths):
         """Model of a Projected problem without nuisance parameters at strengths (terms,).
 
-        blocks, steps: as in `rrru.gap.weight.borne`; grams: as in `rrru.gap.projected.Projected.of`, of one level.
+        blocks, steps: as in `rrru.diagnosis.payload_nuisance.borne`; grams: as in
+        `rrru.diagnosis.marginal_problem.Projected.of`, of one level.
         """
         k, q = len(problem.size), len(steps)
         index = np.concatenate([problem.index, *(numbers.ravel() for _, numbers in blocks.values())])

@@ -3,14 +3,14 @@
 import numpy as np
 import pandas as pd
 
+from rrru.calibration import campaign_fit
+from rrru.calibration.schemas import TABLES as FIT_TABLES
 from rrru.campaign import measurements as rows
-from rrru.compensate.evaluate import model_residual
-from rrru.fit import campaign_fit
-from rrru.fit.schemas import TABLES as FIT_TABLES
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.compensation.evaluate import model_residual
 from rrru.robots.rrru3 import Rrru3
-from rrru.store import facts, tables
-from tests.gap.campaigns import FORWARD, NOISE_MM, REVERSE, plan_of
+from rrru.simulation.virtual_robot import VirtualRobot
+from rrru.store import json_files, tables
+from tests.diagnosis.campaigns import FORWARD, NOISE_MM, REVERSE, plan_of
 from tests.schemas import TABLES
 
 NOMINAL = {"name": "rrru3", "dimensions": {}, "parameter_set": None}
@@ -32,7 +32,9 @@ def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS
     known = {table.name: table for table in FIT_TABLES}
     for name, table in campaign_fit.tables(campaign, fits).items():
         tables.write(known[name], table, place / f"{name}.parquet")
-    facts.write({"nominal": nominal, "noise_mm": noise_mm, "arm_mm": np.nan, "calibration": sets}, place / "robot.json")
+    json_files.write(
+        {"nominal": nominal, "noise_mm": noise_mm, "arm_mm": np.nan, "calibration": sets}, place / "robot.json"
+    )
     left = model_residual(frame, robot, fits["both", "least_squares"].deviations)
     points = frame[["run", "trajectory", "point"]].assign(used=True)
     before = {f"before_{axis}_mm": left[f"error_{axis}_mm"].to_numpy() for axis in "xyz"}
@@ -41,7 +43,7 @@ def leave(folder, campaign, frame, noise_mm=NOISE_MM, nominal=NOMINAL, sets=SETS
     )
     part = {"part": "backlash", "kind": "effect", "rms_mm": 0.01, "share": 1.0, "share_low": 0.8, "share_high": 1.2}
     answer = {"effects": [{"name": "backlash"}], "unexplained": False, "probability": 0.9, "gap_rms_mm": 0.01}
-    facts.write(answer | {"budget": [part], "noise_rms_mm": noise_mm * 3.0**0.5}, place / "verdict.json")
+    json_files.write(answer | {"budget": [part], "noise_rms_mm": noise_mm * 3.0**0.5}, place / "verdict.json")
 
 
 def moved(frame, shift_mm):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rrru.gap.schemas import TABLES
+from rrru.diagnosis.schemas import TABLES
 from rrru.report import cells
 
 

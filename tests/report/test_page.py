@@ -7,9 +7,9 @@ from markupsafe import escape
 
 from rrru.figures import style
 from rrru.report import page
-from rrru.store import facts, tables
+from rrru.store import json_files, tables
+from tests.diagnosis.test_verdict_text import CAMPAIGN, answered
 from tests.figures import synthetic_gap, synthetic_tables
-from tests.gap.test_answer import CAMPAIGN, answered
 from tests.schemas import TABLES
 
 
@@ -18,7 +18,7 @@ def folder(tmp_path):
     """Results of one diagnosed campaign, and what an earlier run has left of another."""
     for name in (CAMPAIGN, "earlier"):
         (tmp_path / "campaigns" / name).mkdir(parents=True)
-        facts.write(answered(notes="a <b> & c") | {"campaign": name}, tmp_path / f"campaigns/{name}/verdict.json")
+        json_files.write(answered(notes="a <b> & c") | {"campaign": name}, tmp_path / f"campaigns/{name}/verdict.json")
         with style.print_style():
             figure = style.new(style.SINGLE_MM, 30.0)
             figure.subplots().plot([0.0, 1.0])
@@ -59,7 +59,7 @@ def _with_file(folder, **verdict):
     """The page of the folder whose campaign has a corrected file."""
     place = folder / "campaigns" / CAMPAIGN
     (place / "corrected.urdf").write_text("<robot/>")
-    facts.write(answered(**verdict), place / "verdict.json")
+    json_files.write(answered(**verdict), place / "verdict.json")
     return written(folder)
 
 

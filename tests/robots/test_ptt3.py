@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rrru.errors import ConfigError
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.ptt3 import Ptt3
 from tests.reference import tripods_slow
 

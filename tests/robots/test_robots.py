@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.identifiability import analyse
 from rrru.errors import ConfigError, UnreachableError
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
-from rrru.fit.identifiability import analyse
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.catalogue import MECHANISMS, make_mechanism
 
 _HANGING = ((-100.0, -100.0, -310.0), (100.0, 100.0, -150.0))

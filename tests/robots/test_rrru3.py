@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rrru.errors import ConfigError, UnreachableError
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.rrru3 import Rrru3
 from tests.reference import rrru3_slow
 

@@ -5,9 +5,9 @@ arm and a head without drives. Everything by plain products of matrices.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.robots.dynamics import GRAVITY_MM_S2
-from tests.robots import craig
-from tests.robots.mjcf import text_of
+from rrru.kinematics.dynamics import GRAVITY_MM_S2
+from tests.formats.mjcf import text_of
+from tests.kinematics import craig
 
 # Craig's rows: d in mm, theta in degrees, a in mm, alpha in degrees; mass in kg and its centre in mm
 TRUNK = {

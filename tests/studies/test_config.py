@@ -2,7 +2,7 @@
 
 import yaml
 
-from rrru.gap.run_limits import StatedLimits
+from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.studies import setup
 from rrru.studies.config import limits, of_reproduced_study, robot, sets, source
 from tests.places import ROOT

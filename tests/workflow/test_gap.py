@@ -7,8 +7,8 @@ import pytest
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.effects.library import active_effects
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.ptt3 import Ptt3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.places import DATA
 from tests.workflow.folder import dry_run, run
 

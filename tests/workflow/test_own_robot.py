@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign import measurements as rows
 from rrru.errors import ConfigError
+from rrru.kinematics.base_parameters import direction
 from rrru.robots.catalogue import make_mechanism
-from rrru.robots.geometric_numbers import direction
+from tests.formats import humanoid
 from tests.places import ROOT
-from tests.robots import humanoid
 from tests.workflow.folder import run
 
 # a planar 3-RRR: three legs of two links, driven at the base, hold a plate in a plane
@@ -21,8 +21,8 @@ _MODULE = '''
 """A planar 3-RRR."""
 import numpy as np
 
-from rrru.robots.general import GeneralRobot
-from rrru.robots.legs import Drive, Joint, Leg, Legs, Parts, unit_twist
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.legs import Drive, Joint, Leg, Legs, Parts, unit_twist
 
 X, Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 BASE, UPPER, LOWER, PLATE = 300.0, 220.0, 200.0, 80.0

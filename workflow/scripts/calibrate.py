@@ -2,10 +2,10 @@
 
 import pandas as pd
 
-from rrru.fit import campaign_fit
-from rrru.fit.campaign_noise import Noise
-from rrru.fit.schemas import TABLES
-from rrru.store import facts, tables
+from rrru.calibration import campaign_fit
+from rrru.calibration.campaign_noise import Noise
+from rrru.calibration.schemas import TABLES
+from rrru.store import json_files, tables
 from rrru.store.job import run
 from rrru.studies import setup
 
@@ -25,7 +25,7 @@ def main(settings, inputs, outputs):
     gauge = pd.DataFrame(list(robot.gauge.items()), columns=["number", "stands_for"])
     frames = {"gauge": gauge.assign(campaign=settings["campaign"])}
     told = {"noise_mm": noise.mm, "arm_mm": noise.arm_mm, "calibration": settings["calibration"]}
-    facts.write({"nominal": nominal, **told}, outputs["robot"])
+    json_files.write({"nominal": nominal, **told}, outputs["robot"])
     tables.write_all(TABLES, frames | campaign_fit.tables(settings["campaign"], fits, truth), outputs)
 
 

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign.schemas import TABLES, measurement_table
-from rrru.fit.campaign_noise import campaign_noise
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies import campaigns, setup

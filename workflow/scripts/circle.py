@@ -1,12 +1,12 @@
 """A robot's file, its calibration and its corrected file on a campaign that none of them has seen."""
 
-from rrru.fit.campaign_fit import deviation_vector
-from rrru.robots.dynamics import Masses
+from rrru.calibration.campaign_fit import deviation_vector
+from rrru.kinematics.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.circle.models import errors, sizes
-from rrru.studies.circle.schemas import TABLES
+from rrru.studies.end_to_end.models import errors, sizes
+from rrru.studies.end_to_end.schemas import TABLES
 
 
 def main(settings, inputs, outputs):

@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from rrru.compensate import evaluate
-from rrru.compensate.schemas import TABLES
+from rrru.compensation import evaluate
+from rrru.compensation.schemas import TABLES
 from rrru.genetic.campaign_runs import typical_parameters
 from rrru.store import tables
 from rrru.store.job import run

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rrru.store import tables
+from rrru.store.atomic_write import whole
 from rrru.store.job import run
-from rrru.store.whole import whole
 from rrru.studies.delta import views
 from rrru.studies.delta.schemas import TABLES
 from rrru.studies.delta.virtual_delta import twin

@@ -3,15 +3,15 @@
 import pandas as pd
 
 from rrru.campaign.noise import read_noise
+from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.schemas import TABLES, tables_of
+from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.verdict_text import answer
 from rrru.figures.drawing import draw_all
-from rrru.gap.answer import answer
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.run_limits import StatedLimits
-from rrru.gap.schemas import TABLES, tables_of
-from rrru.gap.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.drive_words import drive_words
-from rrru.robots.dynamics import Masses
-from rrru.store import facts, tables
+from rrru.store import json_files, tables
 from rrru.store.job import run
 from rrru.studies import setup
 
@@ -28,14 +28,14 @@ def main(settings, inputs, outputs):
     result = diagnose(measurements, robot, chosen)
     if "corrected" in outputs:
         # MuJoCo is loaded where a file is written only
-        from rrru.gap.corrected_model import write_corrected
+        from rrru.diagnosis.correction.corrected_model import write_corrected
 
         result = write_corrected(
             result, settings["robot"]["dimensions"], masses, outputs["corrected"], settings["seed"]
         )
     words = drive_words(nominal)
     told = answer(settings["campaign"], result.verdict, result.tables, words)
-    facts.write(told, outputs["verdict"])
+    json_files.write(told, outputs["verdict"])
     frames = {"gap_verdicts": pd.DataFrame([result.verdict]), **result.tables}
     keys = {table.name: table.key for table in TABLES}
     frames = {

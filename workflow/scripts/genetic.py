@@ -3,8 +3,8 @@
 import pandas as pd
 from tqdm import tqdm
 
+from rrru.calibration.campaign_fit import select
 from rrru.campaign.measurements import at_tool
-from rrru.fit.campaign_fit import select
 from rrru.genetic.campaign_runs import Runs, against_least_squares, study_set
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings

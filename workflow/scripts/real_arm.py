@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from rrru.diagnosis.settings import GapSettings
 from rrru.figures.drawing import draw_all
-from rrru.gap.settings import GapSettings
 from rrru.store import tables
 from rrru.store.job import run, tell
 from rrru.studies.real.carry import carried, model

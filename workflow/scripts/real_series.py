@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pandas as pd
 
+from rrru.diagnosis.settings import GapSettings
 from rrru.errors import RrruError
-from rrru.gap.settings import GapSettings
 from rrru.store import tables
+from rrru.store.atomic_write import whole
 from rrru.store.job import run, tell
-from rrru.store.whole import whole
 from rrru.studies.real import arm_tables, arms
 from rrru.studies.real.carry import told
 from rrru.studies.real.refusals import refused

@@ -3,8 +3,8 @@
 import pandas as pd
 from tqdm import tqdm
 
+from rrru.calibration.campaign_fit import select
 from rrru.errors import ConfigError
-from rrru.fit.campaign_fit import select
 from rrru.genetic.schemas import TABLES
 from rrru.genetic.settings import GeneticSettings
 from rrru.genetic.sweep import run_sweep

@@ -2,16 +2,16 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import MeasuredRobot
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.diagnosis.diagnose import MeasuredRobot
+from rrru.diagnosis.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.withheld.advice import UNSURE, advice_summary, ambiguous, follow
-from rrru.studies.withheld.members import robot_of
-from rrru.studies.withheld.robots import Conditions
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.blind_validation.advice import UNSURE, advice_summary, ambiguous, follow
+from rrru.studies.blind_validation.members import robot_of
+from rrru.studies.blind_validation.robots import Conditions
+from rrru.studies.blind_validation.schemas import TABLES
 
 
 def main(settings, inputs, outputs):

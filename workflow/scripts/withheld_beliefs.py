@@ -2,14 +2,14 @@
 
 import pandas as pd
 
-from rrru.gap.diagnose import MeasuredRobot
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.diagnosis.diagnose import MeasuredRobot
+from rrru.diagnosis.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.withheld.beliefs import beliefs
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.blind_validation.beliefs import beliefs
+from rrru.studies.blind_validation.schemas import TABLES
 
 
 def main(settings, inputs, outputs):

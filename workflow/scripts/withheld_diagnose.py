@@ -2,17 +2,17 @@
 
 import pandas as pd
 
-from rrru.gap.details import parameter_rows
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.result_tables import parameter_rows
+from rrru.diagnosis.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
 from rrru.store import tables
 from rrru.store.job import run
 from rrru.studies import setup
-from rrru.studies.withheld.numbers import fitted
-from rrru.studies.withheld.schemas import TABLES
-from rrru.studies.withheld.stated import stated
-from rrru.studies.withheld.states import VERDICT, state_row
+from rrru.studies.blind_validation.numbers import fitted
+from rrru.studies.blind_validation.schemas import TABLES
+from rrru.studies.blind_validation.stated import stated
+from rrru.studies.blind_validation.states import VERDICT, state_row
 
 
 def main(settings, inputs, outputs):

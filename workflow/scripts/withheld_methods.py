@@ -4,8 +4,8 @@ import pandas as pd
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.methods import compare
-from rrru.studies.withheld.schemas import TABLES
+from rrru.studies.blind_validation.methods import compare
+from rrru.studies.blind_validation.schemas import TABLES
 
 
 def main(settings, inputs, outputs):

@@ -4,9 +4,9 @@ import pandas as pd
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.chunks import Member
-from rrru.studies.withheld.members import all_conditions, drawn
-from rrru.studies.withheld.schemas import tables_of
+from rrru.studies.blind_validation.chunks import Member
+from rrru.studies.blind_validation.members import all_conditions, drawn
+from rrru.studies.blind_validation.schemas import tables_of
 
 
 def main(settings, inputs, outputs):

@@ -1,11 +1,11 @@
 """The verdicts of a chunk beside the answers."""
 
-from rrru.gap.settings import GapSettings
+from rrru.diagnosis.settings import GapSettings
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.members import Known, all_conditions
-from rrru.studies.withheld.schemas import TABLES
-from rrru.studies.withheld.score import score_chunk
+from rrru.studies.blind_validation.members import Known, all_conditions
+from rrru.studies.blind_validation.schemas import TABLES
+from rrru.studies.blind_validation.score import score_chunk
 
 
 def main(settings, inputs, outputs):

@@ -2,8 +2,8 @@
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.schemas import TABLES
-from rrru.studies.withheld.sentences.score import sentences
+from rrru.studies.blind_validation.schemas import TABLES
+from rrru.studies.blind_validation.sentences.score import sentences
 
 
 def main(settings, inputs, outputs):

@@ -2,8 +2,8 @@
 
 from rrru.store import tables
 from rrru.store.job import run
-from rrru.studies.withheld.schemas import TABLES
-from rrru.studies.withheld.sentences.score import settings_of, statements
+from rrru.studies.blind_validation.schemas import TABLES
+from rrru.studies.blind_validation.sentences.score import settings_of, statements
 
 
 def main(settings, inputs, outputs):

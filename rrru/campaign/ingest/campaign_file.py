@@ -26,7 +26,7 @@ from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, TARGET, TURNS, 
 from rrru.campaign.ingest.spec import MM, IngestSpec
 from rrru.campaign.measurements import command, measured, turn_columns, turns, vector_columns
 from rrru.errors import ConfigError
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 
 @dataclass(frozen=True)

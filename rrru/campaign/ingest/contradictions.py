@@ -23,7 +23,7 @@ from rrru.campaign.ingest.sheet import AXES, COMMAND, TARGET, TURNS, position_te
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.target_registration import TargetReadings
 from rrru.errors import FitError
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 # positions agree within this and what the last digits of the drive values move them by
 TOLERANCE_MM = 0.01

@@ -23,7 +23,7 @@ from rrru.campaign.ingest.gross_advice import advice, of_drives
 from rrru.campaign.ingest.gross_file import EXPLAINED_SHARE, ORDINARY_SHARE, GrossFile, Hypothesis
 from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.spec import IngestSpec
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 # what more than this share of the robot's size is left of, with the zeros of the drives fitted, is of another robot:
 # links are not built wrong by a fiftieth; assumed

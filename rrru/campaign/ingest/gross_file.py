@@ -18,9 +18,9 @@ from rrru.campaign.ingest.sheet import COMMAND, MEASURED, TARGET, TURNS
 from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
 from rrru.campaign.target_registration import TargetReadings, affine_rms, axes_by_turning, register_targets
 from rrru.errors import FitError
-from rrru.robots.readings import Readings
-from rrru.robots.robot import Robot
-from rrru.robots.walk import Poses
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.readings import Readings
+from rrru.kinematics.robot import Robot
 
 # a mistake explains a file where what it leaves is less than this share of the robot's size; assumed
 EXPLAINED_SHARE = 5e-3

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rrru.robots.geometric_numbers import Reads, candidates_of, choose, direction, open_numbers
-from rrru.robots.readings import lacking
+from rrru.kinematics.base_parameters import Reads, candidates_of, choose, direction, open_numbers
+from rrru.kinematics.readings import lacking
 
 # shares of the robot's size: from the first on a residual may be one of zeros, above the second one of nothing else;
 # what leaves less than the third of it explains it

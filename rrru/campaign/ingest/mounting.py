@@ -16,7 +16,7 @@ from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.mastering import LARGE, lost_zeros
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
 from rrru.campaign.target_registration import axes_by_turning
-from rrru.robots.readings import Readings
+from rrru.kinematics.readings import Readings
 
 # the name of a reflector where the file has no such column
 _UNNAMED = "tool"

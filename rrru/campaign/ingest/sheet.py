@@ -7,7 +7,7 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.problems import Problems
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)

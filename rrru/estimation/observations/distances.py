@@ -14,9 +14,9 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rrru.cache import last_kept
 from rrru.errors import FitError
-from rrru.kept import last_kept
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -17,13 +17,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from rrru.cache import last_kept
 from rrru.errors import FitError
 from rrru.estimation.parameters import Block
-from rrru.kept import last_kept
-from rrru.robots.legs import WORLD
-from rrru.robots.readings import Readings, orientation
-from rrru.robots.robot import Robot
-from rrru.robots.walk import Poses
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.legs import WORLD
+from rrru.kinematics.readings import Readings, orientation
+from rrru.kinematics.robot import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

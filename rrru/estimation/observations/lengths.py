@@ -20,11 +20,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rrru.cache import last_kept
 from rrru.errors import FitError
 from rrru.estimation.observations.multilateration import MIN_DISTANCE_MM, Multilateration, row_loss
 from rrru.estimation.parameters import Parameters
 from rrru.estimation.problem import Problem
-from rrru.kept import last_kept
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]

@@ -9,9 +9,9 @@ import numpy.typing as npt
 from scipy import linalg
 from scipy.spatial.transform import Rotation
 
+from rrru.cache import last_kept
 from rrru.estimation.observations.distances import require_finite
-from rrru.kept import last_kept
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from rrru.cache import last_kept
 from rrru.errors import FitError
-from rrru.kept import last_kept
-from rrru.robots.readings import Readings, lacking
-from rrru.robots.robot import Robot
-from rrru.robots.walk import Poses
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.readings import Readings, lacking
+from rrru.kinematics.robot import Robot
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class TargetPositions:
         return self.mechanism.model.solve(self.actuators, self._nominal_poses, twists), twists
 
     def residual(self, values: FloatArray, /) -> FloatArray:
-        """Measured minus predicted (m, 3) in mm at deviations (p,), see `rrru.robots.readings.lacking`."""
+        """Measured minus predicted (m, 3) in mm at deviations (p,), see `rrru.kinematics.readings.lacking`."""
         if self.readings is None:
             return self.measured_mm - self.model(values)
         return lacking(self.mechanism, self.readings, *self._poses(values))

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rrru.fit.identifiability import analyse
+from rrru.calibration.identifiability import analyse
 from rrru.robots.delta import Delta
 from rrru.studies import paper
 from rrru.studies.delta.paper import RESULTS

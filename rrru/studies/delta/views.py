@@ -11,7 +11,7 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign.measurements import vector_columns, vectors
-from rrru.plant.camera import Camera, Target, render
+from rrru.simulation.camera import Camera, Target, render
 from rrru.studies.delta.virtual_delta import Poses, twin
 
 _LOOKING_DOWN = np.diag([1.0, -1.0, -1.0])

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from rrru.errors import ConfigError
-from rrru.plant.tracker import measure
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.seeds import stream
+from rrru.simulation.tracker import measure
 
 
 @dataclass(frozen=True)

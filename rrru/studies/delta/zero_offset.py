@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.fit.calibration import assess, estimate_deviations_at
-from rrru.fit.identifiability import analyse
+from rrru.calibration.calibrate import assess, estimate_deviations_at
+from rrru.calibration.identifiability import analyse
 
 
 def one_step(residuals):

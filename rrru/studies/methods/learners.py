@@ -8,11 +8,11 @@ from functools import partial
 
 import numpy as np
 
+from rrru.calibration.calibrate import calibrate
 from rrru.campaign import measurements as rows
-from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.compensate.rbf import choose, fit, grow, make_folds
+from rrru.compensation.jacobian import through_inverse, through_jacobian
+from rrru.compensation.rbf import choose, fit, grow, make_folds
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
 
 # what each method needs to measure
 NEEDS = {

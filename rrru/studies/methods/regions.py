@@ -6,8 +6,8 @@ import numpy as np
 
 from rrru.campaign.stops import cylinder_points, nearest_first, stops
 from rrru.errors import ConfigError
-from rrru.plant.driven import DrivenRobot
 from rrru.seeds import stream
+from rrru.simulation.driven import DrivenRobot
 from rrru.studies import setup
 
 TESTS = ("inside", "outside")

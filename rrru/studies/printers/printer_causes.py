@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rrru.fit.calibration import calibrate
+from rrru.calibration.calibrate import calibrate
 from rrru.studies.printers.cause_tests import BAD_READING, CauseTests
 
 FOUND, NOT_FOUND, NOT_DECIDABLE = "found", "not found", "not decidable"

@@ -6,12 +6,12 @@ from functools import cached_property
 import numpy as np
 from scipy import special
 
+from rrru.calibration.calibrate import Calibration, calibrate
+from rrru.calibration.identifiability import analyse_columns, parameter_scale
 from rrru.errors import FitError
 from rrru.estimation.f_test import LinearizedModel
 from rrru.estimation.observations.probed_heights import ProbedHeights
 from rrru.estimation.problem import WhiteNoise
-from rrru.fit.calibration import Calibration, calibrate
-from rrru.fit.identifiability import analyse_columns, parameter_scale
 from rrru.studies.printers import steps
 from rrru.studies.printers.firmware import NAMES, own_jacobian, own_numbers, residuals_of, rounding, stop
 from rrru.studies.printers.printer import Printer

@@ -5,7 +5,7 @@ Its dimensions are lost too: Ptt3's nominal ones stand in.
 
 import numpy as np
 
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.ptt3 import Ptt3
 from rrru.studies import paper
 from rrru.studies.paper import Finding, finding

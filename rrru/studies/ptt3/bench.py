@@ -7,10 +7,10 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.measurements import vector_columns
-from rrru.compensate.backlash import measured_width, repeatability
-from rrru.plant.screw import ScrewBench, encoder_record
-from rrru.robots import workspace
+from rrru.compensation.backlash import measured_width, repeatability
+from rrru.kinematics import workspace
 from rrru.seeds import stream
+from rrru.simulation.screw import ScrewBench, encoder_record
 from rrru.studies import setup
 from rrru.studies.ptt3.experiments import experiment, nominal
 

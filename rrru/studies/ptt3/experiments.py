@@ -13,7 +13,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import from_config
-from rrru.compensate.backlash import compensated
+from rrru.compensation.backlash import compensated
 from rrru.studies import setup
 from rrru.studies.ptt3.parts import campaign_section
 

@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import RBFInterpolator
 
-from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.compensate.rbf import ROUNDING, choose, fit, grow, make_folds
+from rrru.calibration.calibrate import calibrate
+from rrru.compensation.jacobian import through_inverse, through_jacobian
+from rrru.compensation.rbf import ROUNDING, choose, fit, grow, make_folds
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
 from rrru.studies.ptt3.experiments import Lesson
 
 

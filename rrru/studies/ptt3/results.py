@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign.measurements import vector_columns
-from rrru.compensate.jacobian import through_inverse, through_jacobian
-from rrru.compensate.rbf import ROUNDING, grow, validation_mse
+from rrru.compensation.jacobian import through_inverse, through_jacobian
+from rrru.compensation.rbf import ROUNDING, grow, validation_mse
 from rrru.studies.ptt3.learning import relative
 
 AXES = ("x", "y", "z", "z_mean", "z_absolute")

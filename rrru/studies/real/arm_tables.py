@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
-from rrru.gap.evidence import STRENGTHS, averaged
-from rrru.gap.spectra import amplitudes
-from rrru.gap.terms import Term
+from rrru.diagnosis.drive_spectra import amplitudes
+from rrru.diagnosis.evidence import STRENGTHS, averaged
+from rrru.diagnosis.terms import Term
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.refusals import named
 from rrru.studies.real.sheets import PLACE

@@ -16,15 +16,15 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.spec import IngestSpec
+from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot, diagnose, sim
+from rrru.diagnosis.inference import with_arm
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.state import State
 from rrru.errors import ConfigError, FitError, IngestError
-from rrru.gap.attribute import with_arm
-from rrru.gap.case import Case
-from rrru.gap.diagnose import Diagnosis, MeasuredRobot, diagnose, sim
-from rrru.gap.make_case import make_case
-from rrru.gap.settings import GapSettings
-from rrru.gap.state import State
-from rrru.robots.dynamics import Masses
-from rrru.robots.robot import Robot
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
 from rrru.studies import setup
 from rrru.studies.real import chains
 from rrru.studies.real.series import Series

@@ -12,16 +12,16 @@ import numpy as np
 import pandas as pd
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.settings import GapSettings
+from rrru.diagnosis.state import State
 from rrru.effects.protocol import Effect, plain_coordinates
 from rrru.errors import FitError
-from rrru.gap.case import Case
-from rrru.gap.diagnose import sim
-from rrru.gap.make_case import make_case
-from rrru.gap.settings import GapSettings
-from rrru.gap.state import State
-from rrru.gap.unknown import UNKNOWN
-from rrru.gap.weight import WEIGHT
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 from rrru.studies import setup
 from rrru.studies.real.arms import NO_MASSES, Studied, nominal_robot
 from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames

@@ -9,6 +9,8 @@ import numpy.typing as npt
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.target_registration import PLACE_SD_MM
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.state import State
 from rrru.effects.protocol import Contribution, Effect, plain_coordinates
 from rrru.errors import FitError
 from rrru.estimation.explain import explain_end
@@ -16,13 +18,11 @@ from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem
 from rrru.estimation.solver import solve
 from rrru.estimation.starts import frame_values
-from rrru.gap.case import Case
-from rrru.gap.state import State
+from rrru.kinematics.base_parameters import Candidate, direction, open_numbers
+from rrru.kinematics.legs import WORLD
+from rrru.kinematics.readings import Readings
+from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
-from rrru.robots.geometric_numbers import Candidate, direction, open_numbers
-from rrru.robots.legs import WORLD
-from rrru.robots.readings import Readings
-from rrru.robots.robot import Robot
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -12,12 +12,12 @@ from itertools import islice
 
 import numpy as np
 
+from rrru.calibration.lengths import LengthFit, fit_lengths, refit, standing_out
 from rrru.errors import FitError
 from rrru.estimation.evidence import MarginalLikelihood
 from rrru.estimation.observations.length_starts import free_coordinates
 from rrru.estimation.observations.lengths import Lengths
 from rrru.estimation.parameters import Block, Parameters
-from rrru.fit.lengths import LengthFit, fit_lengths, refit, standing_out
 
 UNEXPLAINED = "unexplained"
 # starts beside the fit that judged the readings; readings that a law's fit leaves free at least

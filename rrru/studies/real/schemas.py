@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from rrru.gap.schemas import TABLES as GAP
+from rrru.diagnosis.schemas import TABLES as GAP
 from rrru.store.schema import read_tables
 
 _OWN = """

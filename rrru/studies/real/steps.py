@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.model_fit import fit_named_effects
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.state import State
 from rrru.effects.library import find
 from rrru.effects.protocol import Effect
 from rrru.errors import FitError
 from rrru.estimation.estimate import numerical_rank
-from rrru.gap.calibrate import calibrate
-from rrru.gap.case import Case
-from rrru.gap.model_fit import fit_named_effects
-from rrru.gap.state import State
-from rrru.robots.robot import Robot
+from rrru.kinematics.robot import Robot
 from rrru.studies.real.frame_fit import FRAMES, fit_frames, frames
 
 _HARMONICS = "harmonics"

@@ -8,7 +8,7 @@ import numpy as np
 from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.genetic.algorithm import minimise
 from rrru.genetic.settings import GeneticSettings
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.rrru3 import Rrru3
 from rrru.studies import paper
 from rrru.studies.paper import Finding, finding

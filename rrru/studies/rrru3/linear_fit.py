@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from rrru.calibration.identifiability import RANK_TOLERANCE
 from rrru.errors import FitError
-from rrru.fit.identifiability import RANK_TOLERANCE
 
 # weight in mm of the squared excess over a bound, counted in bounds: they are kept to some thousandths
 _STIFFNESS = 10.0

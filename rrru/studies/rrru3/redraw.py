@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.mean_distance import least_mean_distance
 from rrru.campaign import measurements as rows
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
-from rrru.fit.mean_distance import least_mean_distance
-from rrru.plant.driven import non_repeatability
-from rrru.plant.tracker import measure
+from rrru.simulation.driven import non_repeatability
+from rrru.simulation.tracker import measure
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3.paper import ERRORS_MM
 

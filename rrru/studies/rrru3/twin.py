@@ -8,8 +8,8 @@ import pandas as pd
 from rrru.campaign import trajectories
 from rrru.effects.library import active_effects
 from rrru.errors import ConfigError
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 
 _LEGS = (1, 2, 3)
 _OFFSETS = ("offset_first_mm", "offset_second_mm", "offset_third_mm")

@@ -17,10 +17,10 @@ import numpy as np
 from rrru.campaign.plan import Plan, make_run
 from rrru.effects.protocol import together
 from rrru.errors import ConfigError, FitError, UnreachableError
-from rrru.plant.driven import non_repeatability
-from rrru.plant.virtual_robot import VirtualRobot
-from rrru.robots import singularity
+from rrru.kinematics import singularity
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.driven import non_repeatability
+from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.rrru3 import study_numbers as numbers
 from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM

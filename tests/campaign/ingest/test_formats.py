@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign.ingest.campaign_file import ingest
 from rrru.campaign.ingest.formats import Format
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.campaign.noise import read_noise
 from rrru.errors import ConfigError, IngestError
-from rrru.fit.campaign_noise import campaign_noise
 from rrru.robots.rrru3 import Rrru3
 from tests.campaign.ingest.samples import FILES, SAMPLES, section
 from tests.places import DATA

@@ -7,17 +7,17 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import select
+from rrru.calibration.campaign_noise import campaign_noise
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.errors import IngestError
-from rrru.fit.calibration import calibrate
-from rrru.fit.campaign_fit import select
-from rrru.fit.campaign_noise import campaign_noise
-from rrru.gap.diagnose import MeasuredRobot, diagnose
+from rrru.kinematics.base_parameters import direction
+from rrru.kinematics.readings import Readings
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.from_dh import from_dh
-from rrru.robots.geometric_numbers import direction
-from rrru.robots.readings import Readings
 from rrru.robots.rrru3 import Rrru3
 from tests.places import ROOT
 from tests.schemas import check_measurements
@@ -135,7 +135,7 @@ def test_play_is_named_from_poses_in_no_order(arm, driven, tmp_path):
 def _motion(arm, driven):
     """The motion of an arm that stops at each pose."""
     from rrru.effects.motion import Course, make_motion
-    from rrru.robots.dynamics import Masses
+    from rrru.kinematics.dynamics import Masses
 
     poses, count = arm.solve(driven, np.tile(arm.legs.home_mm, (len(driven), 1))), len(driven)
     place, nothing = poses.point(np.asarray(arm.tool_mm)), np.full((count, 3), np.nan)
@@ -233,7 +233,7 @@ def test_joints_that_no_robot_can_take_are_refused(tmp_path):
 
 def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
     """A reflector's parameter moves that reflector and nothing else."""
-    from rrru.robots.geometric_numbers import Reads
+    from rrru.kinematics.base_parameters import Reads
 
     robot = arm.reading(Reads(("reflector a", "reflector b"), ("reflector b",)))
     own = [one for one in robot.candidates if one.name.startswith("reflector")]

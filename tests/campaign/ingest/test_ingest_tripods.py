@@ -7,9 +7,9 @@ from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
 from rrru.campaign.plan import make_plan
 from rrru.campaign.trajectories import Spiral
 from rrru.errors import IngestError
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
+from rrru.simulation.virtual_robot import VirtualRobot
 from tests.schemas import check_measurements
 
 ROBOTS = {

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
-from rrru.fit.calibration import calibrate
-from rrru.fit.campaign_fit import select
-from rrru.gap.result_notes import zero_notes
+from rrru.diagnosis.result_notes import zero_notes
 from rrru.robots.hexapod import hexapod
 from rrru.robots.serial import serial
 from tests.schemas import check_measurements

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from rrru.calibration.calibrate import calibrate, estimate_deviations
 from rrru.errors import FitError
 from rrru.estimation.observations.distances import Distances
 from rrru.estimation.observations.shapes import Shape
 from rrru.estimation.observations.target_positions import TargetHeights, TargetPositions
-from rrru.fit.calibration import calibrate, estimate_deviations
 from rrru.robots.delta import Delta
 
 ROBOT = Delta()

@@ -11,9 +11,9 @@ from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
-from rrru.robots.geometric_numbers import Reads
-from rrru.robots.readings import orientation
-from tests.robots.test_general_model import GENERAL, _about_home, _clear
+from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.readings import orientation
+from tests.kinematics.test_general_model import GENERAL, _about_home, _clear
 
 _NOISE_MM, _NOISE_RAD = 0.02, 5e-5
 _TILT = np.array([0.012, -0.007])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
 from rrru.robots.delta import Delta
 from rrru.studies.delta import audit
 

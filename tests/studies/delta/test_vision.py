@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.errors import FitError
-from rrru.plant.camera import Camera, Target, render
+from rrru.simulation.camera import Camera, Target, render
 from rrru.studies.delta import vision
 
 PITCH, DIAMETER = 10.0, 5.0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
 from rrru.errors import FitError
 from rrru.estimation.observations.distances import Distances
 from rrru.estimation.observations.shapes import Shape
 from rrru.estimation.observations.target_positions import TargetHeights
-from rrru.fit.calibration import calibrate
 from rrru.robots.delta import Delta
 from rrru.studies.delta.zero_offset import one_step, step_fit, taken_for_errors
 from tests.estimation.observations.test_distances import COMMAND, ROBOT, THETA, TRUE, moved

@@ -10,7 +10,7 @@ from snakemake.utils import validate
 
 from rrru.errors import ConfigError
 from rrru.genetic.settings import GeneticSettings
-from rrru.plant.virtual_robot import VirtualRobot
+from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.methods import compare, learners, parts, regions
 from tests.places import ROOT
 from tests.schemas import check

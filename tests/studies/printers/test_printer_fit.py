@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
 from rrru.errors import FitError
-from rrru.fit.calibration import calibrate
 from rrru.studies.printers import firmware, printer_fit, printer_tables, saved_answers, steps
 from rrru.studies.printers.printer import Refused
 from tests.schemas import check

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
+from rrru.diagnosis.settings import GapSettings
 from rrru.errors import ConfigError, IngestError
-from rrru.gap.settings import GapSettings
 from rrru.store.tables import check
 from rrru.studies.real import arm_tables, arms, carry, figures
 from rrru.studies.real.schemas import TABLES

@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rrru.calibration.lengths import fit_lengths, refit
 from rrru.errors import ConfigError, FitError, IngestError
-from rrru.fit.lengths import fit_lengths, refit
 from rrru.studies.real import belts, figures_lengths
 from rrru.studies.real.lengths_section import Section
 from tests.studies.real import simulated_lengths as simulated

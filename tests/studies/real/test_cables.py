@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from rrru.calibration.lengths import fit_lengths
 from rrru.errors import ConfigError, IngestError
-from rrru.fit.lengths import fit_lengths
 from rrru.studies.real import cables
 from rrru.studies.real.lengths_section import Section
 from tests.studies.real import simulated_lengths as simulated

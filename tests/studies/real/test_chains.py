@@ -14,14 +14,14 @@ import pytest
 
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.model_fit import fit_named_effects
+from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import NAMES, find
 from rrru.errors import ConfigError
-from rrru.gap.calibrate import calibrate
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.make_case import make_case
-from rrru.gap.model_fit import fit_named_effects
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.kinematics.dynamics import Masses
 from rrru.studies import setup
 from rrru.studies.real.chains import robot_section, sheet
 

@@ -11,15 +11,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import select
 from rrru.campaign import measurements as rows
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.result_notes import zero_notes
+from rrru.diagnosis.settings import GapSettings
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
-from rrru.fit.campaign_fit import select
-from rrru.gap.diagnose import MeasuredRobot, diagnose
-from rrru.gap.result_notes import zero_notes
-from rrru.gap.settings import GapSettings
-from rrru.robots.dynamics import Masses
+from rrru.kinematics.dynamics import Masses
 from rrru.robots.from_dh import from_dh
 
 _DATA = Path(os.environ.get("RRRU_REAL_DATA", "")) / "irb120" / "measurements.csv"

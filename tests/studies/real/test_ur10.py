@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from rrru.gap.settings import GapSettings
+from rrru.diagnosis.settings import GapSettings
 from rrru.studies.real import arm_tables, arms
 from rrru.studies.real.series import found
 from tests.places import ROOT

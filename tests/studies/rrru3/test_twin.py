@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.mean_distance import least_mean_distance
 from rrru.errors import ConfigError, UnreachableError
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.fit.calibration import calibrate
-from rrru.fit.mean_distance import least_mean_distance
-from rrru.plant.virtual_robot import VirtualRobot
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.virtual_robot import VirtualRobot
 from rrru.studies.rrru3 import twin, twin_search
 from rrru.studies.rrru3.linear_fit import linear_fit
 from rrru.studies.rrru3.paper import ERRORS_MM

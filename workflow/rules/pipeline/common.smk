@@ -3,7 +3,7 @@ from pathlib import Path
 
 import rrru.report
 from rrru.errors import ConfigError
-from rrru.objects import module_file
+from rrru.plugins import module_file
 from rrru.store.digest import code_digest
 from rrru.studies import config as parts
 

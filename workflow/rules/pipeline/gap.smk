@@ -1,4 +1,4 @@
-CHECKS.append("rrru.gap.settings:check")
+CHECKS.append("rrru.diagnosis.settings:check")
 GAP_TABLES = [
     "gap_verdicts",
     "gap_left_out",

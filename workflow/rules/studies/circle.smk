@@ -1,8 +1,8 @@
 # what a corrected file is worth on a campaign that nobody has seen; without its section there is nothing to make
-CHECKS.append("rrru.studies.circle.models:check")
+CHECKS.append("rrru.studies.end_to_end.models:check")
 CIRCLE = config.get("circle", {})
 CIRCLE_TABLES = ["circle", "circle_points"]
-CIRCLE_FIGURES = {"circle": ("rrru.studies.circle.figures:circle", CIRCLE_TABLES)}
+CIRCLE_FIGURES = {"circle": ("rrru.studies.end_to_end.figures:circle", CIRCLE_TABLES)}
 
 if CIRCLE:
     FIGURES["circle"] = CIRCLE_FIGURES

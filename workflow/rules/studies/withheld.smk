@@ -1,6 +1,6 @@
-from rrru.studies.withheld.chunks import chunks, described, rivalled, statement_chunks
+from rrru.studies.blind_validation.chunks import chunks, described, rivalled, statement_chunks
 
-CHECKS.append("rrru.studies.withheld.chunks:check")
+CHECKS.append("rrru.studies.blind_validation.chunks:check")
 # the robots of every job
 WITHHELD = chunks(config["withheld"])
 WITHHELD_NAMES = ("verdicts", "scores", "limits", "parts", "causes", "summary", "confusion")
@@ -12,14 +12,14 @@ WITHHELD_HIDDEN = [name for name, members in WITHHELD.items() if any(member.chec
 STATEMENTS = statement_chunks(config["withheld"]["sentences"])
 WITHHELD_FIGURES = {
     "withheld": (
-        "rrru.studies.withheld.figures:withheld",
+        "rrru.studies.blind_validation.figures:withheld",
         ["withheld_scores", "withheld_confusion", "withheld_parts"],
     ),
-    "withheld_causes": ("rrru.studies.withheld.figures:withheld_causes", ["withheld_causes"]),
+    "withheld_causes": ("rrru.studies.blind_validation.figures:withheld_causes", ["withheld_causes"]),
 }
 PLANTS_FIGURES = {
     "withheld_plants": (
-        "rrru.studies.withheld.figures:withheld_plants",
+        "rrru.studies.blind_validation.figures:withheld_plants",
         ["withheld_scores", "withheld_confusion", "withheld_parts"],
     )
 }

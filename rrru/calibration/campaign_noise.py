@@ -1,0 +1,61 @@
+"""The measuring noise of a campaign, given or from what a calibration of all its points leaves."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import select
+from rrru.campaign import measurements as rows
+from rrru.campaign.noise import quieter_repeats, read_noise, reading_series
+from rrru.errors import ConfigError
+from rrru.estimation.noise_model import high_frequency_noise
+from rrru.kinematics.robot import Robot
+
+
+class Noise(NamedTuple):
+    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and where from."""
+
+    mm: float
+    rad: float
+    source: str
+
+    @property
+    def arm_mm(self) -> float:
+        """Length at which an orientation counts beside a position."""
+        return self.mm / self.rad if self.mm > 0.0 and self.rad > 0.0 else np.nan
+
+
+def campaign_noise(
+    robot: Robot,
+    measurements: pd.DataFrame,
+    given: tuple[float | None, float | None],
+    use_near_singularity: bool = True,
+) -> Noise:
+    """The Noise of a campaign: of what is not given, see `rrru.estimation.noise_model`.
+
+    given: of positions in mm and of orientations in rad, None where nobody states it. Raises ConfigError where there
+    are too few points to estimate it.
+    """
+    noise_mm, noise_rad = given
+    known = "given"
+    if noise_mm is None:
+        noise_mm, known = read_noise(measurements), "readings"
+    turned = rows.has_turns(measurements)
+    if noise_mm is not None and (noise_rad or not turned):
+        return Noise(noise_mm, noise_rad if noise_rad and turned else np.nan, known)
+    residuals = select(measurements, robot, ["*"], use_near_singularity, robot.angle_arm_mm)
+    if residuals is None:
+        raise ConfigError("too few usable points to estimate noise_mm; give it")
+    fit, used = calibrate(residuals), measurements[rows.usable(measurements, use_near_singularity)]
+    left, columns = residuals.residual(fit.deviations), residuals.jacobian(fit.deviations)
+    series, positions = reading_series(used, residuals.readings), np.arange(len(left)) < len(used)
+    found_rad = noise_rad or high_frequency_noise(left, columns, series, ~positions) / robot.angle_arm_mm
+    if noise_mm is not None:
+        return Noise(noise_mm, found_rad, known)
+    found_mm = high_frequency_noise(left, columns, series, positions)
+    if np.isnan(found_mm):
+        raise ConfigError("too few usable points to estimate noise_mm; give it")
+    repeated = quieter_repeats(used, found_mm)
+    return Noise(found_mm, found_rad, "high_frequency") if repeated is None else Noise(repeated, found_rad, "repeats")

@@ -1,0 +1,153 @@
+"""The budget of a gap: how much of its mean square each effect makes, and what does not repeat, runs and the unknown.
+
+Mean squares are those of positions on the robot. Effects and what is unexplained are drawn from the posterior over
+hypotheses and their coefficients, with the calibration's share taken out. Squares of parts and twice the products of
+effects that imitate each other add up to the gap's mean square, but for what the draw of the noise has left in it
+("sampling").
+"""
+
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from scipy.special import ndtr
+
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.terms import signatures, spread
+from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
+
+COLUMNS = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
+_UNEXPLAINED = "unexplained"
+
+
+def budget(attribution, stated_mm, generator, draws):
+    """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
+    squares, products, fitted = _drawn(attribution, generator, draws)
+    noise = _noise_parts(attribution, stated_mm, generator, draws)
+    residual = attribution.case.residual(attribution.calibrated)
+    instrument = float(noise.pop("instrument").mean())
+    gap = float((residual[attribution.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
+    beliefs = attribution.posterior
+    unexplained = squares.pop(_UNEXPLAINED)
+    rows = [(name, "effect", drawn, beliefs.marginal(name)) for name, drawn in squares.items()]
+    rows += [(name, name, *drawn) for name, drawn in noise.items()]
+    rows.append((_UNEXPLAINED, _UNEXPLAINED, unexplained, beliefs.probability_unexplained))
+    rows += [(" and ".join(pair), "covariance", drawn, np.nan) for pair, drawn in products.items()]
+    # small products are left to what the noise leaves
+    least = OPTIONS.min_covariance_share * max(gap, 1e-12)
+    rows = [row for row in rows if row[1] != "covariance" or abs(row[2].mean()) > least]
+    known = sum(float(drawn.mean()) for *_, drawn, _ in rows)
+    calibration = instrument * fitted * np.ones(1)
+    rows.append(("sampling", "sampling", np.array([gap - known]), np.nan))
+    rows.append(("calibration", "calibration", calibration, np.nan))
+    total = gap + float(calibration[0])
+    return pd.DataFrame([_row(*row, total) for row in rows], columns=COLUMNS)
+
+
+def _row(part, kind, squares, probability, total):
+    """One row of draws (b,) of a mean square, which may be negative where it is a product."""
+    mean, (low, high) = float(squares.mean()), np.quantile(squares, OPTIONS.interval_quantiles)
+    share = [one / total if total > 0.0 else 0.0 for one in (mean, min(low, mean), max(high, mean))]
+    return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), *map(float, share), float(probability)
+
+
+def _drawn(attribution, generator, draws):
+    """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
+    share of the noise that the calibration absorbs.
+    """
+    case, evidence, beliefs = attribution.case, attribution.evidence, attribution.posterior
+    linear = evidence.linear
+    left = _LeftByCalibration(linear.base, case.on_robot)
+    data, count = left.of(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
+    weights = beliefs.weights.ravel()
+    counts = np.bincount(generator.choice(len(weights), draws, p=weights / weights.sum()), minlength=len(weights))
+    names = [name for name in case.effects if beliefs.marginal(name) > OPTIONS.min_budget_probability]
+    squares = {name: np.zeros(draws) for name in (*names, _UNEXPLAINED)}
+    products, first = {pair: np.zeros(draws) for pair in combinations(squares, 2)}, 0
+    for number in np.flatnonzero(counts):
+        row, level = np.unravel_index(number, beliefs.weights.shape)
+        some = slice(first, first + counts[number])
+        first = some.stop
+        parts = _parts(evidence, beliefs.hypotheses[row], level, left, generator, counts[number])
+        for name in set(parts) & set(squares):
+            squares[name][some] = (parts[name] ** 2).sum(axis=0) / count
+        for pair in products:
+            if set(pair) <= set(parts):
+                products[pair][some] = 2.0 * (parts[pair[0]] * parts[pair[1]]).sum(axis=0) / count
+        if beliefs.unexplained[row, level] and _UNEXPLAINED not in parts:
+            beyond = data - sum(parts.values(), np.zeros((len(data), counts[number])))
+            spare = 3.0 * case.noise_mm**2 * (1.0 - left.taken)
+            squares[_UNEXPLAINED][some] = np.maximum((beyond**2).sum(axis=0) / count - spare, 0.0)
+    return squares, products, left.taken
+
+
+class _LeftByCalibration:
+    """What a calibration of columns (m, 3, p) leaves of numbers at those of the m readings that count.
+
+    taken: share of the noise that it absorbs there.
+    """
+
+    def __init__(self, columns, counted):
+        self._basis, _ = np.linalg.qr(columns.reshape(-1, columns.shape[-1]))
+        self._counted = np.repeat(counted, 3)
+        self.taken = float((self._basis[self._counted] ** 2).sum() / self._counted.sum())
+
+    def of(self, numbers):
+        """Of numbers (3m, k) at all readings those (3n, k) at the readings that count."""
+        return numbers[self._counted] - self._basis[self._counted] @ (self._basis.T @ numbers)
+
+
+def _parts(evidence, hypothesis, level, left, generator, count):
+    """By effect of a hypothesis what the calibration leaves of its part of the gap, (3n, count), at drawn coefficients.
+
+    left: a _LeftByCalibration.
+
+    Those of unknown functions together are what is unexplained.
+    """
+    if not hypothesis.terms:
+        return {}
+    mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+    # numbers of very different sizes
+    unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
+    shaken = unit[:, None] * turned * np.sqrt(np.maximum(size, 0.0))
+    drawn = mean[:, None] + shaken @ generator.standard_normal((len(mean), count))
+    result, start = {}, 0
+    linear = evidence.linear
+    made = signatures(evidence.library, linear, hypothesis.terms)
+    for term, columns in zip(hypothesis.terms, made, strict=True):
+        coordinates = evidence.library[term.effect].coordinates
+        matrix = spread(coordinates, term.legs)
+        own = drawn[start : start + matrix.shape[1]]
+        own = np.where((matrix.T @ coordinates.positive > 0)[:, None], np.maximum(own, 0.0), own)
+        part = columns.reshape(-1, columns.shape[-1]) @ own
+        if (term.effect, term.shape) in linear.by_weight:
+            each = linear.by_weight[term.effect, term.shape].reshape(len(part), -1, len(matrix))
+            # to first order, as both were found
+            acting = matrix @ evidence.found(hypothesis.terms)[start : start + matrix.shape[1]]
+            part = part + np.einsum("nqc,c->nq", each, acting) @ drawn[len(mean) - each.shape[1] :]
+        start += matrix.shape[1]
+        name = _UNEXPLAINED if term.effect in UNKNOWN else term.effect
+        result[name] = result.get(name, 0.0) + left.of(part)
+    return result
+
+
+def _noise_parts(attribution, stated_mm, generator, draws):
+    """Draws (b,) of the instrument's mean square, and draws and probability of scatter and runs."""
+    case = attribution.case
+    model = case.noise or NoiseModel.white(case.noise_mm)
+    freedom = max(len(case) - attribution.evidence.linear.base.shape[-1], 1)
+    axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
+    scatter, probability = np.zeros((draws, 3)), np.nan
+    if stated_mm:
+        beyond = model.axis_mm > CONTRADICTED * stated_mm
+        scatter = np.where(beyond, np.maximum(axes - stated_mm**2, 0.0), 0.0)
+        error = np.sqrt(0.5 / freedom)
+        probability = ndtr((np.log(model.axis_mm / stated_mm) - np.log(CONTRADICTED)) / error).max()
+    offset = model.drawn_offsets(generator, draws)
+    return {
+        "instrument": (axes - scatter).sum(axis=1),
+        "scatter": (scatter.sum(axis=1), probability),
+        "runs": (axes.sum(axis=1) * offset, model.offset_probability),
+    }

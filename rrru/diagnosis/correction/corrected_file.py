@@ -1,0 +1,145 @@
+"""The user's own file with what a diagnosis has found, and how far that closes the gap.
+
+Every effect that changes nothing but constant numbers is geometry, as the calibration's numbers are; `drive_compliance`
+is the stiffness of the drives and `backlash` their play. Anything else a file cannot hold; nor does it know of loads
+that it does not carry itself. The model stands in the frame of the measurements. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.inference import with_effects
+from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.result_notes import weight_notes
+from rrru.diagnosis.result_tables import parameter_rows
+from rrru.formats.file_changes import Found, held_by
+from rrru.formats.mjcf_writer import to_mjcf
+from rrru.formats.robot_file import mjcf_parts, urdf_parts
+from rrru.formats.structure import structure_of
+from rrru.formats.urdf_writer import to_urdf
+
+# what a drive's numbers in a file are, by the effect and the stem of its parameters
+_COMPLIANCE, _PLAY = ("drive_compliance", "compliance"), ("backlash", "width")
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """A corrected file.
+
+    text; not_in_model: what it cannot hold, in words; lacking: the effects among these; found: what there is to hold;
+    in_file: values by parameter of the effects that it holds beside geometry; mjcf: whether it is one, not a URDF.
+    """
+
+    text: str
+    not_in_model: tuple
+    lacking: tuple
+    found: Found
+    in_file: dict = field(default_factory=dict)
+    mjcf: bool = False
+
+
+def found_of(attribution, stated_reflectors=False):
+    """The Found of an attribution, and the names of its effects that no file holds.
+
+    stated_reflectors: whether reflectors whose places are stated belong to it, too.
+    """
+    case, state = attribution.case, attribution.state
+    library, sites = case.library, case.mechanism.legs.sites
+    constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
+    constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
+    twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
+    steps, coordinates = attribution.fit.one_sigma_steps()
+    spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
+    for key, twist in constant.items():
+        moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])
+        spread = spread + np.stack([one.twists[0] - twist[0] for one in moved])
+    moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
+    numbers, count = parameter_rows(attribution), len(case.mechanism.parts.drives)
+    loads = np.nan_to_num(np.abs(case.motion.drive_load)).max(axis=0)
+    found = Found(
+        {sites[k]: twists[k] for k in moves},
+        {sites[k]: spread[:, k] for k in moves},
+        _places(case, stated_reflectors),
+        tuple(case.mechanism.tool_mm),
+        _of_drives(numbers, *_COMPLIANCE, count),
+        _of_drives(numbers, *_PLAY, count),
+        dict(enumerate(loads.tolist())),
+    )
+    held = {name for name, _ in constant} | {_COMPLIANCE[0], _PLAY[0]}
+    return found, [name for name, _ in state.effects if name not in held]
+
+
+def fitted_in_file(attribution, section):
+    """The Attribution with its hypothesis fitted in geometric numbers that the robot's own file can hold.
+
+    Numbers of others, such as shifts between the axes of a ball, can stand in for those of the file in the fit; written
+    without them the file would miss by what they did. section: the robot's entry in the configuration.
+    """
+    mechanism = attribution.case.mechanism
+    if "urdf" in section:
+        parts = urdf_parts(section["urdf"], **{key: section.get(key) for key in ("base", "tip", "home")})
+    else:
+        parts = mjcf_parts(section["mjcf"], section["platform"])
+    held = held_by(structure_of(*parts), mechanism.candidates)
+    if set(mechanism.parameters.names) <= set(held):
+        return attribution
+    names = [name for name in held if name in mechanism.among] if mechanism.among else held
+    case = replace(attribution.case, mechanism=replace(mechanism, among=tuple(names)))
+    fitted, state = attribution.fit.model, attribution.state
+    start = replace(calibrate(case), effects=state.effects, shape_values=state.shape_values)
+    of_case = replace(fitted.case, mechanism=case.mechanism)
+    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, attribution.fit.level, fitted.signed)
+    return replace(attribution, case=case, fit=fit)
+
+
+def _of_drives(numbers, effect, stem, count):
+    """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
+    own = numbers[numbers["effect"] == effect].set_index("parameter")
+    return {k: tuple(own.loc[f"{stem}{k + 1}", ["value", "standard_error"]]) for k in range(count) if len(own)}
+
+
+def _places(case, stated):
+    """Places (3,) on the platform, before what was found, by site: of reflectors that were found, or stated, too."""
+    reads = case.mechanism.reads
+    wanted = set(reads.reflectors if stated else reads.fitted)
+    if not wanted:
+        return {}
+    on_world = rows.on_the_world(case.measurements)
+    frame = case.measurements if on_world is None else case.measurements[~on_world]
+    places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
+    return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in wanted}
+
+
+def corrected(attribution, section, folder):
+    """The Corrected file of an attribution for a folder; section: the robot's entry in the configuration.
+
+    Its numbers are fitted anew where the format cannot hold all effects and numbers that were. Raises ConfigError for a
+    file whose bodies do not all stand in it as such.
+    """
+    # more links at the end of a URDF's chain would leave its tip open
+    reflectors = "mjcf" in section
+    diagnosed, lacking = found_of(attribution, reflectors)
+    others, effects = [*lacking], [name for name, _ in attribution.state.effects]
+    if "urdf" in section:
+        lacking += [name for name in effects if name in (_COMPLIANCE[0], _PLAY[0])]
+    held = tuple(name for name in effects if name not in lacking)
+    found, _ = found_of(
+        fitted_in_file(with_effects(attribution, held) if lacking else attribution, section), reflectors
+    )
+    if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
+        others.append("unexplained")
+    others += weight_notes(attribution)
+    if "urdf" in section:
+        chain = {key: section.get(key) for key in ("base", "tip", "home")}
+        found = replace(found, compliance=diagnosed.compliance, play=diagnosed.play)
+        text, lost = to_urdf(section["urdf"], found, folder, **chain)
+        return Corrected(text, (*others, *lost), tuple(lacking), found)
+    text, lost = to_mjcf(section["mjcf"], section["platform"], found, folder)
+    drives = ((*_COMPLIANCE, found.compliance), (*_PLAY, found.play))
+    in_file = {name: {f"{stem}{k + 1}": value for k, (value, _) in each.items()} for name, stem, each in drives if each}
+    return Corrected(text, (*others, *lost), tuple(lacking), found, in_file, mjcf=True)

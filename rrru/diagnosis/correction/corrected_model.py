@@ -1,0 +1,210 @@
+"""A robot's file as it came and as corrected, read again and driven along the campaign. In mm and rad."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.correction.corrected_file import corrected
+from rrru.diagnosis.correction.drive_table import corrected_drives
+from rrru.diagnosis.correction.file_error import FileModel, file_error
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.shrink import model_row
+from rrru.diagnosis.verdict_text import NOT_CORRECTED, readable
+from rrru.errors import ConfigError, SimulationError, UnreachableError
+from rrru.formats.file_changes import placement_of
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.legs import TOOL, WORLD
+from rrru.robots.catalogue import make_mechanism
+from rrru.seeds import stream
+from rrru.simulation.mujoco_robot import MujocoRobot
+from rrru.store.atomic_write import write_text
+
+# what of a Motion has no row for each point
+_WHOLE = ("robot", "path_drive", "load_slopes")
+
+
+def write_corrected(diagnosis, section, masses, file, seed=0):
+    """The Diagnosis with what its robot's corrected file is worth, and `corrected_drives`; writes the file.
+
+    A file that cannot be corrected, or that is no robot once it is, as where a loop of bodies closes no more, becomes
+    an empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
+    robot's; seed: of the fresh poses at which file and diagnosis are compared.
+    """
+    file, attribution = Path(file), diagnosis.attribution
+    shrink, why, worth = diagnosis.tables["gap_shrink"], "", {}
+    try:
+        if why_not := diagnosis.verdict["no_answer"]:
+            raise ConfigError(why_not)
+        written = corrected(attribution, section, file.resolve().parent)
+        write_text(written.text, file)
+        more, why = gap_rows(attribution, written, section, file, shrink)
+        _refuse_worse(more)
+        error = file_error(
+            attribution, _model(attribution, written, section, file), masses, stream(seed, "fresh poses")
+        )
+        worth = {
+            "file_error_mm": error.measured_mm,
+            "file_error_fresh_mm": error.fresh_mm,
+            "file_remainder": _remainder(shrink, more, written, error),
+            "file_headline": _headline(written, error),
+        }
+        shrink, lost = pd.concat([shrink, more], ignore_index=True), written.not_in_model
+    except ConfigError as error:
+        tag, said = ("mujoco" if "mjcf" in section else "robot"), " ".join(str(error).replace("--", "-").split())
+        write_text(f"<{tag}><!-- not corrected: {said} --></{tag}>\n", file)
+        lost = (f"{NOT_CORRECTED}{said}",)
+    notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
+    verdict = diagnosis.verdict | worth | {"notes": notes, "not_in_model": "; ".join(lost)}
+    tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
+    return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
+
+
+def _left_mm(steps, kind):
+    """Root mean square residual in mm on all trajectories of the last row of a kind of `gap_shrink`, NaN for none."""
+    own = steps[(steps["kind"] == kind) & (steps["trajectory"] == "*")] if len(steps) else steps
+    return float(own["rms_mm"].iloc[-1]) if len(own) else np.nan
+
+
+def _refuse_worse(more):
+    """Raise ConfigError where the corrected file misses by more than the file as it came."""
+    given, written = _left_mm(more, "given_model"), _left_mm(more, "corrected_model")
+    if written > given:
+        raise ConfigError(f"it would miss by {written:.3g} mm rms, the file as it came misses by {given:.3g} mm")
+
+
+def _remainder(shrink, more, written, error):
+    """What a corrected file leaves beyond what the diagnosis does, in words, empty where it is next to nothing.
+
+    written: the Corrected file; error: its FileError.
+    """
+    left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
+    if written.lacking:
+        names = ", ".join(map(readable, written.lacking))
+        return f"this {_holds(written)} and not {names}: {error.fresh_mm:.2g} mm rms remain; use corrected_drives"
+    if not left > OPTIONS.max_file_remainder_ratio * whole:
+        return ""
+    return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"
+
+
+def _holds(written):
+    """What a Corrected file's format holds."""
+    return "MJCF holds geometry, compliance and play of the drives" if written.mjcf else "URDF holds the geometry only"
+
+
+def _headline(written, error):
+    """That a corrected file is worse than the calibration, and why, in words; empty where it is not."""
+    if not error.readings_mm > OPTIONS.max_file_remainder_ratio * error.calibrated_mm:
+        return ""
+    lost, most = written.not_in_model, OPTIONS.max_listed_numbers
+    more = f" and {len(lost) - most} more" if len(lost) > most else ""
+    lacking = f"; it cannot hold: {', '.join(lost[:most])}{more}" if lost else ""
+    sizes = f"{error.readings_mm:.2g} mm rms, the calibration by {error.calibrated_mm:.2g} mm"
+    return f"the corrected file misses the readings by {sizes}{lacking}"
+
+
+def _model(attribution, written, section, file):
+    """The FileModel of a Corrected file, loaded anew."""
+    robot = _robot(attribution.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
+    return FileModel(robot, written.in_file, _instrument(attribution.case, robot, written.found, True))
+
+
+def gap_rows(attribution, corrected, section, file, shrink):
+    """Rows of `gap_shrink`: of the robot's file as it came, and of the Corrected one, and why MuJoCo did not drive it.
+
+    section: the robot's entry in the configuration; file: the corrected one; shrink: the other rows. MuJoCo drives an
+    MJCF, up to 300 points of the campaign, with what loads and drives it itself; where it cannot, and of a URDF, both
+    are closed at the drive values that the numbers in the file lead to. Raises ConfigError where the corrected file is
+    no robot.
+    """
+    key = "mjcf" if "mjcf" in section else "urdf"
+    models = [
+        ("given_model", _robot(attribution.case, section), {}),
+        ("corrected_model", _robot(attribution.case, section | {key: str(file)}), corrected.in_file),
+    ]
+    files, why = (section[key], file), ""
+    try:
+        if key == "urdf":
+            raise ConfigError("a URDF has no actuators")
+        poses = [
+            simulated(attribution.case.motion, robot, Path(one), section["platform"])
+            for (_, robot, _), one in zip(models, files, strict=True)
+        ]
+    except (ConfigError, SimulationError, UnreachableError) as error:
+        why = f"corrected model not driven: {error}; closed at its drive values instead"
+        poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
+    result, case = [], attribution.case
+    known = case.on_robot & case.complete({term.effect for term in attribution.fit.terms})
+    for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
+        twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
+        # the file is not judged where the sense of arrival of a drive is unknown
+        left = np.where(known[:, None], case.by_other(robot, own, twists), np.nan)
+        if np.isfinite(left).all(axis=1).any():
+            result.append(model_row(shrink, kind, left, case.noise_mm))
+    return pd.DataFrame(result), why
+
+
+def _robot(case, section):
+    """The robot of a file."""
+    robot = make_mechanism(case.mechanism.name, section, parameter_set="frame")
+    return robot.reading(case.mechanism.reads)
+
+
+def simulated(motion, robot, file, platform):
+    """Poses (n) of an MJCF that MuJoCo drives along a Motion, NaN beyond what is driven, and no twists.
+
+    robot: of the file. Raises ConfigError, SimulationError or UnreachableError where it cannot be driven.
+    """
+    count = min(len(motion), OPTIONS.max_driven_points)
+    first = replace(
+        motion,
+        **{name: getattr(motion, name)[:count] for name in motion.__dataclass_fields__ if name not in _WHOLE},
+    )
+    poses, _ = MujocoRobot(robot, file, platform).posed(first, first.position_mm)
+    whole = _nowhere(robot, len(motion))
+    for name in ("position_mm", "turn", "residual_mm", "closed"):
+        getattr(whole, name)[:count] = getattr(poses, name)
+    return whole, robot.twists()
+
+
+def _nowhere(robot, count):
+    """Poses (n) that are unknown."""
+    passive = np.zeros((count, len(robot.legs.passive_joints)))
+    return Poses(
+        np.full((count, 3), np.nan),
+        np.full((count, 3, 3), np.nan),
+        passive,
+        np.full(count, np.inf),
+        np.zeros(count, dtype=bool),
+    )
+
+
+def _closed(case, robot, effects):
+    """Poses (n) of a robot closed at the drive values of the campaign and what effects add, and its twists."""
+    twists = FileModel(robot, effects, robot.twists()).twists(case.motion)
+    actuators, command = rows.actuators(case.measurements, robot), rows.command(case.measurements)
+    return robot.solve(actuators, command, twists), twists
+
+
+def _instrument(case, robot, found, corrected):
+    """Twists (1, sites, 6) of what is read: the reflectors' places, and the tool's where it is corrected or these are.
+
+    The frame is the file's, so that reflectors beside the robot are moved by it.
+    """
+    result, numbers = robot.twists(), robot.legs.site_numbers
+    reads = case.mechanism.reads
+    named = {*reads.fitted, *((TOOL,) if corrected or reads.fitted or reads.turned else ())}
+    for name in named & set(found.twists):
+        result[0, numbers[name]] = found.twists[name]
+    on_world = rows.on_the_world(case.measurements)
+    if on_world is not None:
+        frame = case.measurements[on_world]
+        places, sites = rows.vectors(frame, "target"), rows.sites(frame["target"]).to_numpy()
+        world = placement_of(found.twists.get(WORLD, np.zeros(6)))
+        for name in pd.unique(sites):
+            nominal = places[np.flatnonzero(sites == name)[0]]
+            own = nominal + found.twists.get(name, np.zeros(6))[:3]
+            result[0, numbers[name], :3] = world[:3, :3] @ own + world[:3, 3] - nominal
+    return result

@@ -1,0 +1,114 @@
+"""Compensation table: which drive values bring the robot, as diagnosed, to where it is commanded. mm and rad.
+
+The grid fills the box about the measured points as far as one of these is near; it is the only thing to go by where no
+model file can hold what was found. The robot is at rest, as warm as at the campaign's end.
+"""
+
+import numpy as np
+import pandas as pd
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.options import OPTIONS
+from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import Contribution
+from rrru.kinematics.inverse import drives_at
+
+# how far the drives come from, longer than any play
+_APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
+
+
+def corrected_drives(attribution, masses):
+    """Rows of `corrected_drives` of an attribution; masses: of the robot."""
+    case = attribution.case
+    robot, known = case.mechanism, case.used
+    commands, drives = rows.command(case.measurements)[known], rows.actuators(case.measurements, robot)[known]
+    position, nearest = _grid(commands)
+    stated = robot.solve(drives[nearest], commands[nearest])
+    turn = stated.turn
+    nominal = drives_at(robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False)
+    reached = np.isfinite(nominal).all(axis=1)
+    position, turn, nominal = position[reached], turn[reached], nominal[reached]
+    payload, end_s = at_end(case)
+    found = {}
+    for approach in (-1, 1):
+        told = nominal
+        for _ in range(OPTIONS.correction_iterations):
+            motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
+            twists = robot.twists(attribution.state.deviations) + effect_twists(attribution, motion)
+            told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
+        found[approach] = told
+    if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
+        found = {0: found[1]}
+    return _table(robot, (position, turn), (nominal, found), {"payload_kg": payload, "time_s": end_s})
+
+
+def _table(robot, place, drives, state):
+    """The rows of places and drives: nominal ones (n, K), and found ones (n, K) by the side that they come from."""
+    (position, turn), (nominal, found) = place, drives
+    vectors = Rotation.from_matrix(turn).as_rotvec().reshape(-1, 3)
+    told = {"point": np.arange(1, len(position) + 1)} | rows.vector_columns("command", position)
+    told |= {f"command_r{axis}_rad": value for axis, value in zip("xyz", vectors.T, strict=True)}
+    told |= dict(zip(robot.parts.columns, nominal.T, strict=True)) | state
+    names = [f"corrected_{name}" for name in robot.parts.columns]
+    frames = [
+        pd.DataFrame(told | dict(zip(names, values.T, strict=True))).assign(approach=side)
+        for side, values in found.items()
+    ]
+    table = pd.concat(frames, ignore_index=True)
+    return table[np.isfinite(table.to_numpy(dtype=float)).all(axis=1)].reset_index(drop=True)
+
+
+def _grid(commands):
+    """Points (g, 3) of the box about commands (n, 3) that one of these is near, and its number (g,)."""
+    low, high = commands.min(axis=0), commands.max(axis=0)
+    lines = [
+        np.linspace(a, b, OPTIONS.drive_table_grid_lines) if b - a > OPTIONS.min_extent_mm else np.array([a])
+        for a, b in zip(low, high, strict=True)
+    ]
+    points = np.stack([axis.ravel() for axis in np.meshgrid(*lines, indexing="ij")], axis=1)
+    step = np.maximum((high - low) / (OPTIONS.drive_table_grid_lines - 1), OPTIONS.min_extent_mm)
+    far, number = cKDTree(commands / step).query(points / step, p=np.inf)
+    return points[far <= OPTIONS.max_grid_distance_steps], number[far <= OPTIONS.max_grid_distance_steps]
+
+
+def at_end(case):
+    """The largest payload in kg and the time in s of the end of a Case's campaign."""
+    payload_kg = float(np.nan_to_num(case.motion.payload_kg[case.used]).max(initial=0.0))
+    return payload_kg, float(np.nanmax(case.motion.time_s, initial=0.0))
+
+
+def at_rest(robot, masses, state, approach, nominal):
+    """The Motion at rest at positions (n, 3) and drives (n, K), to which all drives came from one side.
+
+    approach: 1 from smaller values, -1 from larger ones, one number or (n, 1); nominal (n, K): drive values that bring
+    the nominal robot there, which is where it stands.
+    """
+    position, drive, payload, end_s = state
+    count, nothing = len(position), np.zeros_like(position)
+    before = drive - approach * np.array([_APPROACH[unit] for unit in robot.parts.units])
+    path = np.stack([before, drive], axis=1).reshape(2 * count, -1)
+    course = Course(
+        position_mm=position,
+        drive=drive,
+        path_drive=path,
+        path_index=2 * np.arange(count) + 1,
+        time_s=np.full(count, end_s),
+        velocity_mm_s=nothing,
+        acceleration_mm_s2=nothing,
+        payload_kg=np.full(count, payload),
+        drive_motion=(np.zeros_like(drive), np.zeros_like(drive)),
+    )
+    return make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
+
+
+def effect_twists(attribution, motion):
+    """Twists of the effects of an attribution's state that a robot at rest has."""
+    state, library = attribution.state, attribution.case.library
+    change = Contribution(motion.robot.twists())
+    for key in state.effects:
+        needs = getattr(library[key[0]], "needs", ())
+        if all(np.isfinite(getattr(motion, need)).all() for need in needs):
+            change = change + state.contribution(library, key, motion)
+    return change.twists

@@ -1,0 +1,225 @@
+"""Which further run would decide between two answers: computed by what each candidate adds, not by rule of thumb.
+
+Candidates are further passes along a campaign's own trajectories. Where none of them would decide between the first two
+answers, poses are chosen too, each the one that adds most to those before it. What they add is counted as
+`rrru.diagnosis.design.expected_information` says. No candidate exceeds the limits of the robot, see
+`rrru.diagnosis.design.run_limits`.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.design import poses
+from rrru.diagnosis.design.contests import contests_of
+from rrru.diagnosis.design.expected_information import greedy, worth
+from rrru.diagnosis.design.run_limits import RunLimits, StatedLimits, run_limits
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.options import OPTIONS
+
+RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points")
+_COLUMNS = (*RUN, "separates", "now_nats", "gain_nats")
+_POSE = ("pose", *(f"{end}_{axis}_mm" for end in ("from", "to") for axis in "xyz"))
+_POSE += (*(f"command_r{axis}_rad" for axis in "xyz"), "speed_mm_s", "payload_kg")
+# kinds of further passes: in reverse, fast, loaded
+_KINDS = ((False, False, False), (True, False, False), (False, True, False), (False, False, True), (True, True, True))
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Rows of `gap_next_runs`, best first, without campaign and rank, and of `gap_next_poses` without campaign.
+
+    undecided: the two answers, "a / b", that nothing which can be simulated would decide between, else empty; limited:
+    which limit of the robot leaves candidates out, in words, else empty.
+    """
+
+    runs: pd.DataFrame
+    poses: pd.DataFrame
+    undecided: str = ""
+    limited: str = ""
+
+
+NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
+
+
+def advise(attribution, verdict, masses, stated=None, sizes=None):
+    """The Advice, empty where no rival answer is left that the library can predict.
+
+    stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
+    decide what matters most come first.
+    """
+    contests = contests_of(attribution, verdict, sizes or {})
+    if not contests:
+        return NOTHING
+    stated = stated or StatedLimits()
+    limits, limited = run_limits(attribution.case, masses, stated)
+    result = _runs(attribution, contests, masses, limits)
+    first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
+    if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
+        row, listed = _poses(attribution, contests[0], masses, limits)
+        result, first = result + row, first + row
+    runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
+    runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
+    # of runs that decide, those that decide what matters most; of others those that tell most
+    turn = runs["contest"].where(runs["gain_nats"] > OPTIONS.decisive_gain_nats, len(contests))
+    runs = runs.assign(turn=turn).sort_values(
+        ["turn", "gain_nats", "run"], ascending=[True, False, True], kind="stable"
+    )
+    runs = runs.drop_duplicates("run").head(OPTIONS.max_advised_runs)[[*_COLUMNS]].reset_index(drop=True)
+    some_gain = any(row["gain_nats"] > OPTIONS.min_run_gain_nats for row in first)
+    open_still = not some_gain and verdict.sure < OPTIONS.min_sure_probability
+    listed = listed if (runs["kind"] == "poses").any() else NOTHING.poses
+    undecided = contests[0].separates if open_still else ""
+    return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
+
+
+def _runs(attribution, contests, masses, limits):
+    """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
+    choice, table = candidates(attribution.case.measurements, limits)
+    if not choice:
+        return []
+    planned, result = _planned(attribution.case, table, masses), []
+    for number, contest in enumerate(contests):
+        if not _tell(planned, contest):
+            continue
+        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        start = now.nats()
+        for run, one in zip(choice, added, strict=True):
+            about = {"contest": number, "separates": contest.separates, "now_nats": start}
+            result.append(run | about | {"gain_nats": (now + one).nats() - start})
+    return result
+
+
+def _planned(case, table, masses):
+    """The case of a table of planned runs."""
+    return make_case(table, case.mechanism, masses, case.noise_mm, case.effects, arm_mm=case.arm_mm)
+
+
+def _tell(planned, contest):
+    """Whether planned runs tell what the effects of a Contest need, such as times or temperatures."""
+    answers = contest.truth, contest.imitator
+    return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
+
+
+def _poses(attribution, contest, masses, limits):
+    """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
+
+    They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
+    """
+    case, best = attribution.case, ([], NOTHING.poses)
+    passes = poses.passes(case.measurements, case.mechanism)
+    if not len(passes):
+        return best
+    told_speed, own_load = (float(case.measurements[name].median()) for name in ("speed_mm_s", "payload_kg"))
+    own_speed = told_speed if np.isfinite(told_speed) else _speed(case.measurements)
+    last_s, own_load, most = _end_s(case.measurements), float(np.nan_to_num(own_load)), 0.0
+    for fast, loaded in product((False, True), repeat=2):
+        speed = limits.fast(told_speed, np.full(1, np.nan)) if fast else own_speed
+        load = limits.loaded_kg(own_load) if loaded else own_load
+        if (fast and not (speed > told_speed and np.isfinite(last_s))) or (loaded and not load > own_load):
+            continue
+        # a pass at which a drive would be too fast is none
+        some = passes.some([not fast or limits.slower(rate * speed) >= 1.0 for rate in passes.rates_per_mm])
+        if not len(some) or not limits.allows(speed, load):
+            continue
+        table = some.commands(case.mechanism, last_s + OPTIONS.pause_between_runs_s, speed, load)
+        planned = _planned(case, table, masses)
+        if not _tell(planned, contest):
+            continue
+        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
+        chosen = chosen[: some.within(chosen, speed, limits.seconds)]
+        if not chosen:
+            continue
+        gain = sum((added[number] for number in chosen), now).nats() - now.nats()
+        # one that tells hardly more is not worth a payload
+        if gain > OPTIONS.min_gain_ratio_of_harder_poses * most:
+            count, most = len(chosen), gain
+            words = " ".join([f"{count} poses", *_how(fast, loaded, speed, load)]), "poses", "poses", False
+            row = *words, speed, load, count * OPTIONS.points_per_pass, contest.separates, now.nats(), gain
+            listed = some.listed(chosen).assign(speed_mm_s=speed, payload_kg=load)
+            best = [{"contest": 0, **dict(zip(_COLUMNS, row, strict=True))}], listed
+    return best
+
+
+def _how(fast, loaded, speed, load):
+    """In words what of a kind of pass is not the campaign's own."""
+    return [f"at {speed:g} mm/s"] * fast + [f"with {load:g} kg payload"] * loaded
+
+
+def _end_s(frame):
+    """Time at which a measurement table ends, NaN where it has none."""
+    return np.nanmax(frame["time_s"].to_numpy(dtype=float)) if frame["time_s"].notna().any() else np.nan
+
+
+def _speed(frame):
+    """Speed in mm/s between the points of a measurement table, by its times; NaN where it has none."""
+    way = np.linalg.norm(np.diff(rows.command(frame), axis=0), axis=1)
+    time = np.diff(frame["time_s"].to_numpy(dtype=float))
+    moved = (np.diff(frame["run"].to_numpy()) == 0) & (way > 0.0) & (time > 0.0)
+    return float(np.median(way[moved] / time[moved])) if moved.any() else np.nan
+
+
+def candidates(frame, limits=None):
+    """Candidate runs as mappings of the columns RUN of `gap_next_runs`, and their commands, numbered from 1.
+
+    Every kind of pass along some of a measurement table's trajectories that keeps the RunLimits, by default those of a
+    robot of which nothing is known.
+    """
+    limits = limits or RunLimits()
+    count = frame.groupby(["trajectory", "run"], sort=False).size().groupby("trajectory", sort=False).max()
+    # passes of poses that were driven before are no trajectories
+    names = count.index[(count > OPTIONS.points_per_pass) | (count.max() <= OPTIONS.points_per_pass)]
+    chosen = names[np.unique(np.linspace(0, len(names) - 1, OPTIONS.max_advised_trajectories).astype(int))]
+    end, result, tables = _end_s(frame), [], []
+    for name in chosen:
+        first = frame[frame["trajectory"] == name]
+        first = first[first["run"] == first["run"].iloc[0]]
+        own_speed, own_load = float(first["speed_mm_s"].iloc[0]), float(np.nan_to_num(first["payload_kg"].iloc[0]))
+        fastest, heaviest = limits.fast(own_speed, _rates(first, limits.columns)), limits.loaded_kg(own_load)
+        for reverse, fast, loaded in _KINDS:
+            if (fast and not (fastest > own_speed and np.isfinite(end))) or (loaded and not heaviest > own_load):
+                continue
+            speed, load = fastest if fast else own_speed, heaviest if loaded else own_load
+            table = _pass(first, len(tables) + 1, end + OPTIONS.pause_between_runs_s, reverse, speed, load)
+            if not limits.allows(speed, load, _seconds(table)):
+                continue
+            tables.append(table)
+            how = ["in reverse"] * reverse + _how(fast, loaded, speed, load)
+            words = f"{name} {' '.join(how) or 'once more'}"
+            result.append(dict(zip(RUN, (words, "run", str(name), reverse, speed, load, len(first)), strict=True)))
+    return result, pd.concat(tables, ignore_index=True) if tables else frame.iloc[:0]
+
+
+def _rates(run, columns):
+    """Largest rates (K,) of the drives of some columns between the points of a run; NaN where it has no times."""
+    time = np.diff(run["time_s"].to_numpy(dtype=float))
+    way = np.abs(np.diff(run[[*columns]].to_numpy(dtype=float), axis=0))
+    rate = np.divide(way, time[:, None], out=np.full(way.shape, np.nan), where=time[:, None] > 0.0)
+    return np.nanmax(rate, axis=0, initial=0.0)
+
+
+def _seconds(run):
+    """Driving time of a run, by its times, else by its way and its speed; NaN where it has neither."""
+    time = run["time_s"].to_numpy(dtype=float)
+    if np.isfinite(time).any():
+        return float(np.nanmax(time) - np.nanmin(time))
+    way = np.linalg.norm(np.diff(rows.command(run), axis=0), axis=1).sum()
+    return float(way / run["speed_mm_s"].iloc[0])
+
+
+def _pass(first, number, start_s, reverse, speed_mm_s, payload_kg):
+    """Table of one more pass along the points of a run."""
+    run = (first.iloc[::-1] if reverse else first).reset_index(drop=True)
+    clock = first["time_s"].to_numpy(dtype=float)
+    time = clock[-1] - clock[::-1] if reverse else clock - clock[0]
+    own_speed = float(first["speed_mm_s"].iloc[0])
+    if np.isfinite(own_speed) and speed_mm_s != own_speed:
+        # the same profile, driven faster: the average speed over the run rises in proportion
+        time = time * own_speed / speed_mm_s
+    measured = rows.vector_columns("measured", rows.command(run))
+    told = {"run": number, "time_s": start_s + time, "speed_mm_s": speed_mm_s, "payload_kg": payload_kg}
+    return run.assign(**told, status="ok", **measured)

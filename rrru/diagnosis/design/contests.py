@@ -1,0 +1,91 @@
+"""Between which answers a further run should decide: what matters most for the verdict and for the prediction first."""
+
+from dataclasses import dataclass
+
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.verdict import label
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Two answers, each (hypothesis, level) as `Posterior.best_of` gives it, and both in words: "a+b / a+c".
+
+    The data are made by truth, which has no fewer effects than imitator: the smaller one could not make the larger
+    one's.
+    """
+
+    separates: str
+    truth: tuple
+    imitator: tuple
+
+
+def contests_of(attribution, verdict, sizes):
+    """Up to `OPTIONS.max_advised_rivals` Contests of a Verdict, in the order in which they matter.
+
+    First the members of each group, the set with its most probable one against the set with another one in its place;
+    then the verdict against the most probable answer with, or without, the doubtful cause that makes most of the gap;
+    then, of a verdict that is not sure, that against its nearest rivals. Of a verdict with something unexplained the
+    groups alone: an effect outside of the library makes no data. sizes: by effect the rms in mm of its part of the gap.
+    """
+    found = {}
+    for pair in _pairs(attribution.posterior, verdict, sizes):
+        contest = _contest(*pair) if None not in pair else None
+        if contest:
+            found.setdefault(frozenset(hypothesis.effects for hypothesis, _ in pair), contest)
+        if len(found) == OPTIONS.max_advised_rivals:
+            break
+    return [*found.values()]
+
+
+def _pairs(posterior, verdict, sizes):
+    """Pairs of answers, the favoured one first; None for one of which there is no hypothesis."""
+    effects = frozenset(verdict.effects)
+    for group in verdict.groups:
+        own, *others = group.names
+        for other in others:
+            yield (
+                _of(posterior, effects, (own,), (other,)),
+                _of(posterior, effects - {own} | {other}, (other,), (own,)),
+            )
+    if verdict.unexplained:
+        return
+    if doubtful := _doubtful(posterior, verdict, sizes):
+        acts = doubtful in effects
+        # without a cause others may do what it does: its rival is the most probable answer without it
+        yield (
+            _of(posterior, effects, *(((doubtful,), ()) if acts else ((), (doubtful,)))),
+            posterior.best_where(lambda names: (doubtful in names) != acts),
+        )
+    if verdict.sure >= OPTIONS.min_sure_probability:
+        return
+    rivals = [frozenset(names) for names, flag, _ in verdict.rivals if not flag and frozenset(names) != effects]
+    if not rivals:
+        rivals = [names for names, flag in posterior.sets() if not flag and names != effects]
+    for names in rivals:
+        yield posterior.best_of(effects), posterior.best_of(names)
+
+
+def _of(posterior, effects, within, without):
+    """The answer of exactly these effects, else the most probable one with all of `within` and none of `without`."""
+    found = posterior.best_of(effects)
+    return found or posterior.best_where(lambda names: names.issuperset(within) and names.isdisjoint(without))
+
+
+def _doubtful(posterior, verdict, sizes):
+    """The cause outside of groups, named or possible, that may act or not and makes most of the gap; "" for none."""
+    grouped = {name for group in verdict.groups for name in group.names}
+    causes = (*verdict.effects, *(name for name in verdict.possible if name not in ("none", "unexplained")))
+    low = OPTIONS.min_possible_probability
+    doubts = {name: posterior.marginal(name) for name in dict.fromkeys(causes) if name not in grouped}
+    doubts = {name: p for name, p in doubts.items() if low < p < 1.0 - low}
+    return max(doubts, key=lambda name: (sizes.get(name, 0.0), doubts[name], name), default="")
+
+
+def _contest(favoured, other):
+    """The Contest of two answers, None where they are of the same effects."""
+    names = [label(sorted(hypothesis.effects), False) for hypothesis, _ in (favoured, other)]
+    if names[0] == names[1]:
+        return None
+    # a rival may be one only together with something small that is unknown
+    larger = len(favoured[0].terms) >= len(other[0].terms)
+    return Contest(" / ".join(names), *((favoured, other) if larger else (other, favoured)))

@@ -1,0 +1,88 @@
+"""What further points would tell between two answers: the log Bayes factor to expect of them, in nats.
+
+If hypothesis A holds with its fitted numbers, the data that it makes differ from the best that hypothesis B can do by
+
+    I = 1/2 min_b |(y_A - X_B b) / sigma|^2 + prior of b
+
+nats. Further points add to the sums of squares and products that I is made of; what I grows by is their worth.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rrru.diagnosis.state import State
+from rrru.diagnosis.terms import signatures, spread
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over points of a design (k numbers) and of data, over the noise: precision (k, k), moment (k,), square."""
+
+    precision: np.ndarray
+    moment: np.ndarray
+    square: float
+
+    def __add__(self, other):
+        return Sums(self.precision + other.precision, self.moment + other.moment, self.square + other.square)
+
+    @classmethod
+    def of(cls, design, data, noise_mm):
+        """Of a design (n, 3, k) and data (n, 3) under a noise per axis."""
+        flat, target = design.reshape(-1, design.shape[-1]) / noise_mm, data.ravel() / noise_mm
+        return cls(flat.T @ flat, flat.T @ target, float(target @ target))
+
+    def nats(self):
+        """Half of the least squares that the design leaves of the data."""
+        unit = 1.0 / np.sqrt(np.maximum(np.diag(self.precision), 1e-300))
+        scaled = unit[:, None] * self.precision * unit + 1e-12 * np.eye(len(unit))
+        moment = unit * self.moment
+        return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
+
+
+def worth(attribution, truth, imitator, planned):
+    """Sums of the present campaign, the prior among them, and of each run of a planned Case in order of its number.
+
+    truth, imitator: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
+    """
+    (hypothesis, level), (rival, rival_level) = truth, imitator
+    case, evidence = attribution.case, attribution.evidence
+    terms = hypothesis.terms + rival.terms
+    # what the weight is off by is the same in both answers
+    keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
+    here, planned = (reachable(replace(one, doubts={}), attribution.state) for one in (case, planned))
+    # both about one state: the evidence's own linearisation is that of the fit before
+    present, there = (one.linearise(attribution.state, keys) for one in (here, planned))
+    mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+    mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
+    made, designs = [], []
+    for linear in (present, there):
+        none = np.zeros((*linear.data.shape, 0))
+        made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
+        designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
+    penalty = np.zeros(designs[0].shape[-1])
+    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
+    now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
+    runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
+    return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]
+
+
+def reachable(case, state):
+    """A Case without the points at which a state's model, with its effects or without them, has no pose."""
+    left = [case.residual(one) for one in (state, State(state.deviations, {}))]
+    lost = ~np.isfinite(left).all(axis=(0, 2))
+    return case.without(lost) if lost.any() else case
+
+
+def greedy(now, candidates, most):
+    """Numbers of up to `most` candidates, each the one that adds most nats to those before it, and the nats of all.
+
+    now: Sums at the start; candidates: Sums of each.
+    """
+    chosen, start = [], now.nats()
+    for _ in range(min(most, len(candidates))):
+        left = [k for k in range(len(candidates)) if k not in chosen]
+        best = max(left, key=lambda k: (now + candidates[k]).nats())
+        chosen.append(best)
+        now = now + candidates[best]
+    return chosen, now.nats() - start

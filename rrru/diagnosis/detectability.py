@@ -1,0 +1,76 @@
+"""What a campaign can show of each effect, before anything is fitted.
+
+How much of it the calibration leaves, from what size on it is found, and which other effect could stand in for it.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from scipy.special import chdtri, chndtrinc
+
+from rrru.diagnosis.options import OPTIONS
+
+_HIDDEN = "the calibration takes it up entirely on these points"
+_UNKNOWN = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
+
+
+def identify(case, linear):
+    """Rows of `gap_identifiability` without the campaign, from the linearised sim without effects."""
+    base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
+    visible = {name: _visible(case, linear, base, name) for name in case.effects}
+    bases = {name: _basis(columns) for name, (_, columns) in visible.items()}
+    rows = [{"effect": name, **_row(case, name, *visible[name], bases)} for name in case.effects]
+    rows += [{"effect": name, "testable": False, **_UNKNOWN, "note": note} for name, note in case.untestable.items()]
+    return pd.DataFrame(rows)
+
+
+def with_seen(case, linear):
+    """The case without effects that even at their largest the calibration would hide, and the linearisation of it."""
+    base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
+    hidden = {}
+    for name, effect in case.effects.items():
+        largest = float(np.min(effect.coordinates.most / effect.coordinates.typical))
+        own = float(np.linalg.norm(_visible(case, linear, base, name)[1]))
+        if largest * own < case.noise_mm * np.sqrt(_needed(1)):
+            hidden[name] = _HIDDEN
+    library = {name: effect for name, effect in case.library.items() if name not in hidden}
+    columns = {key: column for key, column in linear.columns.items() if key[0] in library}
+    seen = replace(case, library=library, untestable=case.untestable | hidden)
+    return seen, replace(linear, columns=columns)
+
+
+def _needed(freedom):
+    """Square, over the noise, from which on an effect of so many degrees of freedom is found."""
+    return chndtrinc(chdtri(freedom, OPTIONS.false_alarm_probability), freedom, 1.0 - OPTIONS.detection_power)
+
+
+def _visible(case, linear, base, name):
+    """Columns (3n, k) of an effect, all shapes, per typical size, with and without what a basis (3n, p) takes up."""
+    coordinates = case.library[name].coordinates
+    parts = [linear.columns[name, shape].reshape(3 * len(case), -1) for shape in range(len(coordinates.shapes))]
+    raw = np.concatenate([part * coordinates.typical for part in parts], axis=1)
+    return raw, raw - base @ (base.T @ raw)
+
+
+def _basis(columns):
+    """Orthonormal basis of columns (3n, k)."""
+    basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+    return basis[:, size > 1e-9 * max(size[0], 1e-300)]
+
+
+def _row(case, name, raw, visible, bases):
+    """The row of one testable effect; raw, visible: its columns (3n, k) with and without the calibration's part."""
+    own, total = float((visible**2).sum()), float((raw**2).sum())
+    share = np.sqrt(own / total) if total > 0.0 else 0.0
+    row = {"testable": True, **_UNKNOWN, "visible_share": share, "note": ""}
+    if share < OPTIONS.min_visible_rms_share:
+        return row | {"testable": False, "note": _HIDDEN}
+    first = visible[:, : len(case.library[name].coordinates)]
+    freedom = np.linalg.matrix_rank(first, tol=1e-6 * np.linalg.norm(first))
+    row["detectable_mm"] = float(case.noise_mm * np.sqrt(_needed(freedom) / len(case)))
+    imitated = {other: float(((basis.T @ visible) ** 2).sum() / own) for other, basis in bases.items() if other != name}
+    if imitated:
+        best = max(imitated, key=imitated.get)
+        row |= {"imitated_by": best, "imitated_share": min(imitated[best], 1.0)}
+    return row

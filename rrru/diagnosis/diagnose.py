@@ -1,0 +1,266 @@
+"""The diagnosis of one campaign: where its gap lies, what causes it, how far it shrinks, what to measure next."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.budget import budget
+from rrru.diagnosis.design.advise import Advice, advise
+from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.diagnosis.determined import few_readings, require_determined
+from rrru.diagnosis.drive_functions import drive_functions
+from rrru.diagnosis.inference import (
+    KNOWN,
+    STATED,
+    UNKNOWN_NOISE,
+    Attribution,
+    attribute,
+    with_arm,
+    with_beside,
+    with_effects,
+)
+from rrru.diagnosis.left_out import left_out, left_out_note
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.model_space import explore
+from rrru.diagnosis.omitted_variable_bias import bias_notes
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior
+from rrru.diagnosis.remainder import NO_REMAINDER, followed_alike, remainder_rows
+from rrru.diagnosis.result_notes import fit_notes, noise_notes, posterior_notes, weight_doubts, weight_notes, zero_notes
+from rrru.diagnosis.result_tables import details_of, parameter_rows, where
+from rrru.diagnosis.settings import GapSettings, Prior
+from rrru.diagnosis.shrink import CLOSED, order_by_share, share_closed, shrink_steps
+from rrru.diagnosis.state import State
+from rrru.diagnosis.validity import why_no_answer
+from rrru.diagnosis.variance_by_factor import worst_spot
+from rrru.diagnosis.verdict import Verdict, decide, without_answer
+from rrru.estimation.noise_model import CONTRADICTED, NoiseModel
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
+from rrru.robots.drive_words import drive_words
+from rrru.seeds import stream
+
+_DEFAULTS = GapSettings()
+
+
+@dataclass(frozen=True)
+class MeasuredRobot:
+    """What is known of the robot that a campaign was measured on.
+
+    mechanism: its nominal one; masses: `rrru.kinematics.dynamics.Masses`; noise_mm: of the instrument, per axis, None
+    or 0 where nobody states it, and noise_rad: of the orientations that it reads; noise_known: noise_mm is no guess
+    within 30 % but right; campaign: name of the campaign, for its random stream; limits: what further runs may ask of
+    it.
+    """
+
+    mechanism: Robot
+    masses: Masses = field(default_factory=Masses)
+    noise_mm: float | None = None
+    campaign: str = ""
+    noise_rad: float | None = None
+    noise_known: bool = False
+    limits: StatedLimits = field(default_factory=StatedLimits)
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
+    corrected sim; attribution: everything that the search found; decided: the Verdict itself.
+    """
+
+    verdict: dict[str, Any]
+    tables: dict[str, pd.DataFrame]
+    state: State
+    attribution: Attribution
+    decided: Verdict
+
+
+def sim(mechanism: Any) -> Any:
+    """The mechanism with bounds wide enough for a gap to show itself in the deviations."""
+    return mechanism.widened(OPTIONS.parameter_bound_rad, OPTIONS.parameter_bound_mm)
+
+
+def diagnose(
+    measurements: pd.DataFrame, robot: MeasuredRobot, settings: GapSettings = _DEFAULTS, details: bool = True
+) -> Diagnosis:
+    """Diagnosis of a measurement table of a MeasuredRobot.
+
+    details: also the tables that tell more than the verdict, its budget and numbers and what to measure next. Raises
+    FitError where the readings do not determine the calibration with some to spare, see `rrru.diagnosis.determined`.
+    """
+    library = settings.library(robot.mechanism)
+    stated = (KNOWN if robot.noise_known else STATED) if robot.noise_mm else UNKNOWN_NOISE
+    nominal, near = sim(robot.mechanism), settings.use_near_singularity
+    arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
+    case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
+    case = replace(case, doubts=settings.doubts(case.doubts))
+    case = require_determined(case, f"campaign {robot.campaign}: " if robot.campaign else "")
+    if rows.has_turns(measurements):
+        case = with_arm(case, robot.noise_mm, robot.noise_rad)
+    case = with_beside(case)
+    generator = stream(settings.seed, "gap", robot.campaign)
+    verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated), settings.prior)
+    if why := why_no_answer(attribution, robot.noise_mm):
+        verdict, attribution, ordered = without_answer(why), _without_effects(attribution, settings.prior), ()
+    steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
+    case = attribution.case
+    residual = case.residual(attribution.calibrated)
+    own = stream(settings.seed, "gap budget", robot.campaign)
+    parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
+    sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
+    further = advise(attribution, verdict, robot.masses, robot.limits, sizes)
+    worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
+    excluded = left_out(case, near)
+    row = _row(attribution, verdict, steps, worst, further, (robot.noise_mm, excluded))
+    ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
+    tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
+    tables["gap_parameters"] = parameter_rows(attribution)
+    tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
+    unexplained = verdict.unexplained and not verdict.no_answer
+    tables["gap_remainder"] = remainder_rows(attribution) if unexplained else NO_REMAINDER
+    if details:
+        tables |= details_of(attribution, verdict, steps, residual, generator, settings.draws)
+    return Diagnosis(row, tables, attribution.state, attribution, verdict)
+
+
+def _found(attribution: Attribution) -> Iterator[str]:
+    """What a user has to know of the robot beside its effects."""
+    yield from zero_notes(attribution.fit.estimate, attribution.case.mechanism)
+    yield from bias_notes(attribution)
+    yield from weight_notes(attribution)
+    yield from weight_doubts(attribution)
+
+
+def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
+    """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
+    case = attribution.case
+    yield from fit_notes(attribution)
+    yield from posterior_notes(attribution.posterior)
+    if case.count < OPTIONS.min_used_share * len(case.used):
+        yield left_out_note(excluded, case.count, len(case.used))
+    if few := few_readings(case):
+        yield few
+    acting = {name for name, _ in attribution.state.effects} & case.known.keys()
+    if lacking := case.count - len(np.unique(case.at[case.complete(acting)])):
+        where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
+        yield f"{', '.join(sorted(acting))} fitted without {where_not}"
+    yield from noise_notes(case, stated_mm, CONTRADICTED)
+    for effect, note in case.untestable.items():
+        yield f"{effect} not tested: {note}"
+
+
+def _joined(notes: Sequence[str]) -> str:
+    """Notes as one text, separated by semicolons, which none of them has itself."""
+    return "; ".join(note.replace("; ", ", ") for note in notes)
+
+
+def _row(
+    attribution: Attribution,
+    verdict: Verdict,
+    steps: Sequence,
+    worst_mm: np.ndarray,
+    further: Advice,
+    told: tuple[float | None, pd.DataFrame],
+) -> dict:
+    """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
+    stated_mm, excluded = told
+    found = [] if verdict.no_answer else _found(attribution)
+    case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
+    return {
+        "effects": verdict.label,
+        "probability": verdict.probability,
+        "leg": verdict.leg,
+        "where": where(attribution, verdict.effects),
+        "confusable_with": ", ".join(verdict.confusable_with),
+        "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
+        "searches_apart": attribution.posterior.apart,
+        "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),
+        "gap_rms_mm": steps[0].gap_rms_mm,
+        "gap_after_rms_mm": steps[-1].gap_rms_mm,
+        **dict(zip(CLOSED, share_closed(steps[0], steps[-1]), strict=True)),
+        **dict(zip(("worst_x_mm", "worst_y_mm", "worst_z_mm"), worst_mm.tolist(), strict=True)),
+        "next_runs": "; ".join(further.runs["run"]),
+        "undecided": further.undecided,
+        "noise_stated_mm": stated_mm or np.nan,
+        "noise_correlation": noise.correlation,
+        "noise_runs_mm": float(np.sqrt(noise.offset * (noise.axis_mm**2).mean())),
+        "noise_from": attribution.noise_from,
+        "points": case.count,
+        "dropped_points": attribution.dropped,
+        "notes": _joined([*found, *_notes(attribution, stated_mm, excluded), *filter(None, [further.limited])]),
+        "not_in_model": "",
+        "no_answer": verdict.no_answer,
+        "file_error_mm": np.nan,
+        "file_error_fresh_mm": np.nan,
+        "file_remainder": "",
+        "file_headline": "",
+    }
+
+
+def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attribution, tuple]:
+    """Verdict, the attribution fitted to it, and its terms with their shares in order.
+
+    The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
+    verdict without it does, by more than chance, is ruled out and the rest decides again. Beside something unexplained,
+    a part of which it may be, an effect has to make them better, and by more than a small part of the gap to be named.
+    """
+    ruled_out: set[str] = set()
+    small: frozenset[str] = frozenset()
+    while True:
+        verdict = decide(attribution.posterior, attribution.case.effects, small)
+        fitted = with_effects(attribution, verdict.effects)
+        least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
+        worse = {name for name, gain in _gains(fitted).items() if gain < least}
+        if not worse:
+            ordered = order_by_share(fitted)
+            # decided once, with all effects fitted: one that is left out would be a part of the remainder
+            if not small and (small := _small(fitted, {term.effect: share for term, share in ordered}, verdict)):
+                continue
+            return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
+        ruled_out |= worse
+        attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
+
+
+def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
+    """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
+    # shares are of positions on the robot: reflectors elsewhere may show what hardly moves these
+    if not verdict.unexplained or attribution.case.beside.any():
+        return frozenset()
+    found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
+    residual = attribution.case.residual(attribution.calibrated)[attribution.case.on_robot]
+    gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
+    alike, left_mm = followed_alike(attribution, remainder_rows(attribution), tuple(shares))
+    least = OPTIONS.min_size_per_remainder * left_mm
+    return frozenset(found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least})
+
+
+def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:
+    """The posterior without effects that have just been found worse, and all that have been ruled out.
+
+    Where every likely set holds one of them, others are looked for.
+    """
+    beliefs = attribution.posterior
+    rest = beliefs
+    for name in worse:
+        rest = rest.without(name)
+    if rest.height > beliefs.height - OPTIONS.negligible_nats:
+        return rest
+    evidence = attribution.evidence.on_library()
+    return explore(evidence, prior, ruled_out)
+
+
+def _without_effects(attribution: Attribution, prior: Prior) -> Attribution:
+    """The attribution of the calibration alone, with a posterior that has no effect of the library."""
+    names = set(attribution.case.effects)
+    return with_effects(attribution.believing(_without(attribution, names, names, prior)), ())
+
+
+def _gains(attribution: Attribution) -> dict[str, float]:
+    """Log predictive score that each effect of the hypothesis gains on left-out points over the others."""
+    terms, level = attribution.hypothesis.terms, attribution.level
+    gains = attribution.held_out.gains(terms, attribution.hypothesis.strengths[level], level)
+    return {term.effect: gain for term, gain in zip(terms, gains, strict=True)}

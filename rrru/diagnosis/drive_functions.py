@@ -1,0 +1,88 @@
+"""Errors of the drives over their own values: what the effects of a verdict make of every drive, and where most.
+
+Of a law that depends on the drive's value alone the error e(q) is drawn over the measured range, minus its mean there:
+a constant is the drive's zero, which the calibration has. With the derivatives s(q) of e(q) by the effect's numbers and
+their covariance C the 95 % band is e(q) +- 1.96 sqrt(s(q)^T C s(q)).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from rrru.diagnosis.result_tables import value_steps
+from rrru.diagnosis.terms import spread
+from rrru.estimation.intervals import QUANTILE_95
+
+# places of a drive's range: a wave of 200 a turn still has three and more
+_PLACES = 721
+_COLUMNS = ("effect", "drive", "name", "unit", "drive_value", "error", "low_95", "high_95", "worst")
+
+
+def drive_functions(attribution, names):
+    """Rows of `gap_drive_functions` without the campaign; names: of the drives.
+
+    Drives that the campaign does not move, and those that an effect does not change, have none.
+    """
+    case, fit = attribution.case, attribution.fit
+    frames = [
+        _of_drive(case, fit, term, k).assign(effect=term.effect, drive=k + 1, name=names[k], unit=unit)
+        for term in fit.terms
+        if term.effect in case.effects and case.effects[term.effect].of_drive_value
+        for k, unit in enumerate(case.mechanism.parts.units)
+    ]
+    frames = [frame for frame in frames if len(frame)]
+    return pd.concat(frames, ignore_index=True)[[*_COLUMNS]] if frames else pd.DataFrame(columns=_COLUMNS)
+
+
+def _of_drive(case, fit, term, drive):
+    """Rows of one drive under one term, none where it is not moved or not changed."""
+    effect = case.library[term.effect]
+    measured = case.motion.drive[case.used]
+    low, high = np.nanmin(measured[:, drive]), np.nanmax(measured[:, drive])
+    if not high > low:
+        return pd.DataFrame()
+    value = np.linspace(low, high, _PLACES)
+    others = np.repeat(np.nanmean(measured, axis=0)[None], _PLACES, axis=0)
+    others[:, drive] = value
+    motion = replace(case.motion, drive=others)
+    error, slopes = (_linear if effect.along_drives else _by_steps)(case, fit, term, (motion, drive))
+    if not error.any():
+        return pd.DataFrame()
+    variance = np.einsum("nk,kl,nl->n", slopes, fit.effect_covariance(term)[1], slopes)
+    half = QUANTILE_95 * np.sqrt(np.maximum(variance, 0.0))
+    worst = np.arange(_PLACES) == int(np.abs(error).argmax())
+    columns = {"drive_value": value, "error": error, "low_95": error - half, "high_95": error + half, "worst": worst}
+    return pd.DataFrame(columns)
+
+
+def _linear(case, fit, term, at):
+    """Error (n,) of a drive minus its mean, and its slopes (n, k) by a term's free numbers; the law is linear in them.
+
+    at: the Motion at n places of the drive's range, and the drive's number.
+    """
+    motion, drive = at
+    made = case.library[term.effect].along_drives(motion)
+    ends = np.cumsum([0, *(own.shape[1] for own in made)])
+    slopes = np.zeros((len(motion), ends[-1]))
+    own = slice(ends[drive], ends[drive + 1])
+    slopes[:, own] = made[drive] - made[drive].mean(axis=0)
+    free = slopes @ spread(case.library[term.effect].coordinates, term.legs)
+    return slopes @ fit.state.effects[term.effect, term.shape], free
+
+
+def _by_steps(case, fit, term, at):
+    """Error (n,) of a drive minus its mean, and its slopes (n, k) by the numbers of the effect's covariance."""
+    (motion, drive), effect, key = at, case.library[term.effect], (term.effect, term.shape)
+    part = case.mechanism.parts.drives[drive]
+
+    def error_of(values):
+        """Error (n,) of the drive under parameter values, minus its mean."""
+        number = case.mechanism.legs.site_numbers[part.site]
+        twists = np.broadcast_to(effect.contribute(motion, values).twists, (_PLACES, len(case.mechanism.legs.sites), 6))
+        change = twists[:, number] @ part.twist / (part.twist @ part.twist)
+        return change - change.mean()
+
+    fitted = effect.coordinates.to_values(fit.state.effects[key], fit.state.shape(case.library, key))
+    steps = value_steps(fit, case.library, term)
+    return error_of(fitted), np.stack([(error_of(up) - error_of(down)) / size for up, down, size in steps], axis=1)

@@ -1,0 +1,368 @@
+"""How well a hypothesis predicts the data, all its numbers averaged out: the marginal likelihood of linear models.
+
+Along each run the data d (one axis, k points) are
+
+    d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
+
+with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior), the
+effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
+of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
+O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
+of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of it.
+Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
+
+A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
+`Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.diagnosis.payload_nuisance`).
+
+An effect may lack what it needs at some readings, such as the sense in which a drive arrives: it says nothing about
+them. All sets of effects then compare on the readings at which every effect of the library has what it needs
+(`ModelEvidence.on_library`); coefficients of a set are those of the readings at which its own effects do.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial, wraps
+from itertools import product
+
+import numpy as np
+
+from rrru.cache import Latest
+from rrru.diagnosis.evidence_kernels import log_sum_exp
+from rrru.diagnosis.marginal import Average, averaged_mean
+from rrru.diagnosis.marginal_problem import Prior, Projected
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import WEIGHT, as_found, borne, gained_over_cases, mean_over_cases, over_cases
+from rrru.diagnosis.terms import EACH, SAME, spread
+from rrru.diagnosis.whitened import LEVELS, Whitened
+from rrru.estimation.noise_model import NoiseModel
+
+STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+
+
+def _on_complete(method):
+    """The method of a set of terms on the readings at which all its effects have what they need."""
+
+    @wraps(method)
+    def on_complete(self, terms, *args, **kwargs):
+        return method(self.on_complete(terms), terms, *args, **kwargs)
+
+    return on_complete
+
+
+@dataclass(frozen=True)
+class ModelEvidence:
+    """Evidence of sets of terms on one linearisation.
+
+    library: effects by name; linear: `rrru.diagnosis.state.Linear`; run (n,): the series of each row; noise: a
+    NoiseModel; smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is; known: effect
+    to the rows (n,) at which it has all that it needs, of effects that lack something somewhere. Numbers of sets with
+    such effects are those of the rows at which all of them do.
+    """
+
+    library: dict
+    linear: object
+    run: np.ndarray
+    noise: NoiseModel
+    smooth: bool = True
+    known: dict = field(default_factory=dict)
+
+    def __len__(self):
+        return len(self.run)
+
+    def on_library(self):
+        """The evidence on the readings at which every effect has what it needs, where all sets compare."""
+        return self._on(self.known)
+
+    def on_complete(self, terms):
+        """The evidence on the readings at which all effects of terms have what they need."""
+        return self._on({term.effect for term in terms} & self.known.keys())
+
+    def _on(self, names):
+        """The evidence on the readings at which some effects have what they need."""
+        needed = [self.known[name] for name in sorted(names)]
+        if not needed:
+            return self
+        rows = np.all(needed, axis=0)
+        key = rows.tobytes()
+        if key not in self._parts:
+            part = replace(self, linear=self.linear.at(rows), run=self.run[rows], known={})
+            self._parts[key] = part
+        return self._parts[key]
+
+    @cached_property
+    def _parts(self):
+        """Evidences on some of the readings that have been asked for."""
+        return {}
+
+    @cached_property
+    def _whitened(self):
+        """The columns, whitened."""
+        return Whitened(self.library, self.linear, self.run, self.noise)
+
+    @property
+    def levels(self):
+        """Levels (l,), as indices, that there may be."""
+        return np.arange(len(LEVELS)) if self.smooth else np.zeros(1, dtype=int)
+
+    @cached_property
+    def none(self):
+        """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
+        return np.array([self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(LEVELS))])
+
+    @cached_property
+    def _priors(self):
+        """Priors by term and by effect whose shape parameters are fitted, made when they are asked for."""
+        return {name: Prior.normal(self._whitened.layout[0][name]) for name in self.linear.shape_columns}
+
+    def _prior(self, term):
+        """The prior of one term's coefficients."""
+        if term not in self._priors:
+            coordinates, gram = self.library[term.effect].coordinates, np.diag(self._whitened.gram(0)[0])
+            matrix = spread(coordinates, term.legs)
+            index = self._whitened.layout[0][term.effect, term.shape, SAME if term.legs == SAME else EACH]
+            index = index if term.legs in (EACH, SAME) else index[coordinates.legs == term.legs]
+            size = matrix.T @ coordinates.typical / matrix.sum(axis=0)
+            power, total = (
+                (all_of[index] * size**2).sum() / (3.0 * len(self)) for all_of in (gram, self._whitened.whole)
+            )
+            # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
+            unit = np.sqrt(max(power, OPTIONS.min_visible_share * total, 1e-30))
+            if coordinates.sized:
+                # of many coefficients the data tell the size far better than the strengths lie apart: one is just it
+                unit = STRENGTHS[np.abs(np.log(STRENGTHS / unit)).argmin()]
+            size /= unit
+            most = np.broadcast_to(coordinates.most, len(coordinates))
+            largest = np.array([most[column > 0.0].max() for column in matrix.T])
+            self._priors[term] = Prior(index, size, largest, matrix.T @ coordinates.positive > 0)
+        return self._priors[term]
+
+    @_on_complete
+    def projected(self, terms, levels):
+        """The projected problem of a set of terms at discrepancy levels (indices)."""
+        terms = tuple(terms)
+        asked = frozenset(terms), tuple(levels)
+        made, problem = self._problems.of(asked, lambda: (terms, self._projected(terms, levels)))
+        if made == terms:
+            return problem
+        return problem.reordered([made.index(term) for term in terms], self._order(made, terms))
+
+    @_on_complete
+    def found(self, terms):
+        """Coefficients (k,) of a set of terms under weak priors, which the weight's columns are made with."""
+        terms = tuple(terms)
+        made, found = self._found.of(frozenset(terms), lambda: (terms, as_found(*self._weakly(terms))))
+        return found if made == terms else found[self._order(made, terms)]
+
+    def _weakly(self, terms):
+        """The Projected problem of terms alone at one level, and weak strengths (1, terms)."""
+        # whatever levels are asked for, it is one weight
+        return self._bare(terms, partial(self._grams, self.levels[:1])), np.full((1, len(terms)), STRENGTHS[-1])
+
+    def _order(self, made, terms):
+        """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
+        ends = np.cumsum([0, *(len(prior.index) for prior in self.priors_of(made))])
+        numbers = {key: np.arange(*ends[k : k + 2]) for k, key in enumerate(self._keys(made))}
+        return np.concatenate([numbers[key] for key in self._keys(terms)])
+
+    def _keys(self, terms):
+        """Keys of the priors of terms and after them of their shapes."""
+        return *terms, *(term.effect for term in terms if term.effect in self.linear.shape_columns)
+
+    def priors_of(self, terms):
+        """Priors of terms and after them of their shapes."""
+        count = len(terms)
+        keys = self._keys(terms)
+        return [*map(self._prior, keys[:count]), *(self._priors[effect] for effect in keys[count:])]
+
+    def _projected(self, terms, levels):
+        if not self._blocks(terms):
+            return self._bare(terms, partial(self._grams, levels))
+        return self._borne(terms, levels, self.found(terms))
+
+    def _borne(self, terms, levels, found):
+        """The Projected problem of terms and of the weight, whose columns are made with coefficients found (k,)."""
+        grams, blocks = partial(self._grams, levels), self._blocks(terms)
+        return borne(self._bare(terms, grams), len(terms), blocks, self.linear.weight_steps, found, grams)
+
+    def _bare(self, terms, grams):
+        """The Projected problem of terms without the weight."""
+        return Projected.of(self.priors_of(terms), len(terms), grams)
+
+    def _blocks(self, terms):
+        """`_by_weight` of the terms that give way, by their number."""
+        return {k: self._by_weight(t) for k, t in enumerate(terms) if (t.effect, t.shape) in self.linear.by_weight}
+
+    def _grams(self, levels, index):
+        """Gram matrices (l, k, k) and moments (l, k) of some columns at levels (indices)."""
+        grams = [self._whitened.gram(level) for level in levels]
+        return map(np.array, zip(*((g[index[:, None], index], m[index]) for g, m, _ in grams), strict=True))
+
+    def _by_weight(self, term):
+        """The matrix from a term's coefficients to coordinates, and the columns that the weight makes of these's."""
+        numbers = self._whitened.layout[0][term.effect, term.shape, WEIGHT]
+        matrix = spread(self.library[term.effect].coordinates, term.legs)
+        return matrix, numbers.reshape(-1, len(matrix))
+
+    @_on_complete
+    def over_strengths(self, terms, strengths=None, levels=None):
+        """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
+
+        strengths: grids, one per term, by default STRENGTHS for each; levels (l,): indices, by default all that may be.
+        """
+        grids = tuple(strengths or (STRENGTHS,) * len(terms))
+        combinations = np.array(list(product(*grids)))
+        levels = self.levels if levels is None else levels
+        broad = self._broadest(terms)
+        if broad is None:
+            none = np.array([self._whitened.gram(level)[2] for level in levels])
+            found = gained_over_cases(self.projected(terms, levels), combinations)
+            return none[:, None] + found, combinations
+        rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
+        rows = np.array(list(product(*others)))
+        problem = self.projected(rest, levels) if rest else None
+        values = [self._beside(terms[broad], strength, problem, rows, levels) for strength in grids[broad]]
+        values = [value.reshape(len(levels), *map(len, others)) for value in values]
+        return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
+
+    @_on_complete
+    def remaining_columns(self, terms, strengths, level):
+        """All columns other than the broad term of a set, and the problem of the set's others.
+
+        Gram matrix (K, K) of all columns; across (K, z): what the broad term takes of it, its product with its
+        transpose; moments (K,) after that; the Projected problem at the level (an index), and the prior deviations of
+        its coefficients at the strengths, both None where there is nothing else.
+        """
+        broad = self._broadest(terms)
+        gram, moment, _ = self._whitened.gram(level)
+        rest, strengths = tuple(terms), np.asarray(strengths, dtype=float)
+        across, average = np.zeros((len(moment), 0)), None
+        if broad is not None:
+            average = self._average(terms[broad], strengths[broad], level)
+            across, moment = average.across, average.moment
+            rest, strengths = (*terms[:broad], *terms[broad + 1 :]), np.delete(strengths, broad)
+        if not rest:
+            return gram, across, moment, None, None
+        problem = self.projected(rest, [level])
+        if average is not None:
+            problem = problem.on(*(part[None] for part in average.rest(problem.index)))
+        return gram, across, moment, problem, problem.scale(strengths[None])[0]
+
+    def _broadest(self, terms):
+        """Number of the term of the most coefficients if these are many, None where no term has."""
+        counts = [len(self._prior(term).index) for term in terms]
+        broad = [self.library[term.effect].coordinates.broad for term in terms]
+        wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
+        return int(np.argmax(wide)) if any(wide) else None
+
+    def _beside(self, broad, strength, problem, strengths, levels):
+        """Log evidence (levels, m) of a broad term at a strength beside other terms.
+
+        problem: the others' Projected at the levels, None where there are none; strengths (m, terms): theirs.
+        """
+        averages = [self._average(broad, strength, level) for level in levels]
+        value = np.array([self._whitened.gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[
+            :, None
+        ]
+        if problem is None:
+            return value
+        gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
+        return value + gained_over_cases(problem.on(gram, moment), strengths)
+
+    def _average(self, term, strength, level):
+        """The Average over the coefficients of a broad term at a strength and a level (an index)."""
+
+        def make():
+            gram, moment, _ = self._whitened.gram(level)
+            prior = self._prior(term)
+            # drives on which the law does not act by this term: no set has a law twice
+            apart = self._whitened.layout[0][term.effect, term.shape, EACH]
+            return Average(gram, moment, prior.index, prior.at(strength), apart)
+
+        return self._averages.of((term, float(strength), int(level)), make)
+
+    @cached_property
+    def _problems(self):
+        return Latest(OPTIONS.max_cached_results)
+
+    @cached_property
+    def _found(self):
+        return Latest(OPTIONS.max_cached_results)
+
+    @cached_property
+    def _averages(self):
+        return Latest(OPTIONS.max_cached_results)
+
+    @_on_complete
+    def over_all_strengths(self, terms, level, start=None):
+        """Log evidence of a set of terms at a level (an index) averaged over their strengths, and the best (terms,).
+
+        Of one term or two over all combinations; of more over each strength about the others' best, as if they were
+        independent of each other. start (terms,): strengths to begin from.
+        """
+        if len(terms) <= OPTIONS.max_jointly_averaged_effects:
+            value, grid = self.over_strengths(terms, levels=[level])
+            return averaged(value, len(terms))[0], grid[value[0].argmax()]
+        best = np.ones(len(terms)) if start is None else np.array(start, dtype=float)
+        losses = np.zeros(len(terms))
+        for _ in range(OPTIONS.prior_scale_sweeps):
+            before = best.copy()
+            for k, term in enumerate(terms):
+                # what is tried comes last: the others' part stands
+                others = *terms[:k], *terms[k + 1 :]
+                grids = *([strength] for strength in np.delete(best, k)), STRENGTHS
+                value, _ = self.over_strengths((*others, term), grids, [level])
+                best[k], highest = STRENGTHS[value[0].argmax()], value.max()
+                losses[k] = averaged(value, 1)[0] - highest
+            if (best == before).all():
+                break
+        return highest + losses.sum(), best
+
+    @_on_complete
+    def scales(self, terms, strengths):
+        """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
+        if not terms:
+            return np.zeros(0)
+        problem = self.projected(terms, [0])
+        return problem.scale(np.asarray(strengths)[None])[0, problem.owner < len(terms)]
+
+    def explained(self, hypothesis, effects):
+        """Rms per axis, over sigma, of what some effects of a hypothesis explain at its best, calibration taken out."""
+        if hypothesis.effects.isdisjoint(effects):
+            return 0.0
+        level = int(hypothesis.evidence.argmax())
+        mean = self._mean(hypothesis.terms, hypothesis.strengths[level], level)
+        problem = self.projected(hypothesis.terms, [0])
+        chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
+        mean = np.where(chosen[problem.owner], mean, 0.0)
+        return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self.on_complete(hypothesis.terms)))))
+
+    @_on_complete
+    def _mean(self, terms, strengths, level):
+        """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
+        broad = self._broadest(terms)
+        if broad is None:
+            return mean_over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
+        rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
+        index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
+        if rest:
+            problem = self.projected(rest, [level])
+            index = problem.index
+            problem = problem.on(*(p[None] for p in self._average(terms[broad], strengths[broad], level).rest(index)))
+            found = mean_over_cases(problem, np.delete(strengths, broad)[None])
+        gram, moment, _ = self._whitened.gram(level)
+        others = found if problem is None or problem.mix is None else problem.mix @ found
+        own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, others)
+        before = sum(len(self._prior(term).index) for term in terms[:broad])
+        return np.concatenate([found[:before], own, found[before:]])
+
+    @_on_complete
+    def coefficients(self, terms, strengths, level):
+        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).
+
+        The mean obeys the positive coefficients; the covariance does not know of them.
+        """
+        return over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
+
+
+def averaged(value, terms):
+    """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""
+    return log_sum_exp(value) - terms * np.log(len(STRENGTHS))

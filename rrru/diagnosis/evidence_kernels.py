@@ -1,0 +1,323 @@
+"""Inner loops of the evidence, all compiled functions in one file: Numba's cache does not see changes of other files.
+
+The evidence of normal coefficients is that of their Cholesky factor. Non-negative ones, whose priors are halved, add
+the logarithm of 2^p P, where P is the probability that they are positive under the posterior of the untruncated
+coefficients; `tests.diagnosis.orthant` has its equations.
+"""
+
+import math
+
+import numba
+import numpy as np
+from scipy import special
+
+# standard deviations above zero from which a condition is certain: its probability is 1 - 3e-5
+_CERTAIN_Z = 4.0
+# standard deviations from zero between which moments come from a table, and its entries per standard deviation
+_LOW_Z, _HIGH_Z, _PER_Z = -30.0, 9.0, 32
+# relative change of a variance below which a factor stays, and updates of each: log P is stationary in the factors
+_LOG_TOLERANCE, _MAX_LOG_SWEEPS = 0.02, 30
+# smallest share of a precision that rounding leaves without the coefficient's own factor
+_MIN_CAVITY = 1e-10
+# product of pivots at which its logarithm is taken, far from overflow
+_MAX_PRODUCT = 1e200
+# columns of expectation propagation: precision and shift of a factor; of the coefficient without its factor (cavity)
+# precision, standard deviation, mean over that, log probability of the condition, and mean and variance under the
+# condition over that deviation; mean without any factor
+_FACTOR, _SHIFT, _CAVITY, _DEVIATION, _Z, _LOG, _MEAN, _VARIANCE, _START = range(9)
+COLUMNS = 9
+
+
+@numba.njit(cache=True, error_model="numpy")
+def log_ndtr(x):
+    """Logarithm of the standard normal distribution function."""
+    if x > -30.0:
+        return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
+    # the tail's asymptotic series (Abramowitz and Stegun 26.2.12), good to 1e-7 here
+    return -0.5 * x * x - math.log(-x) - 0.5 * math.log(2.0 * math.pi) - 1.0 / x**2 + 2.5 / x**4
+
+
+def _tabulate():
+    """Logarithm (n,) of the normal distribution function and its derivative, the inverse Mills ratio (n,)."""
+    z = np.linspace(_LOW_Z, _HIGH_Z, round((_HIGH_Z - _LOW_Z) * _PER_Z) + 1)
+    log = special.log_ndtr(z)
+    return np.column_stack([log, np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log)])
+
+
+_TABLE = _tabulate()
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _truncate(z):
+    """Log probability of y > 0 with y ~ N(z, 1), and mean and variance of y under that condition.
+
+    By cubic interpolation between values and derivatives of a table, good to 1e-8.
+    """
+    if z >= _HIGH_Z:
+        return 0.0, z, 1.0
+    if z < _LOW_Z:
+        u = 1.0 / (z * z)
+        return log_ndtr(z), -(1.0 - 2.0 * u + 10.0 * u * u) / z, u * (1.0 - 6.0 * u + 50.0 * u * u)
+    place = (z - _LOW_Z) * _PER_Z
+    i = int(place)
+    t = place - i
+    low, high = z - t / _PER_Z, z + (1.0 - t) / _PER_Z
+    log, r, s = _TABLE[i, 0], _TABLE[i, 1], _TABLE[i + 1, 1]
+    up, left, right = t * t * (3.0 - 2.0 * t), t * (1.0 - t) * (1.0 - t) / _PER_Z, -t * t * (1.0 - t) / _PER_Z
+    log += up * (_TABLE[i + 1, 0] - log) + left * r + right * s
+    # the ratio's own derivative is -ratio (z + ratio)
+    ratio = r + up * (s - r) - left * r * (low + r) - right * s * (high + s)
+    mean = z + ratio
+    return log, mean, 1.0 - ratio * mean
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _cumulants(z, mean, variance):
+    """Skewness and excess kurtosis of y ~ N(z, 1) under y > 0, where its mean and variance are known."""
+    if z < _LOW_Z:
+        # those of the exponential distribution
+        return 2.0, 6.0
+    r = mean - z
+    third = r * (mean * (mean + r) - 1.0)
+    fourth = -r * (z * z * z + 7.0 * z * z * r + 12.0 * z * r * r + 6.0 * r * r * r - 3.0 * z - 4.0 * r)
+    return third / (variance * math.sqrt(variance)), fourth / (variance * variance)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _find_least_probable(mean, covariance, order, count):
+    """Place in the order of the least probable coefficient without a factor, -1 where all these are certain."""
+    best, lowest = -1, _CERTAIN_Z
+    for place in range(count, len(order)):
+        i = order[place]
+        z = mean[i] / math.sqrt(covariance[i, i])
+        if z < lowest:
+            best, lowest = place, z
+    return best
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _multiply(mean, covariance, i, precision, shift):
+    """Multiply a normal density by exp(-precision x_i^2 / 2 + shift x_i), in place; returns the variance's ratio."""
+    p, ratio = len(mean), 1.0 + precision * covariance[i, i]
+    step, own, inverse = (shift - precision * mean[i]) / ratio, precision / ratio, 1.0 / ratio
+    for r in range(p):
+        mean[r] += covariance[i, r] * step
+        if r != i:
+            factor = own * covariance[i, r]
+            for c in range(r + 1):
+                if c != i:
+                    covariance[r, c] -= factor * covariance[i, c]
+                    covariance[c, r] = covariance[r, c]
+    for r in range(p):
+        covariance[i, r] *= inverse
+        covariance[r, i] = covariance[i, r]
+    return ratio
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def match_factors(mean, covariance, order, state, tolerance, sweeps):
+    """Find factors that match the moments, and multiply a normal density, mean (p,) and covariance (p, p), by them.
+
+    order (p,), state (p, COLUMNS): overwritten by the coefficients' numbers, those with a factor first, and by what is
+    known of each factor; tolerance: relative change of a variance below which a factor stays; sweeps: most updates of
+    each. Returns how many coefficients have a factor, and log |I + C diag(t)|.
+    """
+    p = len(mean)
+    for i in range(p):
+        order[i], state[i, _FACTOR], state[i, _SHIFT], state[i, _START] = i, 0.0, 0.0, mean[i]
+    count, place, unchanged, determinant = 0, 0, 0, 0.0
+    for _ in range(sweeps * p):
+        if place == count:
+            place = _find_least_probable(mean, covariance, order, count)
+            if place >= 0:
+                order[count], order[place] = order[place], order[count]
+                place, count, unchanged = count, count + 1, 0
+            else:
+                place = 0
+        if unchanged >= count:
+            break
+        i = order[place]
+        place += 1
+        total, factor = 1.0 / covariance[i, i], state[i, _FACTOR]
+        cavity = max(total - factor, _MIN_CAVITY * total)
+        deviation = 1.0 / math.sqrt(cavity)
+        z = (mean[i] * total - state[i, _SHIFT]) * deviation
+        log, matched, variance = _truncate(z)
+        state[i, _CAVITY], state[i, _DEVIATION], state[i, _Z] = cavity, deviation, z
+        state[i, _LOG], state[i, _MEAN], state[i, _VARIANCE] = log, matched, variance
+        more = max(cavity / variance - cavity, 0.0) - factor
+        if abs(more) < tolerance * total:
+            unchanged += 1
+            continue
+        # a factor that has just changed matches
+        unchanged = 1
+        step = (matched / variance - z) / deviation - state[i, _SHIFT]
+        determinant += math.log(_multiply(mean, covariance, i, more, step))
+        state[i, _FACTOR] += more
+        state[i, _SHIFT] += step
+    return count, determinant
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def log_orthant(mean, covariance, order, state):
+    """Log probability that x ~ N(mean, covariance) is positive, and the correction that it contains.
+
+    mean (p,), covariance (p, p), order (p,), state (p, COLUMNS): overwritten.
+    """
+    if len(mean) == 1:
+        return log_ndtr(mean[0] / math.sqrt(covariance[0, 0])), 0.0
+    count, determinant = match_factors(mean, covariance, order, state, _LOG_TOLERANCE, _MAX_LOG_SWEEPS)
+    total, correction = -0.5 * determinant, 0.0
+    for place in range(count):
+        i = order[place]
+        factor, shift, cavity, z = state[i, _FACTOR], state[i, _SHIFT], state[i, _CAVITY], state[i, _Z]
+        joint, both = z / state[i, _DEVIATION] + shift, cavity + factor
+        # the integral of a factor over the density without it is the probability of the condition
+        total += state[i, _LOG] + 0.5 * (math.log(both / cavity) + z * z - joint * joint / both)
+        total += 0.5 * ((shift - factor * mean[i]) * state[i, _START] + mean[i] * shift)
+        state[i, _MEAN], state[i, _VARIANCE] = _cumulants(z, state[i, _MEAN], state[i, _VARIANCE])
+        state[i, _DEVIATION] = 1.0 / math.sqrt(covariance[i, i])
+        for q in range(place):
+            j = order[q]
+            r = covariance[i, j] * state[i, _DEVIATION] * state[j, _DEVIATION]
+            third, fourth = state[i, _MEAN] * state[j, _MEAN], state[i, _VARIANCE] * state[j, _VARIANCE]
+            correction += r * r * r * (third / 6.0 + r * fourth / 24.0)
+    return total + correction, correction
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _factorize(gram, moment, scale, first, low, half, squares, logs):
+    """Cholesky factor L of I + S gram S with S = diag(scale), and half = L^-1 S moment, from row first on.
+
+    gram (k, k), moment, scale (k,); low (k, k): L, on its diagonal reciprocals; half (k,); squares (k + 1,): sums of
+    squares of the entries of half before each; logs (k + 1, 2): sums of the pivots' logarithms before each, and a
+    product of pivots whose logarithm is yet to be added.
+    """
+    for r in range(first, len(half)):
+        for c in range(r):
+            entry = scale[r] * scale[c] * gram[r, c]
+            for q in range(c):
+                entry -= low[r, q] * low[c, q]
+            low[r, c] = entry * low[c, c]
+        pivot = 1.0 + scale[r] * scale[r] * gram[r, r]
+        entry = scale[r] * moment[r]
+        for q in range(r):
+            pivot -= low[r, q] * low[r, q]
+            entry -= low[r, q] * half[q]
+        # pivots of the identity plus a Gram matrix are at least 1; rounding must not make them less
+        pivot = max(pivot, 1.0)
+        low[r, r] = 1.0 / math.sqrt(pivot)
+        half[r] = entry * low[r, r]
+        squares[r + 1] = squares[r] + half[r] * half[r]
+        logs[r + 1, 0], logs[r + 1, 1] = logs[r, 0], logs[r, 1] * pivot
+        if logs[r + 1, 1] > _MAX_PRODUCT:
+            logs[r + 1, 0] += math.log(logs[r + 1, 1])
+            logs[r + 1, 1] = 1.0
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def _find_moments(low, half, index, first, inverse, mean, covariance):
+    """Mean (p,) and covariance (p, p) of the coefficients index (p,) under the posterior of untruncated ones.
+
+    low, half: of `_factorize`; inverse (p, k): columns of L^-1, of which rows before the first are up to date.
+    """
+    k = len(half)
+    for a in range(len(index)):
+        column = index[a]
+        if column >= first:
+            inverse[a, column] = low[column, column]
+        for r in range(max(column + 1, first), k):
+            entry = 0.0
+            for q in range(column, r):
+                entry -= low[r, q] * inverse[a, q]
+            inverse[a, r] = entry * low[r, r]
+        entry = 0.0
+        for r in range(column, k):
+            entry += inverse[a, r] * half[r]
+        mean[a] = entry
+        for b in range(a + 1):
+            entry = 0.0
+            for r in range(column, k):
+                entry += inverse[a, r] * inverse[b, r]
+            covariance[a, b] = covariance[b, a] = entry
+
+
+@numba.njit(cache=True, error_model="numpy")
+def log_evidence_and_correction(gram, moment, scale, positive):
+    """`log_evidence` (v, m), and the correction (v, m) of the probability of non-negative coefficients in it."""
+    v, k = moment.shape
+    m, index = scale.shape[0], np.flatnonzero(positive)
+    p = len(index)
+    result, corrections = np.empty((v, m)), np.zeros((v, m))
+    low, half, squares, logs = np.zeros((k, k)), np.empty(k), np.zeros(k + 1), np.zeros((k + 1, 2))
+    logs[0, 1] = 1.0
+    inverse, mean, covariance = np.zeros((p, k)), np.empty(p), np.empty((p, p))
+    order, state = np.empty(p, dtype=np.int64), np.empty((p, COLUMNS))
+    for level in range(v):
+        for j in range(m):
+            # rows of the factor stand as long as no scale up to them changes
+            first = 0
+            while j > 0 and first < k and scale[j, first] == scale[j - 1, first]:
+                first += 1
+            _factorize(gram[level], moment[level], scale[j], first, low, half, squares, logs)
+            total = 0.5 * (squares[k] - logs[k, 0] - math.log(logs[k, 1]))
+            if p:
+                _find_moments(low, half, index, first, inverse, mean, covariance)
+                probability, corrections[level, j] = log_orthant(mean, covariance, order, state)
+                total += probability + p * math.log(2.0)
+            result[level, j] = total
+    return result, corrections
+
+
+@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive):
+    """Log evidence (b, m) of each of several blocks of columns alone, at m prior deviations.
+
+    gram (k, k) less across (k, x) times its transpose, and moment (k,): of all columns; numbers (n,): columns of the
+    blocks one after another, which end at ends (b + 1,), 0 first; scale (m, n), positive (n,): as in `log_evidence`.
+    """
+    result = np.empty((len(ends) - 1, len(scale)))
+    for b in range(len(ends) - 1):
+        first, size = ends[b], ends[b + 1] - ends[b]
+        own, target = np.empty((1, size, size)), np.empty((1, size))
+        for r in range(size):
+            i = numbers[first + r]
+            target[0, r] = moment[i]
+            for c in range(r + 1):
+                j = numbers[first + c]
+                entry = gram[i, j]
+                for q in range(across.shape[1]):
+                    entry -= across[i, q] * across[j, q]
+                own[0, r, c] = own[0, c, r] = entry
+        deviation, kinds = scale[:, first : first + size].copy(), positive[first : first + size]
+        result[b] = log_evidence_and_correction(own, target, deviation, kinds)[0][0]
+    return result
+
+
+def log_evidence(gram, moment, scale, positive):
+    """Logarithm of the evidence of k normal coefficients over that of zero coefficients.
+
+    gram (v, k, k), moment (v, k): of the whitened columns, for v noise levels; scale (m, k): prior standard deviations;
+    positive (k,): coefficients that cannot be negative, whose prior is half-normal. Returns (v, m).
+    """
+    if np.count_nonzero(positive) < 2:
+        return log_evidence_and_correction(gram, moment, scale, positive)[0]
+    # strengths that a law's largest size caps have the same deviations, and moments take long
+    distinct, which = _distinct(scale)
+    return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
+
+
+def _distinct(rows):
+    """Numbers (d,) of the first of each of the distinct rows (m, k), and which of these each row is (m,)."""
+    first = {}
+    which = [first.setdefault(row.tobytes(), len(first)) for row in rows]
+    return np.unique(which, return_index=True)[1], which
+
+
+def log_sum_exp(value):
+    """Logarithm of the sums of exponentials along the last axis: scipy's, without what it costs on small arrays."""
+    top = value.max(axis=-1, keepdims=True)
+    largest = value == top
+    count = largest.sum(axis=-1)
+    rest = np.exp(np.where(largest, -np.inf, value) - top).sum(axis=-1)
+    return np.log1p(rest / count) + np.log(count) + top[..., 0]

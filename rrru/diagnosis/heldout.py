@@ -1,0 +1,217 @@
+"""What a hypothesis predicts of points that it was not fitted on."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import block_diag, cho_solve, solve_triangular
+
+from rrru.campaign.noise import along_runs
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.terms import signatures
+from rrru.diagnosis.terms import spread as spread_of
+from rrru.diagnosis.whitened import levels_of, spectrum
+from rrru.estimation.cross_validation import CrossValidation, choose_folds
+from rrru.estimation.noise_model import half_waves, lengths
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predictions of left-out points.
+
+    residual_mm (n, 3): what they get wrong; spread (n, 3, k): the part of it that one standard deviation of each of k
+    independent combinations of the fitted numbers makes; left_mm2 (n, 3): variance of what no fit predicts, noise and
+    discrepancy, along the cosines of the series (n,) where these are told, else at each point.
+    """
+
+    residual_mm: np.ndarray
+    spread: np.ndarray
+    left_mm2: np.ndarray
+    series: np.ndarray | None = None
+
+    @property
+    def uncertainty_mm2(self):
+        """Expected squared distance (n,) between prediction and truth if the hypothesis holds."""
+        return (self.spread**2).sum(axis=(1, 2))
+
+    @property
+    def log_score(self):
+        """Log predictive score (n,) under noise, discrepancy and the prediction's own uncertainty."""
+        residual, spread = self.coordinates
+        return _log_score(residual, self.left_mm2 + (spread**2).sum(axis=-1))
+
+    @property
+    def coordinates(self):
+        """Residuals (n, 3) and their spread (n, 3, k) as they are scored.
+
+        Of series they are those of the cosines, whose scores have the points' sum over a series: what is smooth along a
+        run is one thing to foretell and not one at every point.
+        """
+        if self.series is None:
+            return self.residual_mm, self.spread
+        together, _ = along_runs(np.concatenate([self.residual_mm[..., None], self.spread], axis=-1), self.series)
+        return together[..., 0], together[..., 1:]
+
+
+def _log_score(residual, variance):
+    """`Prediction.log_score` (n,) of residuals (n, 3) with their variance (n, 3)."""
+    return -0.5 * (residual**2 / variance + np.log(variance)).sum(axis=-1)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Predictions of every used reading of a case from those of the other folds, on one linearisation."""
+
+    case: Case
+    evidence: ModelEvidence
+
+    @cached_property
+    def fold(self):
+        """Fold numbers (m,) whose complements determine the calibration, see `rrru.estimation.cross_validation`.
+
+        Runs where every trajectory was driven more than once. Else five interleaved stretches: leaving out the only
+        run of a kind would ask for extrapolation, which says nothing about the effect. Where these leave a parameter
+        to one fold alone, as of a target that was seen at a few stops, every fifth stop.
+        """
+        white = self.evidence.linear.base / self.case.noise_mm
+        return choose_folds(self._candidates(), white)
+
+    def _candidates(self):
+        """Fold numbers (m,), the ones that ask for most first."""
+        frame, run = self.case.points, self.case.run
+        if (frame.groupby("trajectory")["run"].nunique() > 1).all():
+            yield np.unique(run, return_inverse=True)[1] % OPTIONS.max_run_folds
+        place = within(run, self.case.stop)
+        for length in (OPTIONS.points_per_stretch, 1):
+            yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]
+
+    def predict(self, terms, strengths, level, uncertain=True):
+        """Prediction by the calibration together with a set of terms.
+
+        The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
+        effect models as they are. uncertain: state the prediction's spread, too.
+        """
+        linear = self.evidence.linear
+        together = np.concatenate(self._blocks(terms), axis=-1)
+        residual, spread = np.empty_like(linear.data), np.empty_like(together if uncertain else linear.base[..., :0])
+        for number, fit in self._fits(terms, strengths, level).items():
+            out = self.fold == number
+            residual[out] = linear.data[out] - together[out] @ fit.mean
+            if uncertain:
+                spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
+        return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
+
+    def gains(self, terms, strengths, level):
+        """Log predictive score that each of the terms adds to that of the others, at these strengths.
+
+        Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
+        then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
+
+        Readings at which a term lacks what it needs do not count.
+        """
+        part = self.on_complete(terms)
+        if part is not self:
+            return part.gains(terms, strengths, level)
+        whole, fits = self.predict(terms, strengths, level), self._fits(terms, strengths, level)
+        residuals, spread = whole.coordinates
+        variances = whole.left_mm2 + (spread**2).sum(axis=-1)
+        result, score = [], _log_score(residuals, variances).sum()
+        for first, last in pairwise(np.cumsum([block.shape[-1] for block in self._blocks(terms)])):
+            residual, variance = residuals.copy(), variances.copy()
+            for number, fit in fits.items():
+                out = self.fold == number
+                half = fit.half(np.eye(len(fit.mean))[first:last])
+                root, moved = np.linalg.cholesky(half.T @ half), spread[out] @ half
+                residual[out] += moved @ cho_solve((root, True), fit.mean[first:last])
+                taken = solve_triangular(root, moved.reshape(-1, last - first).T, lower=True, check_finite=False)
+                variance[out] -= (taken**2).sum(axis=0).reshape(-1, 3)
+            result.append(float(score - _log_score(residual, variance).sum()))
+        return result
+
+    def on_complete(self, terms):
+        """The predictions of the readings at which all effects of terms have what they need."""
+        evidence = self.evidence.on_complete(terms)
+        if evidence is self.evidence:
+            return self
+        return HeldOut(self.case.at_complete({term.effect for term in terms}), evidence)
+
+    def _blocks(self, terms):
+        """Columns (n, 3, k) of the calibration and of each term."""
+        linear = self.evidence.linear
+        return [linear.base, *signatures(self.evidence.library, linear, terms)]
+
+    def _fits(self, terms, strengths, level):
+        """ComplementFit of calibration and terms by the number of the fold that is left out."""
+        linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
+        sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
+        places, mixing = [np.arange(count)], [np.eye(count)]
+        for term in terms:
+            places.append(self._places[term.effect, term.shape])
+            mixing.append(spread_of(self.evidence.library[term.effect].coordinates, term.legs))
+        precision = np.concatenate([sd, self.evidence.scales(terms, strengths)]) ** -2.0
+        moment = np.zeros(len(precision))
+        moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
+        return self._at(level).fits(np.concatenate(places), block_diag(*mixing), precision, moment)
+
+    def _at(self, level):
+        """The CrossValidation of all columns and the data at a level (an index), made once."""
+        if level not in self._made:
+            linear = self.evidence.linear
+            together = np.concatenate([linear.base, *linear.columns.values(), linear.data[..., None]], axis=-1)
+            if self._whole_runs:
+                together, _ = along_runs(together, self.case.series)
+            white = together / np.sqrt(self._left(level))[..., None]
+            self._made[level] = CrossValidation.of(white, self.fold)
+        return self._made[level]
+
+    @cached_property
+    def _made(self):
+        """CrossValidation by level."""
+        return {}
+
+    @cached_property
+    def _places(self):
+        """Places of the columns of an effect (name, shape) among all."""
+        linear = self.evidence.linear
+        ends = np.cumsum([linear.base.shape[-1], *(columns.shape[-1] for columns in linear.columns.values())])
+        return {key: np.arange(*place) for key, place in zip(linear.columns, pairwise(ends), strict=True)}
+
+    @cached_property
+    def _whole_runs(self):
+        """Whether every fold is of whole runs."""
+        run = self.case.series
+        return all(len(np.unique(self.fold[run == label])) == 1 for label in np.unique(run))
+
+    def _left(self, level):
+        """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
+        noise, series = self.evidence.noise, self.case.series
+        misfit = (noise.mean_mm * levels_of(noise)[level]) ** 2
+        if not self._whole_runs:
+            size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
+            return np.broadcast_to(size, self.evidence.linear.data.shape)
+        waves = half_waves(series)
+        return noise.variance(waves, lengths(series)) + misfit * spectrum(waves)[:, None]
+
+
+def within(run, at):
+    """Number (m,) from 0 on of the stop in its run (m,); at (m,): at which stop of the campaign each row was read."""
+    result = np.empty(len(run), dtype=int)
+    for label in np.unique(run):
+        result[run == label] = np.unique(at[run == label], return_inverse=True)[1]
+    return result
+
+
+def resampled_rows(case, generator, draws):
+    """Rows (draws, m) of a case resampled by runs, or by stretches of five points where there are few runs."""
+    block = run = case.run
+    if len(np.unique(run)) < OPTIONS.min_resampled_runs:
+        block = run * (len(run) + 1) + within(run, case.stop) // OPTIONS.points_per_stretch
+    groups = [np.flatnonzero(block == label) for label in dict.fromkeys(block.tolist())]
+    result = np.empty((draws, len(run)), dtype=int)
+    for k in range(draws):
+        drawn = generator.integers(len(groups), size=2 * len(groups))
+        result[k] = np.resize(np.concatenate([groups[g] for g in drawn]), len(run))
+    return result

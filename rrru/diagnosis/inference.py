@@ -1,0 +1,306 @@
+"""Which effects cause the gap: calibrate, look for the best set, fit it on the exact sim, look again from there."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from rrru.campaign import noise
+from rrru.campaign.outliers import isolated
+from rrru.diagnosis.calibrate import calibrate, origin
+from rrru.diagnosis.detectability import with_seen
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.drive_spectra import with_spectra
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.harmonic_orders import with_orders
+from rrru.diagnosis.heldout import HeldOut
+from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.model_fit import EffectModel, ModelFit, fit_model
+from rrru.diagnosis.model_space import ModelSpace
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.state import State
+from rrru.diagnosis.terms import each_leg
+from rrru.diagnosis.whitened import LEVELS, spectrum
+from rrru.errors import FitError
+from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
+
+# what is told of the noise
+KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """What the search has found.
+
+    origin: State that calibrations start from; calibrated: of the calibration alone, under the noise that was found;
+    fit: ModelFit of the hypothesis at its discrepancy level; evidence: on the last linearisation;
+    posterior over all hypotheses; hypothesis, level: the best one and its discrepancy level; noise_from: "given",
+    "repeats" or "fitted"; dropped: number of points left out as outliers.
+    """
+
+    case: Case
+    origin: State
+    calibrated: State
+    fit: ModelFit
+    evidence: ModelEvidence
+    posterior: Posterior
+    hypothesis: Hypothesis
+    level: int
+    noise_from: str = "given"
+    dropped: int = 0
+
+    @property
+    def state(self):
+        """The State of the fit."""
+        return self.fit.state
+
+    @cached_property
+    def held_out(self):
+        """Predictions of left-out points."""
+        return HeldOut(self.case, self.evidence)
+
+    def believing(self, beliefs):
+        """The attribution with another posterior and its best hypothesis; the fit stays."""
+        hypothesis, level = beliefs.best()
+        return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
+
+
+def with_arm(case, noise_mm=None, noise_rad=None):
+    """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
+    if not (noise_mm and noise_rad):
+        linear, columns = _few(case, calibrate(case))
+        both = (case.positions, ~case.positions)
+        found, turned = (high_frequency_noise(linear.data, columns, case.series, chosen) for chosen in both)
+        noise_mm = noise_mm or noise.quieter_repeats(case.measurements[case.used], found) or found
+        noise_rad = noise_rad or turned / case.arm_mm
+    return replace(case, arm_mm=noise_mm / noise_rad)
+
+
+def with_beside(case):
+    """The case with reflectors beside the robot counted by what everything fitted leaves of them and of the others."""
+    if not case.beside.any() or case.beside.all():
+        return case
+    linear, columns = _few(case, calibrate(case))
+    flat = columns.reshape(linear.data.size, -1)
+    size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+    fitted = flat / size @ np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
+    squares = ((linear.data.ravel() - fitted).reshape(-1, 3) ** 2).sum(axis=1)
+    others = case.positions & ~case.beside
+    return replace(case, beside_scale=float(np.sqrt(squares[others].mean() / max(squares[case.beside].mean(), 1e-12))))
+
+
+def with_noise(case, linear, stated_mm):
+    """The case under the noise that is left of a linearisation when all that may be has been fitted, and where from.
+
+    "fitted", see `rrru.estimation.noise_model`, or "repeats" where poses that were measured again say clearly less.
+    """
+    repeats, complete = noise.repeat_noise(case.measurements[case.used]), case.complete(case.library)
+    if 3 * complete.sum() < linear.base.shape[-1] + MIN_FREE_NUMBERS:
+        complete[:] = True
+    columns = _noise_columns(case, linear, bool(stated_mm) or repeats[1] >= noise.ENOUGH_REPEATS)
+    # an effect that acts where it is unknown how is no noise
+    data, columns, series = linear.data[complete], columns[complete], case.series[complete]
+    model = fit_noise(data, columns, series, stated_mm, repeats, spectrum if case.along_paths else None)
+    model = replace(model, alike=alike(data, columns, case.stop[complete], case.kind[complete]))
+    repeated = noise.quieter_repeats(case.measurements[case.used], model.mean_mm, model.correlation)
+    if repeated is not None:
+        return case.under(replace(model, axis_mm=model.axis_mm * repeated / model.mean_mm)), "repeats"
+    return case.under(model), "fitted"
+
+
+def _noise_columns(case, linear, known):
+    """Columns (m, 3, k) that may explain the readings while the noise is estimated.
+
+    All of the library; where these leave too few numbers without effects of many coefficients, then each effect in the
+    shape alone that fits best, then without unknown functions. known: whether the noise is known otherwise, so that no
+    number needs to be left; where it is not and the library explains everything, what the calibration leaves has to do.
+    """
+    blocks = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+    for chosen in _fewer_blocks(linear, blocks, case.library):
+        columns = np.concatenate([linear.base, *chosen.values(), *linear.shape_columns.values()], axis=-1)
+        if linear.data.size - columns.shape[-1] >= max(MIN_FREE_NUMBERS, OPTIONS.min_free_share * linear.data.size):
+            return columns
+    return columns if known else linear.base
+
+
+def _fewer_blocks(linear, blocks, library):
+    """Blocks of columns by (effect, shape), in steps fewer of them."""
+    yield blocks
+    few = {key: one for key, one in blocks.items() if not library[key[0]].coordinates.broad}
+    yield few
+    fitting = _best_shapes(linear, few)
+    yield fitting
+    yield {key: one for key, one in fitting.items() if key[0] not in UNKNOWN}
+
+
+def _best_shapes(linear, blocks):
+    """Of each effect the block of columns that leaves least of the data together with the calibration."""
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    best = {}
+    for key, columns in blocks.items():
+        flat = columns.reshape(linear.data.size, -1)
+        flat = flat - basis @ (basis.T @ flat)
+        size = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
+        own = np.linalg.lstsq(flat / size, linear.data.ravel(), rcond=1e-9)[0]
+        explained = float(((flat / size @ own) ** 2).sum())
+        if explained > best.get(key[0], (-np.inf, None))[0]:
+            best[key[0]] = explained, key
+    return {key: blocks[key] for _, key in best.values()}
+
+
+def _few(case, calibrated):
+    """The linearisation about a calibration, and the columns (m, 3, k) of all but laws of many coefficients.
+
+    Too few points to fit everything: what the calibration leaves has to do.
+    """
+    few = {name: effect for name, effect in case.library.items() if not effect.coordinates.broad}
+    linear = replace(case, library=few).linearise(calibrated)
+    columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
+    return linear, (columns if columns.shape[-1] <= len(case) else linear.base)
+
+
+def attribute(case, prior, stated=KNOWN):
+    """Attribution of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
+    total = case.count
+    for cleaning in range(OPTIONS.max_outlier_rounds + 1):
+        calibrated = calibrate(case)
+        if stated == UNKNOWN_NOISE:
+            # spikes would pass for noise
+            outliers = isolated(case.residual(calibrated), case.series, 0.0, case.kind)
+            # what arrived from the other side than its neighbours is no outlier
+            outliers &= case.complete(case.library)
+            if outliers.any():
+                case = case.without(outliers)
+                calibrated = calibrate(case)
+        case = case.standing(calibrated)
+        attribution = _rounds(case, calibrated, prior, stated)
+        found = attribution.case
+        outliers = isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
+        if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
+            break
+        case = case.without(outliers)
+    return replace(attribution, dropped=total - case.count)
+
+
+def with_effects(attribution, effects):
+    """The attribution with hypothesis and fit of exactly the named effects; the posterior stays."""
+    same = attribution.hypothesis.effects == frozenset(effects)
+    known = (attribution.hypothesis, attribution.level) if same else attribution.posterior.best_of(frozenset(effects))
+    if known is None:
+        terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
+        found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+        for each in attribution.evidence.levels:
+            found[each], strengths[each] = attribution.evidence.over_all_strengths(terms, each)
+        # what an unknown function explains with them is a discrepancy without it
+        known = Hypothesis(terms, found, strengths), int(found.argmax())
+    hypothesis, level = known
+    starts = (attribution.fit.state, attribution.origin) if hypothesis.terms else (attribution.calibrated,)
+    fit = fit_hypothesis(attribution.case, attribution.evidence, starts, (hypothesis, level), attribution.fit)
+    case = attribution.case.with_approach(fit.state)
+    return replace(attribution, case=case, hypothesis=hypothesis, level=level, fit=fit)
+
+
+def fit_hypothesis(case, evidence, starts, chosen, known=None):
+    """ModelFit of a hypothesis at a level (an index), under the priors that the evidence has chosen for it.
+
+    It is fitted to the readings at which all its effects have what they need. Where one value for all legs is probable
+    enough each leg still gets its own: that they are equal is not known, and the errors say so. chosen: both; known: a
+    ModelFit that may be the one asked for.
+    """
+    hypothesis, level = chosen
+    case, terms = case.at_complete(hypothesis.effects), tuple(map(each_leg, hypothesis.terms))
+    scales = evidence.scales(terms, hypothesis.strengths[level])
+    if known and known.level == level and known.model.same_as(EffectModel(case, terms, scales)):
+        return known
+    return fit_model(case, starts, terms, scales, level)
+
+
+class _Looks:
+    """What one sees of a case at a state: laws found in it, columns at the state, the noise; once for each call."""
+
+    def __init__(self, stated, stated_mm):
+        self._stated, self._stated_mm = stated, stated_mm
+        self._source = None
+
+    def at(self, case, state, terms=()):
+        """Case with its laws and noise, its linearisation at a state with a hypothesis' terms, the noise's source."""
+        linear = case.linearise(state)
+        case, orders = with_orders(case, linear, terms)
+        case, waves = with_spectra(case, linear, terms)
+        kept = {key: columns for key, columns in linear.columns.items() if key[0] in case.library}
+        linear = replace(linear, columns=kept)
+        if orders or waves:
+            linear = replace(linear, columns=kept | case.linearise(state, [*orders, *waves]).columns)
+        if self._stated == KNOWN:
+            return case, linear, "given"
+        # many columns take long to be projected out, and leave the same wherever they are taken
+        if self._source and any(effect.coordinates.broad for effect in case.library.values()):
+            return case, linear, self._source
+        under, self._source = with_noise(case, linear, self._stated_mm if self._stated == STATED else None)
+        return under, linear, self._source
+
+
+def _bends(case, linear, state, fitted):
+    """Whether the exact sim at a fitted state without shapes is off what a linearisation about a state says there."""
+    said = linear.data - linear.base @ (fitted.deviations - state.deviations)
+    said = said - sum(linear.columns[key] @ numbers for key, numbers in fitted.effects.items())
+    return np.sqrt(((case.residual(fitted) - said) ** 2).mean()) > OPTIONS.max_nonlinearity_per_noise * case.noise_mm
+
+
+def _rounds(case, calibrated, prior, stated):
+    """Search and fit in turn until a hypothesis is the best one again."""
+    looks, seen, start = _Looks(stated, case.noise_mm), set(), origin(case)
+    case, linear, source = looks.at(case, calibrated)
+    case, linear = with_seen(case, linear)
+    fit = fit_model(case, [calibrated])
+    calibrated = state = fit.state
+    evidence = case.evidence(linear)
+    small = np.sqrt((linear.data**2).mean()) < OPTIONS.max_small_gap_per_noise * case.noise_mm
+    hypothesis = None
+    for _ in range(OPTIONS.max_search_rounds):
+        space = ModelSpace(evidence.on_library(), prior)
+        first, confirmed = space.search(hypothesis.terms if hypothesis else ()), False
+        beliefs = space.posterior([first])
+        while True:
+            hypothesis, level = beliefs.best()
+            shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
+            unknown = not hypothesis.effects.isdisjoint(UNKNOWN)
+            # where an unknown function wins, a second look from its fit shows nothing else, unless the sim bends on the
+            # way there or a law's shape is still to be fitted
+            settled = unknown and small and not shaped
+            # laws get their chance before an unknown function takes what their linear fit leaves
+            named = beliefs.best_of(hypothesis.effects - set(UNKNOWN)) if unknown and (small or shaped) else None
+            tried, its_level = named or (hypothesis, level)
+            ended = frozenset(hypothesis.terms) in seen or not hypothesis.terms
+            ended |= settled and (tried is hypothesis or not tried.terms)
+            if confirmed or not ended:
+                break
+            # an answer stands once a search from the other end has found nothing better
+            beliefs, confirmed = space.confirmed(first), True
+        if ended:
+            break
+        seen.add(frozenset(hypothesis.terms))
+        # what a dropped effect has done to the others' numbers can hold a fit back
+        dropped = {name for name, _ in state.effects} - tried.effects
+        found = fit_hypothesis(case, evidence, (calibrated if dropped else state, start), (tried, its_level))
+        if settled and not _bends(case, linear, calibrated, found.state):
+            break
+        try:
+            moved = case.standing(found.state).with_approach(found.state)
+            seen_there = looks.at(moved, found.state, tried.terms)
+        except FitError:
+            # the fitted model has no pose at a reading: what the last linearisation says stands
+            break
+        fit, state, (case, linear, source) = found, found.state, seen_there
+        evidence = case.evidence(linear)
+    else:
+        space = ModelSpace(evidence.on_library(), prior)
+        first, confirmed = space.search(hypothesis.terms), False
+    if not confirmed:
+        beliefs = space.confirmed(first)
+    hypothesis, level = beliefs.best()
+    result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
+    # estimate and hypothesis are of one set, whether the rounds have ended or gone round
+    return with_effects(result, hypothesis.effects)

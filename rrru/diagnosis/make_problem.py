@@ -1,0 +1,189 @@
+"""Making the case of a campaign: its motion, which points are used, which effects they can test and at which of them.
+
+Lengths in mm, angles in rad.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import (
+    DEGREE,
+    drive_rates,
+    driven_path,
+    passes_points,
+    smooth_drives,
+    starts_of_runs,
+    stops,
+)
+from rrru.campaign.stated_motion import stated_motion
+from rrru.diagnosis.approach_direction import at_reversals, rest_widths
+from rrru.diagnosis.discrepancy_basis import unknown_functions
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import doubts_of
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.stop_paths import paths_between_stops, undetermined_senses
+from rrru.effects.motion import Course, make_motion
+from rrru.effects.protocol import PATH, complete_rows, known_values
+from rrru.errors import FitError
+from rrru.estimation.starts import register_measurements
+
+
+def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
+    """The case of a measurement table.
+
+    Every point is used that was measured, is no outlier and can be reached. Effects whose needs the motion meets
+    nowhere are set aside with the reason; `Case.known` has the points at which the others have all that they need.
+    Raises FitError for an empty table.
+    """
+    if not len(measurements):
+        raise FitError("the campaign has no points")
+    measurements = register_measurements(measurements, mechanism)
+    actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
+    stop, (course, unknown) = stops(measurements), _course(measurements, mechanism, actuators)
+    motion_at = partial(make_motion, mechanism, masses, replace(course, approach=np.where(unknown, 0.0, np.nan)))
+    motion = motion_at()
+    used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
+    used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
+    if not used.any():
+        raise FitError("the campaign has no point that a diagnosis can use")
+    testable, untestable = _tested(library, motion, used, _told(measurements, used, stop))
+    for name, function in unknown_functions(mechanism).items():
+        if not _lacking(function, motion, used):
+            testable[name] = function
+    rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
+    known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
+    sizes = float(noise_mm), float(arm_mm)
+    doubts, bounds = doubts_of(motion, masses)
+    of_weight = {"doubts": doubts, "bounds": bounds}
+    more = {"motion_at": motion_at, "known": known, **of_weight}
+    return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
+
+
+def _tested(library, motion, used, told):
+    """Effects that the used points can test, and others with the reason.
+
+    told: how many numbers the used points tell of the robot.
+    """
+    testable, untestable = {}, {}
+    for name, effect in library.items():
+        if _fitted(effect, motion):
+            untestable[name] = "the calibration's own parameters take it up"
+            continue
+        if effect.coordinates.broad and len(effect.coordinates) > OPTIONS.max_coefficients_per_number * told:
+            coarser = effect.coarser(OPTIONS.max_coefficients_per_number * told) if effect.coarser else None
+            if coarser is None:
+                untestable[name] = f"has {len(effect.coordinates)} coefficients, too many for {told} measured numbers"
+                continue
+            effect = coarser
+        lacking = _lacking(effect, motion, used)
+        if lacking:
+            untestable[name] = lacking
+        else:
+            testable[name] = effect
+    return testable, untestable
+
+
+def _lacking(effect, motion, used):
+    """Why the used points do not tell what an effect needs, empty where they do."""
+    values = {need: getattr(motion, need)[used] for need in effect.needs if need != PATH}
+    known = {need: value[known_values(value)].reshape(-1, value[0].size) for need, value in values.items()}
+    none = [name for name, value in known.items() if not len(value)]
+    if none:
+        return f"needs {', '.join(none)}, which the columns do not give"
+    alike = [name for name, value in known.items() if not np.ptp(value, axis=0).any()]
+    if "drive_rate" in alike and not known["drive_rate"].any():
+        return "needs drive_rate, which is zero: the robot rests at every point"
+    if alike:
+        return f"needs {', '.join(alike)} of more than one value"
+    return "" if complete_rows(effect, motion)[used].any() else no_approach(used)
+
+
+def no_approach(used):
+    """Why an effect that depends on the sense in which the drives arrive is not tested at used points (n,)."""
+    return f"the sense in which the drives arrive is known at none of {int(used.sum())} points"
+
+
+def _told(measurements, used, stop):
+    """How many numbers the used points tell of the robot: at each stop no more than the six of a platform's pose."""
+    turned = np.zeros(len(used), dtype=bool)
+    if rows.has_turns(measurements):
+        turned = measurements["measured_rx_rad"].notna().to_numpy()
+    beside = rows.on_the_world(measurements)
+    own = used if beside is None else used & ~beside
+    return int(np.minimum(np.bincount(stop, own * (3.0 + 3.0 * turned)), 6.0).sum())
+
+
+def _fitted(effect, motion):
+    """Whether an effect changes nothing but constant numbers that the calibration chooses its parameters from."""
+    coordinates = effect.coordinates
+    values = coordinates.to_values(np.array(coordinates.typical), coordinates.shapes[0])
+    twists = np.asarray(effect.contribute(motion, values).twists)
+    return twists.ndim == 3 and len(twists) == 1 and not (twists[0].astype(bool) & ~motion.robot.offered).any()
+
+
+def _unknown_approach(measurements, mechanism, course):
+    """Where (n, K) the rows do not determine from which side a drive comes: starts of runs, and next to reversals."""
+    run, stop = measurements["run"].to_numpy(), stops(measurements)
+    # no column tells how the robot got to a run's start
+    starts = np.isin(stop, stop[starts_of_runs(run)])
+    result = np.repeat(starts[:, None], course.drive.shape[1], axis=1)
+    if course.stops:
+        return result
+    finer, _ = driven_path(measurements, OPTIONS.finer_spline_degree)
+    other = _path_drive(measurements, finer, (mechanism, course.drive, course.path_index), OPTIONS.finer_spline_degree)
+    first = np.diff(stop, prepend=-1) > 0
+    return result | at_reversals(course, other, rest_widths(course.drive[first], run[first], mechanism.parts.units))
+
+
+def _course(measurements, mechanism, actuators):
+    """What the robot was told to do, and where (n, K) it is not determined from which side a drive comes.
+
+    At the measured points with the table's own actuator values.
+    """
+    path, told = driven_path(measurements)
+    if mechanism.orients:
+        told["drive_motion"] = drive_rates(measurements, actuators)
+    stated = stated_motion(measurements)
+    if stated is not None and stated.stops:
+        return _stopping(measurements, mechanism, Course(drive=actuators, path_drive=actuators, stops=True, **told))
+    at_rest = not passes_points(measurements)
+    path_drive = _path_drive(measurements, path, (mechanism, actuators, told["path_index"]))
+    course = Course(drive=actuators, path_drive=path_drive, stops=at_rest, **told)
+    return course, _unknown_approach(measurements, mechanism, course)
+
+
+def _stopping(measurements, mechanism, course):
+    """`_course` of a campaign that states that the robot rests at each reading: all rows of a stop have its senses."""
+    stop, run = stops(measurements), measurements["run"].to_numpy()
+    first = np.diff(stop, prepend=-1) > 0
+    drive, run = course.drive[first], run[first]
+    between = stated_motion(measurements).between
+    paths, index = paths_between_stops(mechanism, drive, course.position_mm[first], between)
+    unknown = undetermined_senses(paths, index, run, rest_widths(drive, run, mechanism.parts.units))
+    return replace(course, path_drive=paths[0], path_index=index[stop]), unknown[stop]
+
+
+def _path_drive(measurements, path, drives, degree=DEGREE):
+    """Actuator values (N, K) along a path (N, 3) by splines of an odd degree through the points of each run.
+
+    Straight between stops in no order.
+
+    drives: the robot, its actuator values (n, K) at the measured points, and the rows (n,) of these on the path.
+    """
+    mechanism, actuators, index = drives
+    if mechanism.orients or not passes_points(measurements):
+        # positions do not tell the orientation between the points, nor the way between stops
+        evenly = np.stack([np.interp(np.arange(len(path)), index, one) for one in actuators.T], axis=1)
+        result = smooth_drives(measurements, evenly, index, degree)
+    else:
+        result = mechanism.inverse(path)
+    lost = ~np.isfinite(result).all(axis=1)
+    if lost.any():
+        # what is out of reach stays where it was last
+        good = np.flatnonzero(~lost)
+        result = result[good[np.maximum(np.searchsorted(good, np.arange(len(lost)), side="right") - 1, 0)]]
+    result[index] = actuators
+    return result

@@ -1,0 +1,142 @@
+"""Least squares of some coefficients with their priors, the calibration taken out, as the evidence needs it."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
+
+from rrru.diagnosis import evidence_kernels as kernels
+
+
+class Prior(NamedTuple):
+    """Prior of k coefficients: columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
+
+    index: np.ndarray
+    size: np.ndarray
+    largest: np.ndarray
+    positive: np.ndarray
+
+    @classmethod
+    def normal(cls, index):
+        """Of columns of unit deviation, which no strength scales."""
+        nothing = np.zeros(len(index))
+        return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
+
+    def at(self, strength):
+        """Sizes at a strength."""
+        return np.minimum(strength * self.size, self.largest)
+
+
+@dataclass(frozen=True)
+class Projected:
+    """Least squares of k coefficients with their priors, the calibration taken out.
+
+    Those of the terms come first, then those of their shapes, last those of the weight, both owned by nobody. gram
+    (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
+    term, the terms' count for nobody; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
+    these, None where they are the same; weights: of the weight's coefficients whether each is a lean, no mass,
+    and at_least (terms,): strengths under which the terms are as large as found.
+    """
+
+    gram: np.ndarray
+    moment: np.ndarray
+    size: np.ndarray
+    largest: np.ndarray
+    positive: np.ndarray
+    about: np.ndarray
+    owner: np.ndarray
+    index: np.ndarray
+    mix: np.ndarray | None = None
+    weights: tuple[bool, ...] = ()
+    at_least: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, priors, count, grams):
+        """Of the Priors of so many terms, and after them of their shapes.
+
+        grams: from numbers (k,) of columns to their Gram matrices (levels, k, k) and moments (levels, k).
+        """
+        owner = np.repeat(np.minimum(np.arange(len(priors)), count), [len(prior.index) for prior in priors])
+        index, *rest = (np.concatenate(parts) for parts in zip(*priors, strict=True))
+        return cls(*grams(index), *rest, np.zeros(len(index)), owner, index)
+
+    def on(self, grams, moments):
+        """The problem on other Gram matrices (levels, r, r) and moments (levels, r) of its columns."""
+        if self.mix is None:
+            return replace(self, gram=grams, moment=moments)
+        return replace(self, gram=self.mix.T @ grams @ self.mix, moment=moments @ self.mix)
+
+    def reordered(self, terms, coefficients):
+        """The problem with terms (terms,), and coefficients (k,) of these and of shapes, in an order of old numbers."""
+        k = np.concatenate([coefficients, np.arange(len(coefficients), len(self.size))])
+        rank = np.append(np.argsort(terms), len(terms))
+        each = {name: getattr(self, name)[k] for name in ("size", "largest", "positive", "about")}
+        columns = {"index": self.index[k]} if self.mix is None else {"mix": self.mix[:, k]}
+        at_least = None if self.at_least is None else self.at_least[terms]
+        gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
+        return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **each, **columns)
+
+    def scale(self, strengths):
+        """Prior standard deviations (m, k) at strengths (m, terms)."""
+        each = np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
+        return np.minimum(each[:, self.owner] * self.size, self.largest)
+
+
+def gained(problem, scale):
+    """Log evidence (levels, m) of a Projected problem at prior deviations (m, k) over that of none of its terms."""
+    scale = np.ascontiguousarray(scale)
+    gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
+    if not problem.about.any():
+        return kernels.log_evidence(gram, moment, scale, problem.positive)
+    explained = gram @ problem.about
+    at_means = (moment - 0.5 * explained) @ problem.about
+    return at_means[:, None] + kernels.log_evidence(gram, moment - explained, scale, problem.positive)
+
+
+def evidence_error(problem, scale):
+    """How far (levels, m) `gained` may be off at prior deviations (m, k): the size of the correction in it.
+
+    It comes from the probability of the coefficients that cannot be negative, see `tests.diagnosis.orthant`.
+    """
+    gram, moment = np.ascontiguousarray(problem.gram), problem.moment - problem.gram @ problem.about
+    correction = kernels.log_evidence_and_correction(gram, moment, np.ascontiguousarray(scale), problem.positive)[1]
+    return np.abs(correction)
+
+
+def posterior_mean(problem, scale):
+    """The mean (k,) of a Projected problem of one level at prior deviations (k,).
+
+    Where that has negative positive coefficients their most probable point.
+    """
+    gram, about, positive = problem.gram[0], problem.about, problem.positive
+    precision = _precision(gram, scale)
+    moment = scale * (problem.moment[0] - gram @ about)
+    mean = np.linalg.solve(precision, moment)
+    if (mean[positive] < 0.0).any():
+        mean = _not_negative(precision, moment, positive)
+    return about + scale * mean
+
+
+def posterior_covariance(problem, scale):
+    """The covariance (k, k) of a Projected problem of one level at prior deviations (k,)."""
+    return scale[:, None] * np.linalg.inv(_precision(problem.gram[0], scale)) * scale
+
+
+def _precision(gram, scale):
+    """Precision (k, k) of the coefficients over their prior deviations (k,)."""
+    return scale[:, None] * gram * scale + np.eye(len(scale))
+
+
+def _not_negative(precision, moment, positive):
+    """The most probable point (k,) without negative positive coefficients, the others found from these."""
+    free = ~positive
+    both = np.column_stack([precision[free][:, positive], moment[free]])
+    taken = np.linalg.solve(precision[free][:, free], both)
+    left = np.column_stack([precision[positive][:, positive], moment[positive]]) - both[:, :-1].T @ taken
+    factor = np.linalg.cholesky(left[:, :-1])
+    result = np.empty(len(moment))
+    result[positive], _ = nnls(factor.T, solve_triangular(factor, left[:, -1], lower=True))
+    result[free] = taken[:, -1] - taken[:, :-1] @ result[positive]
+    return result

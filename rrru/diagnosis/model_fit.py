@@ -1,0 +1,306 @@
+"""The calibrated model with effects, fitted to the readings of a case: all parameters at once, under one objective.
+
+    y = h(b, c, s, w) + delta + e,    b geometric errors, c coefficients of effect terms, s their shape parameters,
+                                      w the payload and tilt, of which the stated values are uncertain
+
+`rrru.estimation` solves it: the exact model, the noise and the discrepancy of the hypothesis, the priors of all blocks.
+Lengths in mm, angles in rad.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.cache import last_kept
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.state import State
+from rrru.diagnosis.terms import Term, spread
+from rrru.diagnosis.whitened import levels_of, spectrum
+from rrru.effects.protocol import Contribution, gives_way
+from rrru.errors import FitError
+from rrru.estimation.estimate import Estimate
+from rrru.estimation.explain import explain_end
+from rrru.estimation.noise_model import NoiseModel
+from rrru.estimation.parameters import Block, Parameters
+from rrru.estimation.problem import Problem
+from rrru.estimation.solver import SolverOptions, solve
+
+_SOLVER_OPTIONS = SolverOptions(step_tolerance=OPTIONS.step_tolerance_per_standard_error)
+_MANY_OPTIONS = SolverOptions(OPTIONS.max_iterations_of_many, OPTIONS.step_tolerance_of_many)
+
+
+@dataclass(frozen=True, eq=False)
+class EffectModel:
+    """A case's model with effect terms, as the solver's Observations; its parameter vector holds blocks by name.
+
+    terms: the effect terms; scales (k,): prior standard deviations of their coefficients one after the other; signed:
+    coefficients keep the sign that their law allows, and shape parameters are fitted. shapes: values of the shape
+    parameters about which their priors lie, by effect; they are at most a doubt off, 1 sigma.
+    """
+
+    case: object
+    terms: tuple[Term, ...]
+    scales: np.ndarray
+    signed: bool = True
+
+    def same_as(self, other):
+        """Whether this is the same model of the same case under the same priors as another EffectModel."""
+        same = self.case is other.case and self.terms == other.terms and self.signed == other.signed
+        return same and np.array_equal(self.scales, other.scales)
+
+    @cached_property
+    def _matrices(self):
+        """Matrix (c, k) of each term from its coefficients to the effect's coordinates."""
+        return [spread(self.case.library[term.effect].coordinates, term.legs) for term in self.terms]
+
+    @cached_property
+    def shapes(self):
+        """Anchor values of shape parameters by effect."""
+        return {t.effect: dict(self.case.library[t.effect].coordinates.shapes[t.shape]) for t in self.terms}
+
+    @cached_property
+    def _shape_names(self):
+        """(effect, parameter, standard deviation) of every shape parameter that is fitted."""
+        doubts = [
+            (name, key, abs(self.case.library[name].doubted(key, value) - value))
+            for name, shape in self.shapes.items()
+            for key, value in shape.items()
+        ]
+        return [one for one in doubts if one[2] > 0.0] if self.signed else []
+
+    @cached_property
+    def _weight_names(self):
+        """Names of what the weight may be off by, none where no term bears loads."""
+        bears = any(gives_way(self.case.library[term.effect]) for term in self.terms)
+        return [name for name, doubt in self.case.doubts.items() if doubt] if bears and self.signed else []
+
+    @cached_property
+    def parameters(self):
+        """The Parameters: geometry, one block a term, "shape" and "weight"."""
+        blocks, start = [self.case.geometry], 0
+        for term, matrix in zip(self.terms, self._matrices, strict=True):
+            own = slice(start, start + matrix.shape[1])
+            start = own.stop
+            positive = matrix.T @ self.case.library[term.effect].coordinates.positive > 0
+            low = np.where(positive & self.signed, 0.0, -np.inf)
+            names = [f"{term.effect}_{k}" for k in range(matrix.shape[1])]
+            blocks.append(Block.of(term.effect, names, [""] * len(names), self.scales[own], bounds=(low, np.inf)))
+        if self._shape_names:
+            limits = [self.case.library[name].parameters[key] for name, key, _ in self._shape_names]
+            names, units = [f"{name}.{key}" for name, key, _ in self._shape_names], [one.unit for one in limits]
+            mean = [self.shapes[name][key] for name, key, _ in self._shape_names]
+            bounds = [one.low for one in limits], [one.high for one in limits]
+            blocks.append(Block.of("shape", names, units, [sd for *_, sd in self._shape_names], mean, bounds))
+        if self._weight_names:
+            doubts = np.array([self.case.doubts[name] for name in self._weight_names])
+            low, high = np.transpose([self.case.bounds[name] for name in self._weight_names])
+            units = ["kg" if name.endswith("kg") else "rad" for name in self._weight_names]
+            narrow_sd = OPTIONS.stated_nuisance_sd_ratio * doubts
+            blocks.append(Block.of(WEIGHT, self._weight_names, units, narrow_sd, 0.0, (low, high), wide_sd=doubts))
+        return Parameters(tuple(blocks))
+
+    def vector(self, state):
+        """Parameter vector (p,) of a State; effects that it does not hold have coefficients of zero."""
+        values, places = self.parameters.mean.copy(), self.parameters.places
+        values[places[GEOMETRY]] = state.deviations
+        for term, matrix in zip(self.terms, self._matrices, strict=True):
+            coordinates = state.effects.get((term.effect, term.shape))
+            if coordinates is not None:
+                values[places[term.effect]] = np.linalg.lstsq(matrix, coordinates, rcond=None)[0]
+        for k, (name, key, _) in enumerate(self._shape_names):
+            if any(effect == name for effect, _ in state.effects):
+                values[places["shape"]][k] = state.shape_values.get(name, self.shapes[name])[key]
+        for k, name in enumerate(self._weight_names):
+            values[places[WEIGHT]][k] = state.weight.get(name, 0.0)
+        return self.parameters.clipped(values)
+
+    @last_kept
+    def state(self, values):
+        """The State of a parameter vector (p,)."""
+        places = self.parameters.places
+        pairs = zip(self.terms, self._matrices, strict=True)
+        effects = {(t.effect, t.shape): matrix @ values[places[t.effect]] for t, matrix in pairs}
+        shapes = {name: dict(shape) for name, shape in self.shapes.items()}
+        for k, (name, key, _) in enumerate(self._shape_names):
+            shapes[name][key] = float(values[places["shape"]][k])
+        if self._weight_names:
+            found = zip(self._weight_names, values[places[WEIGHT]].tolist(), strict=True)
+            shapes[WEIGHT] = dict.fromkeys(self.case.doubts, 0.0) | dict(found)
+        return State(values[places[GEOMETRY]], effects, shapes)
+
+    def residual(self, values):
+        """Readings minus the exact model (m, 3) at parameter values (p,)."""
+        return self.case.residual(self.state(values))
+
+    @last_kept
+    def jacobian(self, values):
+        """Derivative (m, 3, p) of the residual by the parameters."""
+        case, state = self.case, self.state(values)
+        at = case.map_of(state)
+        blocks = [case.of_rows(at.columns(case.mechanism.directions))]
+        for term, matrix in zip(self.terms, self._matrices, strict=True):
+            blocks.append(self._by_coefficients(at, state, term, matrix))
+        for name, key, doubt in self._shape_names:
+            blocks.append(self._by_shape(at, state, name, key, doubt))
+        blocks += [self._by_weight(at, state, name) for name in self._weight_names]
+        return -np.concatenate(blocks, axis=-1)
+
+    def _by_coefficients(self, at, state, term, matrix):
+        """Derivative (m, 3, k) of the model by a term's coefficients."""
+        case, key = self.case, (term.effect, term.shape)
+        effect, present = case.library[term.effect], state.effects[key]
+        if effect_functions := getattr(effect, "along_drives", None):
+            response = case.of_rows(at.drive_effect)
+            made = [
+                f[case.at][:, None, :] * response[:, :, k, None] for k, f in enumerate(effect_functions(case.motion))
+            ]
+            return np.concatenate(made, axis=-1) @ matrix
+        own = case.contributions(state)[key]
+        result = np.empty((len(case), 3, matrix.shape[1]))
+        for k, column in enumerate(matrix.T):
+            typical = float(np.max(effect.coordinates.typical[column > 0.0]))
+            size = float(np.abs(present[column > 0.0]).max())
+            apart_from_zero = size > OPTIONS.min_coefficient_per_typical * typical
+            step = OPTIONS.difference_step_ratio * max(size, typical) if apart_from_zero else typical
+            moved = state.contribution(case.library, key, case.motion, present + step * column)
+            result[..., k] = case.of_rows(at.move((moved - own).twists)) / step
+        return result
+
+    def _by_shape(self, at, state, name, key, doubt):
+        """Derivative (m, 3, 1) of the model by a shape parameter of an effect."""
+        case, own = self.case, next(one for one in state.effects if one[0] == name)
+        value, limits = state.shape_values[name][key], case.library[name].parameters[key]
+        step = 1e-3 * doubt
+        if value + step > limits.high:
+            step = -step
+        shape = state.shape_values[name] | {key: value + step}
+        moved = state.contribution(case.library, own, case.motion, shape=shape)
+        change = moved - case.contributions(state)[own]
+        return case.of_rows(at.move(change.twists))[..., None] / step
+
+    def _by_weight(self, at, state, name):
+        """Derivative (m, 3, 1) of the model by a number of the weight."""
+        case, step = self.case, 1e-3 * self.case.doubts[name]
+        other = state.under(state.weight | {name: state.weight[name] + step})
+        moved = {
+            key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else own
+            for key, own in case.contributions(state).items()
+        }
+        change = sum(moved.values(), Contribution()) - case.contribution(state)
+        return case.of_rows(at.move(change.twists))[..., None] / step
+
+
+@dataclass(frozen=True, eq=False)
+class ModelFit:
+    """An EffectModel with its Estimate; level: of the discrepancy that it was fitted with, an index."""
+
+    model: EffectModel
+    estimate: Estimate
+    level: int
+
+    @cached_property
+    def state(self):
+        """The State of the estimated values; without fitted shapes where no term has any."""
+        state = self.model.state(self.estimate.values)
+        return state if self.model.terms else State(state.deviations, {})
+
+    @property
+    def terms(self):
+        """The effect terms."""
+        return self.model.terms
+
+    def effect_covariance(self, term):
+        """Names of the fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
+
+        Of the term's k coefficients, and after them of these q parameters.
+        """
+        chosen, shapes = self._places_of(term)
+        return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]
+
+    def effect_numbers(self, term):
+        """Values (k + q,) of a term's coefficients and its effect's fitted shape parameters, intervals (k + q, 2)."""
+        chosen, _ = self._places_of(term)
+        return self.estimate.values[chosen], self.estimate.intervals[chosen]
+
+    def _places_of(self, term):
+        """Places of a term's coefficients and its effect's fitted shape parameters, and the names of these."""
+        parameters, prefix = self.estimate.parameters, f"{term.effect}."
+        own = np.arange(len(parameters))[parameters.places[term.effect]]
+        shapes = [name for name in parameters.names if name.startswith(prefix)]
+        chosen = [*own, *(parameters.names.index(name) for name in shapes)]
+        return chosen, [name.removeprefix(prefix) for name in shapes]
+
+    @property
+    def weight(self):
+        """What the weight is off by: name, unit, value and standard error of each number, nothing where none fitted."""
+        places = self.estimate.parameters.places
+        if WEIGHT not in places:
+            return []
+        (block,) = (block for block in self.estimate.parameters.blocks if block.name == WEIGHT)
+        errors = self.estimate.block_errors(WEIGHT)
+        return list(zip(block.names, block.units, self.estimate.block(WEIGHT).tolist(), errors.tolist(), strict=True))
+
+    def one_sigma_steps(self):
+        """Independent errors of one standard deviation each: geometry (q, p), coordinates (q, c) by key of effect."""
+        places, count = self.estimate.parameters.places, len(self.estimate.parameters)
+        names = (GEOMETRY, *(term.effect for term in self.terms))
+        chosen = np.concatenate([np.arange(count)[places[name]] for name in names])
+        covariance = self.estimate.covariance[np.ix_(chosen, chosen)]
+        size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+        share, axes = np.linalg.eigh(covariance / np.outer(size, size))
+        steps = np.zeros((len(chosen), count))
+        steps[:, chosen] = (size[:, None] * axes * np.sqrt(np.maximum(share, 0.0))).T
+        pairs = zip(self.terms, self.model._matrices, strict=True)
+        return steps[:, places[GEOMETRY]], {(t.effect, t.shape): steps[:, places[t.effect]] @ m.T for t, m in pairs}
+
+
+def whitening_of(case, level):
+    """The Whitening of a case's readings under its noise and the discrepancy of a level (an index)."""
+    noise = (case.noise or NoiseModel.white(case.noise_mm)).counted
+    size = levels_of(noise)[level] * noise.mean_mm
+    discrepancy = (lambda waves: size**2 * spectrum(waves)) if size else None
+    return noise.whitening(case.series, discrepancy)
+
+
+def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=(), level=0, signed=True):
+    """ModelFit of a Case's used readings with effect terms, whose coefficients have prior deviations scales (k,).
+
+    starts: States, tried in turn until a search from one goes straight to its end; where none does, the first that is
+    as good as the best of all. A calibration that has gone far to hide an effect is a place that nothing leads away
+    from. level: of the discrepancy, an index. The Estimate says whether the search converged; raises FitError where
+    the model has no pose at any start, even without effects.
+    """
+    model = EffectModel(case, tuple(terms), np.asarray(scales, dtype=float), signed)
+    problem, many = (
+        Problem(model, model.parameters, whitening_of(case, level)),
+        len(model.parameters) > OPTIONS.max_parameters_of_several_starts,
+    )
+    fits = []
+    for start in starts:
+        # where the exact model has no pose at a start with effects, it has one without them
+        candidates = [model.vector(start), model.vector(State(start.deviations, {}))]
+        candidate = next((one for one in candidates if np.isfinite(model.residual(one)).all()), candidates[-1])
+        fits.append(solve(problem, [candidate], _MANY_OPTIONS if many else _SOLVER_OPTIONS))
+        if (fits[-1].end.straight and fits[-1].end.converged) or many:
+            break
+    enough = min(one.end.cost for one in fits) + OPTIONS.equal_fits_nats
+    return ModelFit(model, next(one for one in fits if one.end.cost <= enough), level)
+
+
+def fit_named_effects(case, names, calibrated, times_typical=OPTIONS.prior_sd_per_typical):
+    """ModelFit of a Case with the effects of these names, each in its first shape, chosen beforehand without a search.
+
+    calibrated: State to start from; times_typical: of the prior's standard deviation over the typical size. Signs and
+    bounds of the effect models are not imposed, so that a size that contradicts the model shows. Raises FitError where
+    the search does not converge.
+    """
+    sizes = [times_typical * np.asarray(case.library[name].coordinates.typical) for name in names]
+    scales = np.concatenate([np.zeros(0), *sizes])
+    fit = fit_model(case, [calibrated], [Term(name) for name in names], scales, signed=False)
+    if not fit.estimate.end.converged:
+        raise FitError(explain_end(fit.estimate, f"the fit of {', '.join(names) or 'the geometry'}"), fit.estimate)
+    return fit

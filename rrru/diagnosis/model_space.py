@@ -1,0 +1,226 @@
+"""The space of all sets of terms, and which of them carry the posterior probability.
+
+From a starting set on, the neighbours of the most probable set whose neighbours are not known yet are evaluated, again
+and again: sets with a term more, with one less, and with one term in place of another, be it the same effect on other
+legs or in another shape, then also with one term less. It ends when no such set has a share of the posterior worth
+mentioning: a set left out then is several worse steps away from all that matters. This is the neighbourhood search of
+C. Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression", JASA 102 (2007), which visits sets in
+the order of their weight in place of a random one; the sets retained are those of Occam's window (D. Madigan and A.
+Raftery, JASA 89, 1994).
+
+A neighbour is evaluated where it may matter by what its term adds at the strengths of the others, which stay. Two
+searches start from opposite ends, from nothing and from as many effects as the data bear. How far the probabilities of
+causes differ between what each of them has visited says whether the answer depends on where one starts.
+"""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.diagnosis.candidates import Candidates
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.evidence import STRENGTHS, averaged
+from rrru.diagnosis.evidence_kernels import log_sum_exp
+from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.posterior import Posterior, Weighed, Weigher
+from rrru.diagnosis.terms import variants
+from rrru.diagnosis.whitened import LEVELS
+
+
+def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
+    """The Posterior over sets of up to `most` terms.
+
+    evidence: ModelEvidence on the readings at which all sets compare; prior: a Prior; without: names of effects that
+    are ruled out.
+    """
+    space = ModelSpace(evidence, prior, without, most)
+    return space.confirmed(space.search(()))
+
+
+@dataclass
+class _Search:
+    """Sets that a search has reached and those whose neighbours it has evaluated, by their terms as a set, in order."""
+
+    reached: dict = field(default_factory=dict)
+    expanded: dict = field(default_factory=dict)
+
+    def reach(self, terms):
+        """Note that a set has been reached."""
+        self.reached[frozenset(terms)] = None
+
+
+class ModelSpace:
+    """Sets of terms that have been evaluated; see `explore`."""
+
+    def __init__(self, evidence, prior, without=(), most=OPTIONS.max_effects):
+        self._evidence, self._weigher = evidence, Weigher(evidence, prior)
+        self.library = {name: effect for name, effect in evidence.library.items() if name not in without}
+        self._terms = [term for effect in self.library.values() for term in variants(effect)]
+        self._most = min(most, len(self.library))
+        self._known: dict[frozenset, Weighed] = {}
+        # those whose best level has been looked for
+        self._climbed: set[frozenset] = set()
+        self._highest = -np.inf
+        for terms in ((), *((term,) for term in self._terms)):
+            self._single(terms)
+
+    @cached_property
+    def _candidates(self):
+        return Candidates(self._evidence, self._terms)
+
+    def confirmed(self, first):
+        """The Posterior after a search and one from the other end; where these differ, after one from both answers."""
+        searches = [first, self.search(self.fullest())]
+        found = self.posterior(searches)
+        if found.apart > OPTIONS.max_searches_apart:
+            best = [max(one.reached, key=lambda key: self._known[key].height) for one in searches]
+            both = {term.effect: term for key in best for term in self._known[key].hypothesis.terms}
+            searches.append(self.search(tuple(both.values())[: self._most]))
+            found = self.posterior(searches)
+        return found
+
+    def posterior(self, searches):
+        """The Posterior over all sets that have been evaluated, with what sets the two best searches apart."""
+        found = list(self._known.values())
+        result = Posterior.of(found)
+        causes = self.library.keys() - UNKNOWN.keys()
+        each = [Posterior.of([self._known[key] for key in one.reached]) for one in searches]
+        each = sorted(each, key=lambda beliefs: -beliefs.total)[:2]
+        marginals = np.array([[beliefs.marginal(name) for name in sorted(causes)] for beliefs in each])
+        apart = float(np.ptp(marginals, axis=0).max(initial=0.0))
+        expanded = {key: None for one in searches for key in one.expanded}
+        share = sum(np.exp(self._known[key].height - result.total) for key in expanded)
+        return Posterior.of(found, apart, float(share))
+
+    def search(self, start):
+        """A search from a set of terms on, until no set is left whose neighbours matter or the time is up."""
+        known = {term for term in start if term in self._terms}
+        found, first = _Search(), frozenset(known)
+        self._evaluate(tuple(term for term in start if term in known), None, None, climb=True)
+        for terms in ((), *((term,) for term in self._terms), first):
+            found.reach(terms)
+        upcoming = first
+        while upcoming is not None and len(found.expanded) < OPTIONS.max_expanded_sets:
+            found.expanded[upcoming] = None
+            self._expand(self._known[upcoming], found)
+            upcoming = self._next(found)
+        return found
+
+    def _next(self, found):
+        """The most probable set whose neighbours have not been evaluated, None where it does not matter."""
+        heights = {key: self._known[key].height for key in found.reached}
+        open_sets = [key for key in heights if key not in found.expanded]
+        best = max(open_sets, key=heights.get, default=None)
+        total = log_sum_exp(np.array(list(heights.values())))
+        matters = best is not None and heights[best] > total + np.log(OPTIONS.min_expanded_probability)
+        return best if matters else None
+
+    def fullest(self):
+        """The set that grows by the term that adds most, however improbable many terms are, as long as one adds."""
+        terms, level, strengths = (), int(self._evidence.none.argmax()), []
+        while len(terms) < self._most:
+            total, best = self._gains(terms, strengths, level)
+            row = int(total.argmax())
+            if total[row] <= 0.0:
+                break
+            terms, strengths = (*terms, self._candidates.terms[row]), [*strengths, best[row]]
+            at = [self._at(terms, strengths, one) for one in self._evidence.levels]
+            level = int(self._evidence.levels[int(np.argmax(at))])
+        return terms
+
+    def _at(self, terms, strengths, level):
+        """Log evidence of a set of terms at its strengths and a level."""
+        return self._evidence.over_strengths(terms, [[one] for one in strengths], [level])[0][0, 0]
+
+    def _gains(self, terms, strengths, level):
+        """Log evidence (c,) that each candidate adds to a set, averaged over its strength, and its best strength."""
+        gains = self._candidates.gains(terms, strengths, level)
+        total = np.full(len(gains), -np.inf)
+        may_act = gains[:, 0] > -np.inf
+        total[may_act] = averaged(gains[may_act], 1)
+        return total, STRENGTHS[gains.argmax(axis=1)]
+
+    def _expand(self, centre, found):
+        """Evaluate what may matter of a set's neighbours."""
+        terms, level = centre.hypothesis.terms, centre.hypothesis.level
+        strengths, own = centre.hypothesis.strengths[level], centre.hypothesis.evidence.max()
+        chosen = []
+        for out in (None, *range(len(terms))):
+            base, start = centre.hypothesis, own
+            if out is not None:
+                rest = [k for k in range(len(terms)) if k != out]
+                smaller = tuple(terms[k] for k in rest)
+                self._evaluate(smaller, level, strengths[rest], climb=True)
+                found.reach(smaller)
+                base = self._known[frozenset(smaller)].hypothesis
+            if len(base.terms) == self._most:
+                continue
+            scales = base.strengths[base.level]
+            gains, best = self._gains(base.terms, scales, base.level)
+            if out is not None:
+                # what takes a term's place adds more or less than that did
+                start = own - gains[self._candidates.terms.index(terms[out])]
+            heights = {
+                row: start + gain + self._weigher.terms((*base.terms, self._candidates.terms[row]))
+                for row, gain in enumerate(gains.tolist())
+                if gain > -np.inf and self._candidates.terms[row] not in terms
+            }
+            rows = sorted(heights, key=heights.get, reverse=True)
+            for rank, row in enumerate(rows):
+                if rank >= OPTIONS.min_neighbours and heights[row] < self._highest - OPTIONS.window_nats:
+                    break
+                chosen.append((heights[row], (*base.terms, self._candidates.terms[row]), np.append(scales, best[row])))
+        chosen.sort(key=lambda one: -one[0])
+        for _, neighbour, scales in chosen[: OPTIONS.max_neighbours]:
+            self._evaluate(neighbour, level, scales)
+            found.reach(neighbour)
+            if {term.effect for term in neighbour} == centre.hypothesis.effects:
+                # an effect on other legs or in another shape may do what another one was needed for
+                for out in range(len(neighbour) - 1):
+                    rest = [k for k in range(len(neighbour)) if k != out]
+                    smaller = tuple(neighbour[k] for k in rest)
+                    self._evaluate(smaller, level, scales[rest])
+                    found.reach(smaller)
+
+    def _evaluate(self, terms, level, strengths, climb=False):
+        """Evaluate a set of terms unless it is known: at a level, and at those next to it as long as they matter.
+
+        climb: whether the best level is looked for even where the set is hopeless.
+        """
+        key = frozenset(terms)
+        if key in self._known and (key in self._climbed or not climb):
+            return
+        evidence, best = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+        allowed, prior = set(self._evidence.levels.tolist()), self._weigher.terms(terms)
+        waiting = [int(self._evidence.none.argmax()) if level is None else level]
+        while waiting:
+            level = waiting.pop(0)
+            evidence[level], best[level] = self._evidence.over_all_strengths(terms, level, strengths)
+            strengths = best[int(evidence.argmax())]
+            hopeless = evidence.max() + prior < self._highest - OPTIONS.hopeless_nats
+            if hopeless and not climb:
+                break
+            if evidence[level] >= evidence.max() - (0.0 if hopeless else OPTIONS.window_nats):
+                nearest = (one for one in (level - 1, level + 1) if one in allowed and evidence[one] == -np.inf)
+                waiting += [one for one in nearest if one not in waiting]
+        self._know(Hypothesis(tuple(terms), evidence, best))
+        if climb or not hopeless:
+            self._climbed.add(key)
+
+    def _single(self, terms):
+        """Evaluate no term or one at all levels."""
+        evidence, best = self._evidence.none.copy(), np.ones((len(LEVELS), len(terms)))
+        if terms:
+            value, grid = self._evidence.over_strengths(terms)
+            levels = self._evidence.levels
+            evidence[levels], best[levels] = averaged(value, 1), grid[value.argmax(axis=1)]
+        self._know(Hypothesis(tuple(terms), evidence, best))
+        self._climbed.add(frozenset(terms))
+
+    def _know(self, hypothesis):
+        """Keep a hypothesis that has been evaluated."""
+        weighed = self._weigher.weighed(hypothesis, self._highest - OPTIONS.negligible_nats)
+        self._known[frozenset(hypothesis.terms)] = weighed
+        self._highest = max(self._highest, float(hypothesis.evidence.max()) + self._weigher.terms(hypothesis.terms))

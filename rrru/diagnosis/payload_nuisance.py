@@ -1,0 +1,172 @@
+"""Weight that nobody knows exactly: a load that was not told, a base that is not level.
+
+What gives way does so under loads that are linear in the mass m at the platform and in the lean w of the base
+(`rrru.kinematics.dynamics.load_slopes`). What both may be off by is fitted together with everything else, wherever an
+effect acts that gives way:
+
+    dm ~ N(0, (share m)^2),    w_x, w_y ~ N(0, lean^2)
+
+It is one weight for all effects, and no effect itself: where nothing gives way it changes nothing. Evidence is averaged
+over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
+
+The columns of the weight are a linearisation about the coefficients found under weak priors. `nuisance_evidence` has
+the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over strengths, is 0.25 nats off at most
+where the effect acts that bears the loads, and 1.2 nats where another one acts or none.
+
+ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
+at the platform; where nothing was told there, by a tenth of all that moves, as an arm is made to carry); the robot
+stands level within a tenth of a degree, or it leans by a degree.
+"""
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+
+from rrru.diagnosis.evidence_kernels import log_sum_exp
+from rrru.diagnosis.marginal_problem import gained, posterior_covariance, posterior_mean
+from rrru.diagnosis.options import OPTIONS
+from rrru.kinematics.dynamics import carried_kg, level_axes
+from rrru.kinematics.point_masses import PLATFORM
+
+# its name beside effects, and that of its mass
+WEIGHT, _EXTRA = "weight", "extra_kg"
+# probabilities that a mass, or a tilt, is as stated and that it is not, each with its ratio of standard deviations
+_CASES = (
+    (OPTIONS.stated_nuisance_probability, OPTIONS.stated_nuisance_sd_ratio),
+    (1.0 - OPTIONS.stated_nuisance_probability, 1.0),
+)
+
+
+def weight_names(robot):
+    """Names of what the weight may be off by: mass at the platform, turns of the base about the level axes."""
+    return (_EXTRA, *(f"lean_{'xyz'[axis]}" for axis in level_axes(robot)))
+
+
+def doubts_of(motion, masses):
+    """What the weight along a Motion may be off by: standard deviations and bounds (low, high) by name.
+
+    All zero where nothing has weight.
+    """
+    robot, lumps = motion.robot, getattr(motion.robot, "lumps", ())
+    own = sum(lump.mass_kg for lump in lumps if lump.joint == PLATFORM)
+    told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
+    extra = OPTIONS.payload_sd_per_stated_mass * float(told.max(initial=0.0))
+    extra = extra or OPTIONS.payload_sd_per_robot_mass * sum(lump.mass_kg for lump in lumps)
+    doubts = extra, *(2 * [OPTIONS.tilt_sd_rad if extra else 0.0])
+    bounds = [(-OPTIONS.nuisance_bound_sd * doubt, OPTIONS.nuisance_bound_sd * doubt) for doubt in doubts]
+    bounds[0] = -OPTIONS.max_missing_mass_share * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
+    return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (doubts, bounds))
+
+
+def as_found(problem, strengths):
+    """Coefficients (k,) of a Projected problem of one level at strengths (1, terms)."""
+    return posterior_mean(problem, problem.scale(strengths)[0])
+
+
+def borne(problem, count, blocks, steps, found, grams):
+    """The Projected problem of so many terms with what the weight may be as further coefficients.
+
+    blocks: by number of a term that gives way the matrix (c, k) of its own k coefficients' coordinates, and the
+    numbers (q, c) of the columns that a step of each of q numbers of the weight makes of its columns; steps: of the
+    weight, see `rrru.diagnosis.state.Linear`; found (k,): the coefficients that such a step changes, the same at all
+    levels; grams: as in `Projected.of`.
+    """
+    means = np.array([step[-1] for step in steps])
+    acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
+    index = np.concatenate([numbers.ravel() for _, numbers in blocks.values()])
+    mix = np.zeros((len(found) + len(index), len(found) + len(means)))
+    np.fill_diagonal(mix[: len(found)], 1.0)
+    row = len(found)
+    for coordinates in acting.values():
+        for number in range(len(means)):
+            mix[row : row + len(coordinates), len(found) + number] = coordinates
+            row += len(coordinates)
+    more = {
+        "size": np.ones(len(means)),
+        "largest": np.full(len(means), np.inf),
+        "positive": np.zeros(len(means), dtype=bool),
+        "about": means,
+        "owner": np.full(len(means), count),
+        "index": index,
+    }
+    joined = {name: np.concatenate([getattr(problem, name), values]) for name, values in more.items()}
+    at_least, squares = np.zeros(count), (found / problem.size) ** 2
+    for k in blocks:
+        at_least[k] = np.sqrt(squares[problem.owner == k].mean())
+    whole = replace(problem, mix=mix, weights=tuple(step[0] != _EXTRA for step in steps), at_least=at_least, **joined)
+    return whole.on(*grams(joined["index"]))
+
+
+def gained_over_cases(problem, strengths):
+    """`gained` of a Projected problem at strengths (m, terms), averaged over the cases of the weight."""
+    if not problem.weights:
+        return gained(problem, problem.scale(strengths))
+    # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
+    least = np.maximum(strengths, OPTIONS.min_prior_scale_per_size * problem.at_least)
+    result = _over_cases(problem, problem.scale(least))
+    narrow = (least > strengths).any(axis=1)
+    if narrow.any():
+        as_it_is = problem.scale(np.concatenate([strengths[narrow], least[narrow]]))
+        # under a prior too narrow for the coefficients the weight's columns, as large as these, would stand for them
+        as_it_is[:, -len(problem.weights) :] = OPTIONS.fixed_nuisance_sd_ratio
+        own, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
+        result[:, narrow] = own + np.minimum(result[:, narrow] - at_least, 0.0)
+    return result
+
+
+def mean_over_cases(problem, strengths):
+    """Mean (k,) of the coefficients of a Projected problem of one level at strengths (1, terms).
+
+    Of a mixture of the cases of the weight, which is always free: the strengths are raised to where it is.
+    """
+    share, scales = _mixture(problem, strengths)
+    return share @ [posterior_mean(problem, scale) for scale in scales]
+
+
+def over_cases(problem, strengths):
+    """`mean_over_cases` and the covariance (k, k), which does not know of positive coefficients."""
+    share, scales = _mixture(problem, strengths)
+    means = np.array([posterior_mean(problem, scale) for scale in scales])
+    spreads = np.array([posterior_covariance(problem, scale) for scale in scales])
+    mean = share @ means
+    apart = means - mean
+    return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
+
+
+def _mixture(problem, strengths):
+    """Probabilities (c,) of the cases of a weight that is free after the data, and prior deviations (c, k) in each."""
+    if not problem.weights:
+        return np.ones(1), problem.scale(strengths)
+    log, scales = _in_cases(problem, problem.scale(np.maximum(strengths, problem.at_least)))
+    log = log + gained(problem, scales)[0]
+    return np.exp(log - np.logaddexp.reduce(log)), scales
+
+
+def _over_cases(problem, scale):
+    """`gained` (levels, m) at prior deviations (m, k) of a weight that is free, averaged over its cases."""
+    log, scales = _in_cases(problem, scale)
+    return log_sum_exp(gained(problem, scales).reshape(len(problem.gram), len(scale), len(log)) + log)
+
+
+def _in_cases(problem, scale):
+    """Logarithms (c,) of the probabilities of all cases, and prior deviations (m c, k) of rows (m, k) in each."""
+    log, shares = _cases(problem.weights)
+    each = np.repeat(scale, len(log), axis=0)
+    each[:, -shares.shape[1] :] *= np.tile(shares, (len(scale), 1))
+    return log, each
+
+
+def cases_of(names):
+    """Log probabilities (c,) of all cases, and standard deviations (c, q) of the parameters of these names."""
+    return _cases(tuple(name != _EXTRA for name in names))
+
+
+@cache
+def _cases(weights):
+    """Logarithms (c,) of the probabilities of all cases of `Projected.weights`, and shares (c, q) of their sizes."""
+    kinds = sorted(set(weights))
+    combined = list(product(_CASES, repeat=len(kinds)))
+    shares = [[case[kinds.index(kind)][1] for kind in weights] for case in combined]
+    return np.array([sum(np.log(chance) for chance, _ in case) for case in combined]), np.array(shares)

@@ -1,0 +1,203 @@
+"""From the evidence of hypotheses to probabilities: of effects, of sets of them, and of what no effect explains."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.evidence_kernels import log_sum_exp
+from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.terms import EACH, SAME, variants
+from rrru.diagnosis.whitened import levels_of
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A Hypothesis with the logarithms (levels,) of its weights, and at which levels something is unexplained."""
+
+    hypothesis: Hypothesis
+    log_weights: np.ndarray
+    unexplained: np.ndarray
+
+    @cached_property
+    def height(self):
+        """Logarithm of the sum of its weights."""
+        return float(log_sum_exp(self.log_weights))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Hypotheses with logarithms (h, levels) of their weights up to a constant, and where they count as unexplained.
+
+    apart: largest difference of a cause's probability between searches from different starts; expanded: probability of
+    the sets all of whose neighbours have been looked at.
+    """
+
+    hypotheses: tuple
+    log_weights: np.ndarray
+    unexplained: np.ndarray
+    apart: float = 0.0
+    expanded: float = 1.0
+
+    @classmethod
+    def of(cls, weighed, apart=0.0, expanded=1.0):
+        """Of a list of Weighed hypotheses: single effects, and sets that are not negligible.
+
+        Single effects stay, however improbable: tables show what each does alone.
+        """
+        least = max(one.height for one in weighed) - OPTIONS.negligible_nats
+        chosen = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]
+        weights, flags = (np.array([getattr(one, name) for one in chosen]) for name in ("log_weights", "unexplained"))
+        return cls(tuple(one.hypothesis for one in chosen), weights, flags, apart, expanded)
+
+    @property
+    def total(self):
+        """Logarithm of the sum of all weights, up to the constant."""
+        return float(log_sum_exp(self.log_weights.ravel()))
+
+    @cached_property
+    def weights(self):
+        """Weights (h, levels) that sum to one."""
+        return np.exp(self.log_weights - self.total)
+
+    def best(self):
+        """The hypothesis of highest weight and its level (an index)."""
+        return self._best(range(len(self.hypotheses)), self.log_weights)
+
+    def sets(self):
+        """Probability by (frozenset of effects, unexplained), highest first."""
+        result = {}
+        for hypothesis, weight, unexplained in zip(self.hypotheses, self.weights, self.unexplained, strict=True):
+            for flag in (False, True):
+                if (unexplained == flag).any():
+                    key = (hypothesis.effects - set(UNKNOWN), flag)
+                    result[key] = result.get(key, 0.0) + float(weight[unexplained == flag].sum())
+        return dict(sorted(result.items(), key=lambda item: (-item[1], sorted(item[0][0]), item[0][1])))
+
+    @property
+    def probability_unexplained(self):
+        """Probability that something acts that the library does not hold."""
+        return sum(p for (_, flag), p in self.sets().items() if flag)
+
+    def marginal(self, effect):
+        """Probability that an effect acts."""
+        return float(self.weights[self._holding(effect)].sum())
+
+    def any_of(self, effects):
+        """Probability that at least one of some effects acts."""
+        return float(self.weights[np.any([self._holding(effect) for effect in effects], axis=0)].sum())
+
+    def both(self, first, second):
+        """Probability that two effects act together."""
+        return float(self.weights[self._holding(first) & self._holding(second)].sum())
+
+    def without(self, effect):
+        """The posterior with an effect ruled out."""
+        keep = ~self._holding(effect)
+        kept = tuple(h for h, fine in zip(self.hypotheses, keep, strict=True) if fine)
+        return Posterior(kept, self.log_weights[keep], self.unexplained[keep], self.apart, self.expanded)
+
+    @property
+    def height(self):
+        """Logarithm of the highest weight, up to the constant."""
+        return float(self.log_weights.max(initial=-np.inf))
+
+    def legs(self, effect):
+        """Probability by legs ("each", "same", 1, 2, 3) of an effect, given that it acts."""
+        result = {}
+        for hypothesis, weight in zip(self.hypotheses, self.weights, strict=True):
+            for term in hypothesis.terms:
+                if term.effect == effect:
+                    result[term.legs] = result.get(term.legs, 0.0) + float(weight.sum())
+        total = sum(result.values())
+        return {legs: p / total for legs, p in result.items()} if total > 0.0 else {}
+
+    def best_of(self, effects, unexplained=None):
+        """The hypothesis of highest weight with exactly these effects, and its level; None where there is none.
+
+        Unless `unexplained` is asked for, one without unknown functions.
+        """
+        hidden = set() if unexplained is None else set(UNKNOWN)
+        rows = [k for k, h in enumerate(self.hypotheses) if h.effects - hidden == effects]
+        if not rows:
+            return None
+        weights = self.log_weights[rows]
+        if unexplained is not None:
+            weights = np.where(self.unexplained[rows] == unexplained, weights, -np.inf)
+        return self._best(rows, weights)
+
+    def best_where(self, condition):
+        """The hypothesis of highest weight without unknown functions whose effects meet a condition, and its level.
+
+        condition: from a frozenset of names to a bool. None where there is none.
+        """
+        rows = [
+            k
+            for k, h in enumerate(self.hypotheses)
+            if h.effects.isdisjoint(UNKNOWN) and condition(frozenset(h.effects))
+        ]
+        return self._best(rows, self.log_weights[rows]) if rows else None
+
+    def _best(self, rows, weights):
+        """The hypothesis among some rows (k) of highest weight (k, levels), and its level (an index)."""
+        row, level = np.unravel_index(weights.argmax(), weights.shape)
+        return self.hypotheses[rows[row]], int(level)
+
+    def _holding(self, effect):
+        """Which hypotheses (h,) hold an effect."""
+        return np.array([effect in h.effects for h in self.hypotheses])
+
+
+class Weigher:
+    """From the evidence of hypotheses to the logarithms of their weights, by the Prior.
+
+    evidence: the ModelEvidence that hypotheses are of.
+    """
+
+    def __init__(self, evidence, prior):
+        library = evidence.library
+        self._evidence, self._levels = evidence, levels_of(evidence.noise)
+        self._prior, self._effects = prior, {}
+        self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
+        self._functions = sum(name in UNKNOWN for name in library)
+        for name in library.keys() - UNKNOWN.keys():
+            kinds = {term.legs if isinstance(term.legs, str) else "one" for term in variants(library[name])}
+            coordinates = library[name].coordinates
+            weights = coordinates.weights or np.full(len(coordinates.shapes), 1.0 / len(coordinates.shapes))
+            self._effects[name] = np.log(weights) - np.log(len(kinds)) + coordinates.log_prior
+
+    def weighed(self, hypothesis, least=-np.inf):
+        """The Weighed hypothesis; least: below this log weight nothing is looked at for what it leaves unexplained."""
+        evidence, log_weights = self._evidence, hypothesis.evidence + self.terms(hypothesis.terms)
+        if not log_weights.max() > least:
+            unexplained = np.ones(len(log_weights), dtype=bool)
+        else:
+            tolerated = self._prior.tolerance * evidence.explained(hypothesis, evidence.library.keys() - UNKNOWN)
+            unexplained = tolerated < np.maximum(self._levels, evidence.explained(hypothesis, set(UNKNOWN)))
+        return Weighed(hypothesis, log_weights + self._of_levels(unexplained), unexplained)
+
+    def terms(self, terms):
+        """Logarithm of the prior probability of a set of terms, whatever the discrepancy."""
+        known = [term for term in terms if term.effect not in UNKNOWN]
+        total = self._prior.log_set(len(known), len(self._effects))
+        total += (len(terms) - len(known)) * np.log(self._prior.unexplained / max(self._functions, 1))
+        for term in known:
+            total += self._effects[term.effect][term.shape]
+            if term.legs not in (EACH, SAME):
+                total -= np.log(self._legs[term.effect])
+        return total
+
+    def _of_levels(self, unexplained):
+        """Of the discrepancy's levels (levels,): half of what is not unexplained is none at all."""
+        if unexplained.all():
+            # its unknown function has paid for it
+            return np.log(np.where(np.arange(len(unexplained)) == 0, 0.5, 0.5 / (len(unexplained) - 1)))
+        explained, spare = 1.0 - self._prior.unexplained, np.count_nonzero(~unexplained) - 1
+        result = np.full(len(unexplained), explained * (0.5 / spare if spare else 1.0))
+        if spare:
+            result[0] = explained * 0.5
+        if unexplained.any():
+            result[unexplained] = self._prior.unexplained / unexplained.sum()
+        return np.log(result)

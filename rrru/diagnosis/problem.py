@@ -1,0 +1,287 @@
+"""One campaign as the diagnosis sees it: usable points, the calibrated sim, every effect's signature, the exact sim.
+
+The sim with effects is the exact closure of the plant; a hypothesis is fitted on its linearisation, renewed about the
+best one found. Lengths in mm, angles in rad.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+
+import numpy as np
+import pandas as pd
+
+from rrru.cache import last_kept_of
+from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import follows_path, passes_points, stops
+from rrru.campaign.noise import reading_series
+from rrru.diagnosis.approach_direction import estimate_approach, has_direction
+from rrru.diagnosis.discrepancy_basis import UNKNOWN
+from rrru.diagnosis.evidence import ModelEvidence
+from rrru.diagnosis.linearise import approach_responses, linearised
+from rrru.diagnosis.options import OPTIONS
+from rrru.effects.motion import standing
+from rrru.effects.protocol import Contribution, Motion
+from rrru.estimation.noise_model import NoiseModel
+from rrru.estimation.parameters import Block
+from rrru.kinematics.readings import lacking
+
+# name of the block of geometric errors
+GEOMETRY = "geometry"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Points of a campaign, all N of them, of which the used ones are fitted.
+
+    What was read at them makes m rows of three numbers in mm: positions, and after them orientations at their arm.
+    library: effects by name that the campaign can test, and after them the functions of
+    `rrru.diagnosis.discrepancy_basis` that it can; untestable: name to the reason for the other effects; noise_mm:
+    deviation per axis; arm_mm: of `rrru.kinematics.readings.Readings`; noise: its NoiseModel, white where there is
+    none; beside_scale: factor by which rows of reflectors beside the robot count, so that they have the noise of the
+    others; motion_at: from where the robot stands to the motion with the loads there, see
+    `rrru.effects.motion.make_motion`; doubts, bounds: what the weight may be off by, see
+    `rrru.diagnosis.payload_nuisance`; known: effect to the points (N,) at which the campaign has all that the effect
+    needs, of the effects that lack something at a used point.
+    """
+
+    mechanism: object
+    measurements: pd.DataFrame
+    motion: Motion
+    used: np.ndarray
+    library: dict
+    untestable: dict
+    noise_mm: float
+    arm_mm: float = np.nan
+    noise: NoiseModel | None = None
+    beside_scale: float = 1.0
+    motion_at: Callable | None = None
+    doubts: dict = field(default_factory=dict)
+    bounds: dict = field(default_factory=dict)
+    known: dict = field(default_factory=dict)
+
+    def __len__(self):
+        return len(self.at)
+
+    @cached_property
+    def geometry(self):
+        """The Block of geometric errors: links and joints are off by less than frames, targets and drives' zeros."""
+        block = Block.geometry(self.mechanism.parameters, GEOMETRY)
+        if not self.mechanism.stages:
+            return block
+        usual = {"mm": OPTIONS.body_error_sd_mm, "rad": OPTIONS.body_error_sd_rad}
+        of_bodies = np.minimum(block.sd, [usual[unit] for unit in block.units])
+        return replace(block, sd=np.where(self.mechanism.stages[-1], block.sd, of_bodies))
+
+    @property
+    def effects(self):
+        """The library without the unknown functions."""
+        return {name: effect for name, effect in self.library.items() if name not in UNKNOWN}
+
+    @cached_property
+    def readings(self):
+        """What was read at all points, None where that are positions of the tool."""
+        return rows.readings(self.measurements, self.arm_mm)
+
+    @cached_property
+    def _kept(self):
+        """Rows (m,) of the used points among those of all readings."""
+        points = np.arange(len(self.used)) if self.readings is None else self.readings.rows
+        return np.flatnonzero(self.used[points])
+
+    @cached_property
+    def along_paths(self):
+        """Whether the points lie along paths, not in any order."""
+        command, run = rows.command(self.measurements), self.measurements["run"].to_numpy()
+        return passes_points(self.measurements) or follows_path(command, run)
+
+    @cached_property
+    def beside(self):
+        """Which rows (m,) are of reflectors beside the robot."""
+        on_world = rows.on_the_world(self.measurements)
+        return np.zeros(len(self), dtype=bool) if on_world is None else on_world[self.at]
+
+    def of_rows(self, values):
+        """Of values (n, 3, ..) of all that was read those of the rows (m, 3, ..), as they count."""
+        kept = values[self._kept]
+        if self.beside_scale == 1.0:
+            return kept
+        scale = np.where(self.beside, self.beside_scale, 1.0)
+        return kept * scale.reshape(-1, *[1] * (kept.ndim - 1))
+
+    @cached_property
+    def at(self):
+        """Number (m,) of the point that each row was read at."""
+        return self._kept if self.readings is None else self.readings.rows[self._kept]
+
+    @cached_property
+    def stop(self):
+        """Number (m,) of the stop that each row was read at: several reflectors may be seen at one."""
+        return stops(self.measurements)[self.at]
+
+    @cached_property
+    def kind(self):
+        """Number (m,) of the target of each row, orientations apart."""
+        target = np.zeros(len(self), dtype=int)
+        if "target" in self.measurements:
+            target = np.unique(self.points["target"], return_inverse=True)[1]
+        return 2 * target + ~self.positions
+
+    @cached_property
+    def positions(self):
+        """Which rows (m,) are positions."""
+        return self._kept < len(self.used)
+
+    @cached_property
+    def on_robot(self):
+        """Which rows (m,) are positions of points on the robot: a distance in mm that is stated is one of these."""
+        return self.positions & ~self.beside
+
+    @property
+    def count(self):
+        """Number of used points."""
+        return int(self.used.sum())
+
+    @property
+    def points(self):
+        """The measurement table, row by row of what was read (m)."""
+        return self.measurements.iloc[self.at]
+
+    @property
+    def run(self):
+        """Run numbers (m,)."""
+        return self.measurements["run"].to_numpy()[self.at]
+
+    @cached_property
+    def series(self):
+        """Numbers (m,) of what follows one another smoothly: runs, of each reflector, orientations apart."""
+        return reading_series(self.measurements, self.readings)[self._kept]
+
+    def by_point(self, values):
+        """Values (m, 3, ..) of rows as those of the used points (n, 3 or 6, ..), zero where no orientation was read."""
+        if self.positions.all():
+            return values
+        result = np.zeros((self.count, 6, *values.shape[2:]))
+        result[:, :3] = values[self.positions]
+        result[np.searchsorted(np.flatnonzero(self.used), self.at[~self.positions]), 3:] = values[~self.positions]
+        return result
+
+    def under(self, noise):
+        """The case under a NoiseModel."""
+        return replace(self, noise=noise, noise_mm=noise.mean_mm)
+
+    def evidence(self, linear):
+        """The ModelEvidence on a linearisation."""
+        noise = (self.noise or NoiseModel.white(self.noise_mm)).counted
+        rows = {name: known[self.at] for name, known in self.known.items() if name in self.library}
+        incomplete = {name: known for name, known in rows.items() if not known.all()}
+        return ModelEvidence(self.library, linear, self.series, noise, self.along_paths, incomplete)
+
+    def complete(self, effects):
+        """Rows (m,) at which the campaign has all that some effects need."""
+        needed = (self.known[name][self.at] for name in sorted(set(effects) & set(self.known)))
+        return np.all([np.ones(len(self), dtype=bool), *needed], axis=0)
+
+    def at_complete(self, effects):
+        """The case of the points alone at which the campaign has all that some effects need."""
+        rows = self.complete(effects)
+        return self if rows.all() else self.without(~rows)
+
+    def with_approach(self, state):
+        """The case with the senses in which the drives arrive as a state and the readings tell them."""
+        if not np.isfinite(self.motion.approach).any():
+            return self
+        approach = np.where(np.isfinite(self.motion.approach), 0.0, np.nan)
+        if any(has_direction(self.library[name]) for name, _ in state.effects):
+            approach = estimate_approach(self, state, approach_responses(self, state))
+        return replace(self, motion=replace(self.motion, approach=approach))
+
+    @property
+    def axis_mm(self):
+        """Deviation (3,) of the noise of each axis."""
+        return np.full(3, self.noise_mm) if self.noise is None else self.noise.axis_mm
+
+    def standing(self, state):
+        """The case with the loads where the robot of a state stands, if its platform can turn.
+
+        Where positions alone were read a calibration may turn the platform as it likes: its turn does not count then.
+        What the weight changes of the loads stays as it was: a sag changes that by a share of itself.
+        """
+        if not self.mechanism.orients:
+            return self
+        at = standing(self.mechanism, self.driven, self.posed(state), self.readings is not None)
+        same = {"load_slopes": partial(getattr, self.motion, "slopes"), "approach": self.motion.approach}
+        return replace(self, motion=replace(self.motion_at(at), **same))
+
+    def without(self, dropped):
+        """The case without the used points of the rows flagged in (m,)."""
+        used = self.used.copy()
+        used[self.at[dropped]] = False
+        return replace(self, used=used)
+
+    @cached_property
+    def driven(self):
+        """Actuator values (N, K) and commanded positions (N, 3)."""
+        return rows.actuators(self.measurements, self.mechanism), rows.command(self.measurements)
+
+    @cached_property
+    def _measured(self):
+        """Measured positions (N, 3)."""
+        return rows.measured(self.measurements)
+
+    def sim(self, deviations):
+        """Positions (N, 3) of the tool by the calibrated sim without effects."""
+        actuators, command = self.driven
+        return self.mechanism.forward(actuators, deviations, command)
+
+    def weight(self, state):
+        """What the weight of a state is off by, by name."""
+        return dict.fromkeys(self.doubts, 0.0) | state.weight
+
+    @last_kept_of
+    def contributions(self, state):
+        """What each effect of a state, (name, shape), changes along the motion."""
+        return {key: state.contribution(self.library, key, self.motion) for key in state.effects}
+
+    @last_kept_of
+    def contribution(self, state):
+        """What the effects of a state change along the motion."""
+        return sum(self.contributions(state).values(), Contribution())
+
+    @last_kept_of
+    def posed(self, state):
+        """Poses (N) of the exact closure corrected by a state, and the twists of deviations and effects."""
+        actuators, command = self.driven
+        twists = self.mechanism.twists(state.deviations) + self.contribution(state).twists
+        return self.mechanism.solve(actuators, command, twists), twists
+
+    def map_of(self, state):
+        """The TwistMap of all points at a state's poses; see `rrru.kinematics.robot.Robot.map`."""
+        actuators, _ = self.driven
+        if self.readings is None and not state.effects:
+            return self.mechanism.map_at(actuators, self.sim(state.deviations), state.deviations)
+        return self.mechanism.map(actuators, *self.posed(state), self.readings)
+
+    def left(self, state):
+        """What is read minus the sim corrected by a state, of all points: positions (N, 3), then orientations.
+
+        The sim is the exact closure where the state has effects, the calibrated one where it has none.
+        """
+        if self.readings is not None:
+            return lacking(self.mechanism, self.readings, *self.posed(state))
+        model = self.mechanism.measured(*self.posed(state)) if state.effects else self.sim(state.deviations)
+        return self._measured - model
+
+    def by_other(self, robot, poses, twists):
+        """What is read minus another robot at Poses (N) under twists (N or 1, sites, 6), of the used points (m, 3)."""
+        if self.readings is not None:
+            return self.of_rows(lacking(robot, self.readings, poses, twists))
+        return self.of_rows(self._measured - robot.measured(poses, twists))
+
+    def residual(self, state):
+        """`left` of the used points (m, 3)."""
+        return self.of_rows(self.left(state))
+
+    def linearise(self, state, keys=None):
+        """The sim linearised about a state, see `rrru.diagnosis.linearise`."""
+        return linearised(self, state, keys)

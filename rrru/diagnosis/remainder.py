@@ -1,0 +1,212 @@
+"""What the unexplained part of a gap looks like: which variable it follows, how smoothly, and how large it is.
+
+A Gaussian process of one variable at a time is fitted to what the verdict's model and its calibration leave: a function
+f of a drive's value, which makes J f of the positions (J: derivative by the drive), or a function of the place, the
+time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its covariance is
+a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian
+Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. What it
+predicts of a fold, a fifth of all stretches of five points, comes from the others.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.linalg import solve_triangular
+from scipy.spatial.distance import cdist
+
+from rrru.diagnosis.heldout import within
+from rrru.diagnosis.options import OPTIONS
+from rrru.robots.drive_words import drive_words
+
+COLUMNS = ("follows", "explained", "scale", "unit", "rms_mm")
+NO_REMAINDER = pd.DataFrame(columns=COLUMNS)
+# deviations of the function over the rms of the remainder
+_AMPLITUDES = (0.3, 1.0, 3.0)
+_JITTER = 1e-8
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """follows: in words; value (n, d) with its unit; drive: number of the drive that the function is added to, None
+    where it moves the positions; steps: the value itself is the function, at each of its columns.
+    """
+
+    follows: str
+    value: np.ndarray
+    unit: str
+    drive: int | None = None
+    steps: bool = False
+
+
+def remainder_rows(attribution):
+    """Rows of `gap_remainder` without the campaign, the variable that explains most first.
+
+    explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
+    over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
+    """
+    case = attribution.case
+    rows = case.on_robot
+    linear = attribution.evidence.linear
+    # under a smooth discrepancy a fit leaves to that what the calibration could take away
+    left, drive = _without_calibration(case.residual(attribution.state), linear, rows), linear.drive[rows]
+    stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
+    fold = (stretch % OPTIONS.stretch_folds)[rows]
+    beyond = (left**2).sum() - left.size * case.noise_mm**2
+    result = []
+    for variable in _variables(case, rows) if beyond > 0.0 else ():
+        predicted, scale = _predicted(variable, left, drive, fold, case.noise_mm)
+        explained = 1.0 - (((left - predicted) ** 2).sum() - left.size * case.noise_mm**2) / beyond
+        rms = float(np.sqrt((predicted**2).sum(axis=1).mean()))
+        result.append((variable.follows, float(np.clip(explained, 0.0, 1.0)), scale, variable.unit, rms))
+    result.sort(key=lambda row: -row[1])
+    return pd.DataFrame(result, columns=COLUMNS)
+
+
+def followed_alike(attribution, rows, names):
+    """Which of some effects of the fit do what the remainder does, and the remainder's rms in mm.
+
+    rows: of `gap_remainder`; names: of effects. Where one variable predicts most of the remainder, an effect is such a
+    one if its law knows that variable alone and most of its own part is a function as smooth as the one found: laws
+    that need the time for the time, laws that need nothing but the drives' values for these and for the place.
+    """
+    best = rows.iloc[0] if len(rows) else None
+    if best is None or best["explained"] < OPTIONS.min_followed_share:
+        return (), 0.0
+    case, linear, state = attribution.case, attribution.evidence.linear, attribution.state
+    on_robot = case.on_robot
+    variable = next(one for one in _variables(case, on_robot) if one.follows == best["follows"])
+    scaled = dict(_functions(variable))
+    functions = scaled[best["scale"]] if best["scale"] in scaled else next(iter(scaled.values()))
+    design = _design(variable, functions, linear.drive[on_robot]).reshape(3 * int(on_robot.sum()), -1)
+    found = []
+    for key, coordinates in state.effects.items():
+        part = _without_calibration(linear.columns[key] @ coordinates, linear, on_robot).ravel()
+        fitted = design @ np.linalg.lstsq(design, part, rcond=1e-3)[0]
+        if (
+            key[0] in names
+            and _knows(case.effects[key[0]], best["follows"])
+            and ((part - fitted) ** 2).sum() < (1.0 - OPTIONS.min_followed_share) * (part**2).sum()
+        ):
+            found.append(key[0])
+    return tuple(found), float(best["rms_mm"]) if found else 0.0
+
+
+def _without_calibration(values, linear, rows):
+    """What the calibration leaves of values (m, 3) at some rows, by plain least squares there."""
+    own = values[rows]
+    columns = linear.base[rows].reshape(own.size, -1)
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    fitted = columns / size @ np.linalg.lstsq(columns / size, own.ravel(), rcond=1e-9)[0]
+    return own - fitted.reshape(own.shape)
+
+
+def _knows(effect, follows):
+    """Whether a law knows the variable, in words, and no other but those that it determines."""
+    return "time_s" in effect.needs if follows == "the time" else not effect.needs
+
+
+def _variables(case, rows):
+    """The variables that may be followed at some rows (m,) of a case, those that do not change left out."""
+    motion, at = case.motion, case.at[rows]
+    words, units = drive_words(case.mechanism), case.mechanism.parts.units
+    names = words.all_names
+    found = [
+        _Variable(f"the value of {name}", motion.drive[at, k : k + 1], unit, k)
+        for k, (name, unit) in enumerate(zip(names, units, strict=False))
+    ]
+    found.append(_Variable("the place", motion.position_mm[at], "mm"))
+    found.append(_Variable("the time", motion.time_s[at][:, None], "s"))
+    found.append(_Variable("the payload", motion.payload_kg[at][:, None], "kg"))
+    speed = case.points["speed_mm_s"].to_numpy(dtype=float)[rows]
+    found.append(_Variable("the speed", speed[:, None], "mm/s"))
+    sense = np.sign(np.where(np.abs(motion.drive_rate[at]) > OPTIONS.min_drive_rate, motion.drive_rate[at], 0.0))
+    found.append(_Variable("the sense of motion of the drives", sense, "1", steps=True))
+    return [one for one in found if np.isfinite(one.value).all() and np.ptp(one.value, axis=0).max() > 0.0]
+
+
+def _predicted(variable, left, drive, fold, noise_mm):
+    """What a function of a variable predicts (m, 3) of the rows left out in each fold, and its scale.
+
+    left (m, 3): the remainder; fold (m,): of its rows; drive (m, 3, K): derivative by the actuator values.
+    """
+    best = -np.inf, None, np.nan
+    size = float(np.sqrt((left**2).mean()))
+    for scale, functions in _functions(variable):
+        design = _design(variable, functions, drive)
+        unit = size / max(float(np.sqrt((design**2).sum(axis=-1).mean())), 1e-300)
+        problem = _Regression(design * unit, left, noise_mm)
+        for amplitude in _AMPLITUDES:
+            evidence = problem.log_evidence(amplitude)
+            if evidence > best[0]:
+                best = evidence, (problem, amplitude), scale
+    problem, amplitude = best[1]
+    return problem.left_out(fold, amplitude), best[2]
+
+
+def _design(variable, functions, drive):
+    """What functions (m, f) of a variable make of the positions (m, 3, k); drive (m, 3, K): derivative by drives."""
+    if variable.steps:
+        return drive * functions[:, None, :]
+    if variable.drive is not None:
+        own = drive[:, :, variable.drive]
+        # the function has the drive's unit, its size is that of what it makes
+        own = own / max(float(np.sqrt((own**2).mean())), 1e-300)
+        return own[:, :, None] * functions[:, None, :]
+    return (functions[:, None, None, :] * np.eye(3)[:, :, None]).reshape(len(functions), 3, -1)
+
+
+def _functions(variable):
+    """Pairs of a scale and functions (m, f) at the values, whose independent unit coefficients make the process."""
+    value = variable.value
+    if variable.steps:
+        yield np.nan, value
+        return
+    width = float(np.linalg.norm(np.ptp(value, axis=0)))
+    points = _inducing(value)
+    for share in OPTIONS.remainder_scales:
+        scale = share * width
+        among = np.exp(-0.5 * (cdist(points, points) / scale) ** 2)
+        across = np.exp(-0.5 * (cdist(points, value) / scale) ** 2)
+        factor = np.linalg.cholesky(among + _JITTER * np.eye(len(points)))
+        yield scale, solve_triangular(factor, across, lower=True).T
+
+
+def _inducing(value):
+    """Some of the values (m, d), each the one that is farthest from those before it."""
+    value = np.unique(value, axis=0)
+    count = min(OPTIONS.remainder_points, len(value))
+    chosen, distance = [0], np.linalg.norm(value - value[0], axis=1)
+    while len(chosen) < count:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(value - value[chosen[-1]], axis=1))
+    return value[chosen]
+
+
+class _Regression:
+    """Least squares of coefficients with a normal prior: design (m, 3, f), data (m, 3), noise per number."""
+
+    def __init__(self, design, data, noise_mm):
+        self._design, self._data, self._variance = design, data, noise_mm**2
+        flat = design.reshape(-1, design.shape[-1])
+        self._gram, self._moment = flat.T @ flat, flat.T @ data.ravel()
+        self._value, self._turned = np.linalg.eigh(self._gram)
+        self._value = np.maximum(self._value, 0.0)
+
+    def log_evidence(self, amplitude):
+        """Log marginal likelihood over that of no coefficients, under their prior deviation."""
+        ratio = amplitude**2 / self._variance
+        along = self._turned.T @ self._moment
+        gained = (along**2 * ratio / (1.0 + ratio * self._value)).sum() / self._variance
+        return 0.5 * float(gained - np.log1p(ratio * self._value).sum())
+
+    def left_out(self, fold, amplitude):
+        """Predictions (m, 3) of each fold by the others."""
+        result, penalty = np.empty_like(self._data), self._variance / amplitude**2 * np.eye(len(self._gram))
+        for number in np.unique(fold):
+            out = fold == number
+            own = self._design[out].reshape(-1, len(self._gram))
+            gram = self._gram - own.T @ own + penalty
+            moment = self._moment - own.T @ self._data[out].ravel()
+            result[out] = (own @ np.linalg.solve(gram, moment)).reshape(-1, 3)
+        return result

@@ -1,0 +1,136 @@
+"""Sentences on what a fit found of the robot apart from its effects."""
+
+import numpy as np
+
+from rrru.campaign.ingest.mastering import LARGE
+from rrru.campaign.noise import repeat_noise
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.kinematics.legs import WORLD
+
+# said where a part of the gap looks like random error and no pose was measured under the same conditions again
+REPEATABILITY_UNKNOWN = "repeatability is unknown: no pose was measured twice"
+
+
+def zero_notes(estimate, robot):
+    """Sentences on drives whose zeros are far off, such as "joint 4: zero, or the part that it moves, is off by 2
+    degrees (95 %: 1.98 to 2.02)".
+
+    estimate: of the robot's geometric errors. A zero that is one number with a frame, or with the place of what is
+    read, is off together with that, and one whose variance comes from the priors is not determined.
+    """
+    block, names = estimate.parameters.places[GEOMETRY], robot.parameters.names
+    known = dict(zip(names, range(block.start, block.stop), strict=True))
+    for drive in robot.parts.drives:
+        name = f"d{drive.column.rpartition('_')[0]}"
+        number = known.get(name)
+        if number is None:
+            continue
+        value, error = estimate.values[number], np.nan_to_num(estimate.standard_errors[number])
+        if abs(value) <= max(LARGE[drive.unit], OPTIONS.min_zero_z * error):
+            continue
+        unit, scale = ("degrees", np.degrees(1.0)) if drive.unit == "rad" else ("mm", 1.0)
+        size = _sized(scale * value, scale * estimate.intervals[number], unit)
+        if others := _one_with(robot, name, LARGE[drive.unit]):
+            both = f"{drive.site}: zero and {others} are not separately identifiable"
+            yield f"{both}, combined they equal a zero offset of {size}"
+        elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
+            yield f"{drive.site}: zero is not determined by the readings, its most probable offset is {size}"
+        else:
+            yield f"{drive.site}: zero, or the part that it moves, is off by {size}"
+
+
+def _sized(value, ends, unit):
+    """A number with its 95 % interval (2,), to two digits of its half width."""
+    places = max(1 - int(np.floor(np.log10(max(0.5 * float(np.ptp(ends)), 1e-12)))), 0)
+    value, low, high = (f"{one:.{places}f}" for one in (value, *ends))
+    return f"{value} {unit} (95 %: {low} to {high})"
+
+
+def _one_with(robot, zero, least):
+    """What a zero is confounded with, in words: what imitates an offset of `least` where it has its usual error."""
+    usual = {"mm": OPTIONS.outside_error_mm, "rad": OPTIONS.outside_error_rad}
+    on_platform = "the place of the target" if robot.legs.reflectors else "the place of the tool"
+    others = (
+        "the frame of the measurements" if WORLD in candidate.twists else on_platform
+        for candidate, size in robot.confounded_outside(zero)
+        if abs(size) * usual[candidate.unit] > least
+    )
+    return " and ".join(dict.fromkeys(others))
+
+
+def weight_notes(attribution):
+    """Sentences on what the weight is surely off by, as far as the readings determine it."""
+    for name, unit, value, interval, determined in _weight_off(attribution):
+        if determined:
+            size = _sized(value, interval, unit)
+            if unit == "kg":
+                yield f"the platform carries {size} more than stated"
+            else:
+                yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
+
+
+def weight_doubts(attribution):
+    """Sentences on what the weight seems to be off by where something else may be the reason."""
+    for name, unit, *_, determined in _weight_off(attribution):
+        if not determined:
+            what = "a mass at the platform" if unit == "kg" else f"a tilt of the base about {name[-1]}"
+            do = "measure with two loads" if unit == "kg" else "level the base"
+            yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
+
+
+def _weight_off(attribution):
+    """Name, unit, value, 95 % interval and whether it is determined of each number of the weight that is surely off.
+
+    With one load all that gives way is in proportion to it: the mass is then measured against masses of the links that
+    nobody has weighed.
+    """
+    fit, case = attribution.fit, attribution.case
+    estimate, weight = fit.estimate, fit.weight
+    if not weight:
+        return
+    block = estimate.parameters.places[WEIGHT]
+    shares, intervals = estimate.prior_shares[block], estimate.intervals[block]
+    several_loads = len(np.unique(np.nan_to_num(case.motion.payload_kg[case.used]))) > 1
+    for (name, unit, value, error), share, interval in zip(weight, shares, intervals, strict=True):
+        if abs(value) > OPTIONS.min_nuisance_z * error:
+            determined = share <= OPTIONS.max_prior_variance_share and (unit != "kg" or several_loads)
+            yield name, unit, value, interval, determined
+
+
+def measured_again(case):
+    """Whether poses of a Case were measured more than once under the same conditions."""
+    return repeat_noise(case.measurements[case.used])[1] > 0
+
+
+def noise_notes(case, stated_mm, contradicted):
+    """Sentences on a noise that contradicts the stated one (mm per axis) by more than a factor."""
+    if not stated_mm:
+        return
+    found = f"noise stated {stated_mm:.3g} mm per axis, found {case.noise_mm:.3g}"
+    if case.noise_mm > contradicted * stated_mm:
+        if measured_again(case):
+            yield f"{found}: the robot does not repeat, or the instrument is worse"
+        else:
+            yield f"{found}: the instrument is worse, or the robot has errors that are not in the model"
+            yield REPEATABILITY_UNKNOWN
+    elif case.noise_mm < stated_mm / contradicted:
+        yield f"{found}: the instrument is better"
+
+
+def posterior_notes(beliefs):
+    """A sentence on a Posterior that depends on where its search began."""
+    if beliefs.apart > OPTIONS.max_searches_apart:
+        yield (
+            f"the search over sets of effects has not settled: two searches give probabilities that differ by up to "
+            f"{beliefs.apart:.2f}"
+        )
+
+
+def fit_notes(attribution):
+    """Sentences on a fit that did not converge."""
+    end, terms = attribution.fit.estimate.end, attribution.fit.terms
+    if not end.converged:
+        names = ", ".join(term.effect for term in terms) or "the calibration"
+        yield f"the fit of {names} did not converge ({end.message}): its numbers are preliminary"

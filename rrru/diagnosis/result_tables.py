@@ -1,0 +1,217 @@
+"""The tables behind a verdict."""
+
+from itertools import zip_longest
+
+import numpy as np
+import pandas as pd
+from scipy.stats import t as student_t
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.detectability import identify
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.shrink import shrink_table
+from rrru.diagnosis.terms import per_leg, sites, spread
+from rrru.diagnosis.variance_by_factor import drive_errors, locate
+from rrru.diagnosis.verdict import label
+from rrru.estimation.intervals import QUANTILE_95
+
+# the table has columns for so many drives of either unit, whatever the robot
+_LEAST_DRIVES = 3
+_EMPTY = {"legs": "", "log_evidence": np.nan}
+_EMPTY |= dict.fromkeys(("heldout_gain", "heldout_gain_low", "heldout_gain_high"), np.nan) | {"note": ""}
+
+
+def details_of(attribution, verdict, steps, residual_mm, generator, draws):
+    """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
+    case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
+    exact = case.residual(attribution.state) if attribution.state.effects else None
+    drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
+    return {
+        "gap_locate": locate(case, residual_mm, linear.drive, generator, draws),
+        "gap_identifiability": identify(case, linear),
+        "gap_attribute": _attribute_rows(attribution, verdict),
+        "gap_sets": _set_rows(attribution),
+        "gap_shrink": shrink_table(case, steps, exact),
+        "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
+    }
+
+
+def _attribute_rows(attribution, verdict):
+    """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
+    beliefs, case = attribution.posterior, attribution.case
+    result = [_effect_row(attribution, name) for name in case.effects]
+    result += [
+        {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
+        for name, note in case.untestable.items()
+    ]
+    none, unknown = beliefs.sets().get((frozenset(), False), 0.0), beliefs.probability_unexplained
+    result.append({"effect": "none", "probability": none, **_EMPTY})
+    result.append({"effect": "unexplained", "probability": unknown, **_EMPTY})
+    rows = pd.DataFrame(result)
+    rows.insert(2, "decision", [verdict.decision(name) for name in rows["effect"]])
+    groups = map(verdict.group_of, rows["effect"])
+    rows.insert(3, "group_probability", [group.probability if group else np.nan for group in groups])
+    return rows
+
+
+def where(attribution, effects):
+    """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
+    case, found = attribution.case, []
+    for term in attribution.hypothesis.terms:
+        if term.effect in effects:
+            names = sites(case.library, case.motion, term)
+            found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
+    return ", ".join(dict.fromkeys(found))
+
+
+def _effect_row(attribution, name):
+    """The row of one testable effect."""
+    beliefs = attribution.posterior
+    row = {"effect": name, "probability": beliefs.marginal(name), **_EMPTY}
+    holding = [h for h in beliefs.hypotheses if name in h.effects]
+    if not holding:
+        return row | {"note": "far less probable than others"}
+    best = max(holding, key=lambda h: h.evidence.max())
+    row["log_evidence"] = float(best.evidence.max() - attribution.evidence.on_library().none.max())
+    if per_leg(attribution.case.library[name]) and (legs := beliefs.legs(name)):
+        row["legs"] = str(max(legs, key=legs.get))
+    single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
+    if single:
+        level, held_out = int(single.evidence.argmax()), attribution.held_out.on_complete(single.terms)
+        alone = held_out.predict((), [], level).log_score
+        gained = held_out.predict(single.terms, single.strengths[level], level).log_score - alone
+        by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
+        row["heldout_gain"] = float(by_fold.sum())
+        if len(by_fold) > 1:
+            half = float(student_t.ppf(0.975, len(by_fold) - 1) * np.sqrt(len(by_fold)) * by_fold.std(ddof=1))
+            row |= {"heldout_gain_low": row["heldout_gain"] - half, "heldout_gain_high": row["heldout_gain"] + half}
+    return row
+
+
+def _set_rows(attribution):
+    """Rows of `gap_sets`: the most probable sets."""
+    result, none = [], attribution.evidence.on_library().none.max()
+    sets = list(attribution.posterior.sets().items())[: OPTIONS.max_listed_sets]
+    for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
+        hypothesis, _ = attribution.posterior.best_of(effects, unexplained)
+        row = {
+            "rank": rank,
+            "effects": label(tuple(sorted(effects)), unexplained),
+            "legs": ", ".join(f"{term.effect}: {term.legs}" for term in hypothesis.terms),
+            "unexplained": unexplained,
+            "probability": probability,
+            "log_evidence": float(hypothesis.evidence.max() - none),
+        }
+        result.append(row)
+    return pd.DataFrame(result)
+
+
+def parameter_rows(attribution):
+    """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
+    fit, library = attribution.fit, attribution.case.library
+    parameters, errors = attribution.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
+    intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
+    result = [
+        ("calibration", parameter.name, parameter.unit, value, error, *interval, held)
+        for parameter, value, error, interval, held in zip(
+            parameters,
+            fit.state.deviations,
+            errors,
+            intervals[places[GEOMETRY]],
+            fit.estimate.at_bound[places[GEOMETRY]].tolist(),
+            strict=True,
+        )
+    ]
+    for term in fit.terms:
+        effect, (values, errors, ends) = library[term.effect], _effect_values(fit, library, term)
+        bound = effect.parameters.at_bound(values) & (errors > 0.0)
+        errors = np.where(errors > 0.0, errors, np.nan)
+        result += [
+            (term.effect, parameter.name, parameter.unit, value, error, *interval, held)
+            for parameter, value, error, interval, held in zip(
+                effect.parameters, values, errors, ends, bound.tolist(), strict=True
+            )
+        ]
+    bounds, own = attribution.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    result += [
+        (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
+        for (name, unit, value, error), interval in zip(fit.weight, own, strict=True)
+    ]
+    numbers = ("value", "standard_error", "low_95", "high_95", "at_bound")
+    return pd.DataFrame(result, columns=("effect", "parameter", "unit", *numbers))
+
+
+def value_steps(fit, library, term):
+    """Parameter values (p,) of a term's effect a step above and below what was fitted, and the size between both.
+
+    One such step for each number of `ModelFit.effect_covariance`, for derivatives by these.
+    """
+    state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
+    shape, present, matrix = state.shape(library, key), state.effects[key], spread(coordinates, term.legs)
+    names, _ = fit.effect_covariance(term)
+    shifts = [(1e-4 * column * coordinates.typical.max(), {}) for column in matrix.T]
+    shifts += [(0.0, {name: 1e-4 * max(abs(shape[name]), 1e-6)}) for name in names]
+    for shift, moved in shifts:
+        up, down = (
+            coordinates.to_values(
+                present + sign * shift, dict(shape) | {name: shape[name] + sign * step for name, step in moved.items()}
+            )
+            for sign in (1.0, -1.0)
+        )
+        yield up, down, 2.0 * (sum(moved.values()) if moved else np.max(shift))
+
+
+def _effect_values(fit, library, term):
+    """Parameter values (p,) of a term's effect, standard errors (p,), 0 for what was not fitted, intervals (p, 2).
+
+    The interval of a parameter that follows one fitted number is that number's, of others it is two standard errors to
+    both sides; NaN for what was not fitted.
+    """
+    state, key, coordinates = fit.state, (term.effect, term.shape), library[term.effect].coordinates
+    covariance, values = (
+        fit.effect_covariance(term)[1],
+        coordinates.to_values(state.effects[key], state.shape(library, key)),
+    )
+    # a phase may have gone once round
+    differences = [(up - down, size) for up, down, size in value_steps(fit, library, term)]
+    slope = np.stack([np.where(np.abs(step) > np.pi, 0.0, step) / size for step, size in differences], axis=-1)
+    errors = np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))
+    ends = values[:, None] + QUANTILE_95 * np.outer(errors, [-1.0, 1.0])
+    numbers, intervals = fit.effect_numbers(term)
+    for row, own in enumerate(slope):
+        (followed,) = np.nonzero(own)
+        if len(followed) == 1:
+            number = followed[0]
+            ends[row] = np.sort(values[row] + own[number] * (intervals[number] - numbers[number]))
+    ends[~slope.any(axis=1)] = np.nan
+    return values, errors, ends
+
+
+def _point_rows(attribution, after, drive):
+    """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected sim and errors of the drives."""
+    case = attribution.case
+    frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
+    before = case.left(attribution.calibrated)[: len(frame)]
+    units = case.mechanism.parts.units
+    after, drive = (_at(case.used, values) for values in (after, drive))
+    unknown = np.full(len(before), np.nan)
+    return frame.assign(
+        **rows.vector_columns("command", rows.command(case.measurements)),
+        **rows.vector_columns("before", before),
+        **rows.vector_columns("after", after),
+        **{
+            f"drive_error{k}_{unit}": drive[:, k - 1] if own == unit else unknown
+            for unit in ("rad", "mm")
+            for k, own in zip_longest(range(1, max(len(units), _LEAST_DRIVES) + 1), units)
+        },
+        used=case.used,
+    )
+
+
+def _at(used, values):
+    """Values (m, 3) at all points from those (n, 3) of the used ones, NaN at the others."""
+    result = np.full((len(used), values.shape[1]), np.nan)
+    result[used] = values
+    return result

@@ -1,0 +1,131 @@
+"""What a diagnosis is told: which effects may act, what is known of them, beliefs, seed."""
+
+from dataclasses import dataclass, field, replace
+from math import comb
+
+import numpy as np
+
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.effects.library import HOLDS, NAMES, find
+from rrru.errors import ConfigError
+from rrru.robots.catalogue import MECHANISMS
+
+# in a configuration in place of the library's names
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Beliefs before the data: a mixture of robots with few effects and of robots as they are, with many small ones.
+
+    counts: of robots with few, probabilities of zero, one, two and three effects; each effect more is as much rarer as
+    the third is after the second. each: of robots as they are, the probability that an effect acts, for each alike and
+    whatever else acts; share: of robots as they are. unexplained: probability of something unexplained besides.
+    tolerance: share of what a set explains up to which a remaining discrepancy still counts as the laws' own
+    inaccuracy.
+    """
+
+    counts: tuple = (0.3, 0.55, 0.13, 0.02)
+    unexplained: float = 0.1
+    tolerance: float = 0.04
+    each: float = 0.1
+    share: float = 0.5
+
+    def log_set(self, count, library):
+        """Logarithm of the probability of one set of so many effects of a library of so many."""
+        few = self.log_count(count) - np.log(comb(library, count))
+        as_they_are = count * np.log(self.each) + (library - count) * np.log1p(-self.each)
+        with np.errstate(divide="ignore"):
+            log_few, log_as_they_are = np.log([1.0 - self.share, self.share])
+        return float(np.logaddexp(log_few + few, log_as_they_are + as_they_are))
+
+    def log_count(self, count):
+        """Logarithm of the probability of so many effects."""
+        *_, last, most = self.counts
+        listed = self.counts[min(count, len(self.counts) - 1)]
+        return float(np.log(listed) + max(count + 1 - len(self.counts), 0) * np.log(most / last))
+
+
+@dataclass(frozen=True)
+class GapSettings:
+    """effects: names or `module:object` of the laws that may act; known: effect to values of parameters that are known,
+    such as a gear ratio; prior; draws: resamplings for intervals; seed; use_near_singularity: fit points marked so.
+    """
+
+    effects: tuple = NAMES
+    known: dict = field(default_factory=dict)
+    prior: Prior = field(default_factory=Prior)
+    draws: int = 200
+    seed: int = 0
+    use_near_singularity: bool = True
+
+    @classmethod
+    def from_config(cls, section, seed=0, use_near_singularity=True):
+        """Settings of the configuration's `gap` section."""
+        keys = ("prior_counts", "prior_unexplained", "tolerance", "prior_each", "prior_share")
+        counts, *others = (section[key] for key in keys)
+        prior = Prior(tuple(counts), *others)
+        named = NAMES if section["effects"] == ALL else section["effects"]
+        effects = *named, *section["own_effects"]
+        return cls(effects, section["known"], prior, section["draws"], seed, use_near_singularity)
+
+    def without(self, name):
+        """The settings with one effect taken out of the library, and those that hold it as a special case."""
+        out = {name, *(general for general, held in HOLDS.items() if name in held)}
+        return replace(self, effects=tuple(effect for effect in self.effects if effect not in out))
+
+    def library(self, robot):
+        """Effects by name that a robot may have, what is known of them fixed.
+
+        Raises ConfigError for an unknown effect or parameter.
+        """
+        found = [effect for effect in (find(name, robot) for name in self.effects) if effect is not None]
+        result = {effect.name: effect for effect in found}
+        if len(result) < len(found):
+            raise ConfigError(f"gap.effects names an effect twice: {', '.join(self.effects)}")
+        for name, values in self.known.items():
+            if name in result:
+                result[name] = _with_known(result[name], values)
+            elif name == WEIGHT:
+                _check_weight(values)
+            elif name not in self.effects:
+                raise ConfigError(f"gap.known: no effect {name!r}; known: {', '.join((*result, WEIGHT))}")
+        # legs are of one design, the joints of an arm are not
+        alike = robot.legs.parallel
+        return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
+
+    def doubts(self, doubts):
+        """What the weight may be off by, by name: nothing where it is known."""
+        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in doubts.items()}
+
+
+def _check_weight(values):
+    """Raise ConfigError where not the numbers of the weight are known, or where they are not zero.
+
+    Leans about all axes are allowed: robots of one configuration may stand upright or hang on a wall.
+    """
+    allowed = ("extra_kg", *(f"lean_{axis}" for axis in "xyz"))
+    if unknown := [name for name in values if name not in allowed]:
+        raise ConfigError(f"gap.known: weight has no {unknown[0]!r}; allowed: {', '.join(allowed)}")
+    if off := [name for name, value in values.items() if value]:
+        raise ConfigError(f"gap.known: weight.{off[0]} must be 0, as it was told; a mass is stated with the campaign")
+
+
+def _with_known(effect, values):
+    """The effect with parameters of its shapes fixed to known values; raises ConfigError where no shape holds one."""
+    coordinates = effect.coordinates
+    unknown = [key for key in values if key not in coordinates.shapes[0]]
+    if unknown:
+        allowed = ", ".join(coordinates.shapes[0]) or "none"
+        raise ConfigError(f"gap.known: {effect.name} has no known {unknown[0]!r}; allowed: {allowed}")
+    fixed = dict.fromkeys(tuple((dict(shape) | dict(values)).items()) for shape in coordinates.shapes)
+    shapes = tuple(map(dict, fixed))
+    # where all is known nothing is fitted further
+    doubt = 0.0 if set(values) == set(shapes[0]) else coordinates.doubt
+    return replace(effect, coordinates=replace(coordinates, shapes=shapes, searched=None, doubt=doubt))
+
+
+def check(config):
+    """Raise ConfigError where the `gap` section names an effect or a parameter that does not exist."""
+    for kind in MECHANISMS.values():
+        GapSettings.from_config(config["gap"]).library(kind())

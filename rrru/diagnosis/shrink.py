@@ -1,0 +1,161 @@
+"""How far the gap shrinks as effects are added: on points left out of the fit, and on the re-simulated campaign."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from rrru.diagnosis.heldout import resampled_rows
+from rrru.diagnosis.options import OPTIONS
+
+CLOSED = ("share_closed", "share_closed_low", "share_closed_high")
+
+
+@dataclass(frozen=True)
+class ShrinkStep:
+    """The gap after some effects are added, at those of m readings that count.
+
+    squares_mm2 (m,): of the gap at each reading, less noise. For b draws: picks (b, m), readings resampled from all;
+    shown_mm2 (m,): their part from the residuals; moved_mm2 (b, m): their part from drawn numbers.
+    """
+
+    added: str
+    effects: tuple
+    residual_mm: np.ndarray
+    squares_mm2: np.ndarray
+    picks: np.ndarray
+    shown_mm2: np.ndarray
+    moved_mm2: np.ndarray
+    counted: np.ndarray
+
+    def part(self, chosen):
+        """The step at those of the chosen readings (m,) that count."""
+        return replace(self, counted=self.counted & chosen)
+
+    @property
+    def gap_rms_mm(self):
+        """Root mean square gap."""
+        return gap_rms(self.squares_mm2[self.counted])
+
+    @property
+    def drawn_rms_mm(self):
+        """Root mean square gap (b,) of the draws, NaN of those that have no reading that counts."""
+        picked = self.counted[self.picks]
+        with np.errstate(invalid="ignore"):
+            shown = np.where(picked, self.shown_mm2[self.picks], 0.0).sum(axis=1) / picked.sum(axis=1)
+        return np.sqrt(np.maximum(shown + self.moved_mm2[:, self.counted].mean(axis=1), 0.0))
+
+
+def gap_rms(squares):
+    """Root mean square gap from squared gaps whose noise is taken off; zero where noise explains all."""
+    return float(np.sqrt(max(float(np.mean(squares)), 0.0)))
+
+
+def order_by_share(attribution):
+    """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
+    hypothesis, level = attribution.hypothesis, attribution.level
+    left, chosen, result = list(hypothesis.terms), [], []
+    noise, counted = 3.0 * attribution.case.noise_mm**2, attribution.case.on_robot
+
+    def gap(terms):
+        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
+        return max(float((prediction.residual_mm[counted] ** 2).sum(axis=1).mean()) - noise, 0.0)
+
+    start = now = gap([])
+    while left:
+        after = [gap([*chosen, term]) for term in left]
+        best = int(np.argmin(after))
+        result.append((left[best], (now - after[best]) / max(start, 1e-12)))
+        now = after[best]
+        chosen.append(left.pop(best))
+    return tuple(result)
+
+
+def shrink_steps(attribution, ordered, generator, draws):
+    """Steps from the calibration alone to all effects, one after another.
+
+    ordered: terms in the order in which they are added. What the last step leaves is the uncertainty of its numbers
+    where it explains all, what the residuals show beyond the noise where it does not; the two are mixed by the
+    probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten) and
+    redraw the fitted numbers.
+    """
+    case, hypothesis, level = attribution.case, attribution.hypothesis, attribution.level
+    picks, result = resampled_rows(case, generator, draws), []
+    for count in range(len(ordered) + 1):
+        terms = ordered[:count]
+        last = count == len(ordered)
+        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
+        shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * case.noise_mm**2
+        weight = attribution.posterior.probability_unexplained if last else 1.0
+        numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
+        moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
+        squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2
+        drawn = picks, weight * shown, (1.0 - weight) * moved
+        names = terms[-1].effect if terms else "", tuple(term.effect for term in terms)
+        result.append(ShrinkStep(*names, prediction.residual_mm, squares, *drawn, case.on_robot))
+    return tuple(result)
+
+
+def share_closed(before, after):
+    """Share of the gap closed between two steps and its 95 % interval from their draws; zero where there was no gap."""
+    share = _share(before.gap_rms_mm, after.gap_rms_mm)
+    drawn = zip(before.drawn_rms_mm, after.drawn_rms_mm, strict=True)
+    pairs = [_share(*pair) for pair in drawn if np.isfinite(pair).all()]
+    low, high = np.quantile(pairs, OPTIONS.interval_quantiles) if pairs else (np.nan, np.nan)
+    return share, float(np.minimum(low, share)), float(np.maximum(high, share))
+
+
+def shrink_table(case, steps, resimulated_mm):
+    """Rows of `gap_shrink` without the campaign; resimulated_mm (m, 3): of the corrected sim, None without effects."""
+    trajectory = case.points["trajectory"].to_numpy()
+    noise = float(np.sqrt(3.0) * case.noise_mm)
+    rows = []
+    for number, step in enumerate(steps):
+        for name in ("*", *pd.unique(trajectory[case.on_robot])):
+            chosen = np.full(len(trajectory), True) if name == "*" else trajectory == name
+            part = step.part(chosen)
+            share = share_closed(steps[0].part(chosen), part) if number else (np.nan,) * 3
+            sizes = _sizes(part.residual_mm[part.counted]) | {"noise_rms_mm": noise, "gap_rms_mm": part.gap_rms_mm}
+            rows.append(_label(number, step, name, "held_out") | sizes | dict(zip(CLOSED, share, strict=True)))
+    if resimulated_mm is not None:
+        resimulated_mm = resimulated_mm[case.on_robot]
+        after = gap_rms((resimulated_mm**2).sum(axis=1) - noise**2)
+        sizes = _sizes(resimulated_mm) | {"noise_rms_mm": noise, "gap_rms_mm": after}
+        share = _share(steps[0].gap_rms_mm, after), np.nan, np.nan
+        label = _label(len(steps) - 1, steps[-1], "*", "resimulated")
+        rows.append(label | sizes | dict(zip(CLOSED, share, strict=True)))
+    return pd.DataFrame(rows)
+
+
+def model_row(shrink, kind, left_mm, noise_mm):
+    """A row of `gap_shrink` of a robot's file, given_model or corrected_model, beside the other rows.
+
+    left_mm (m, 3): measured minus the file's robot, NaN where it was not driven; noise_mm: per axis.
+    """
+    last, noise = shrink["step"].max(), float(np.sqrt(3.0) * noise_mm)
+    own = shrink[(shrink["step"] == (0 if kind == "given_model" else last)) & (shrink["kind"] == "held_out")].iloc[0]
+    start = float(shrink.loc[(shrink["step"] == 0) & (shrink["trajectory"] == "*"), "gap_rms_mm"].iloc[0])
+    left = left_mm[np.isfinite(left_mm).all(axis=1)]
+    after = gap_rms((left**2).sum(axis=1) - noise**2)
+    share = (np.nan if kind == "given_model" else _share(start, after)), np.nan, np.nan
+    label = {name: own[name] for name in ("step", "added", "effects")} | {"trajectory": "*", "kind": kind}
+    sizes = _sizes(left) | {"noise_rms_mm": noise, "gap_rms_mm": after}
+    return label | sizes | dict(zip(CLOSED, share, strict=True))
+
+
+def _label(number, step, trajectory, kind):
+    """What a row of `gap_shrink` is about."""
+    effects = "+".join(step.effects) or "none"
+    return {"step": number, "added": step.added, "effects": effects, "trajectory": trajectory, "kind": kind}
+
+
+def _sizes(residual_mm):
+    """Points and sizes of residuals (n, 3)."""
+    distance = np.linalg.norm(residual_mm, axis=1)
+    rms = float(np.sqrt((distance**2).mean()))
+    return {"points": len(distance), "rms_mm": rms, "max_mm": float(distance.max())}
+
+
+def _share(before, after):
+    """1 - after / before, not below -1; zero where there was no gap."""
+    return max(1.0 - after / before, -1.0) if before > 0.0 else 0.0

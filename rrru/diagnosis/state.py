@@ -1,0 +1,82 @@
+"""A corrected sim, and the sim linearised about it. Lengths in mm, angles in rad."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.effects.protocol import Contribution, gives_way, lacks_values
+
+
+@dataclass(frozen=True)
+class State:
+    """A corrected sim: deviations (p,) of the mechanism and, by effect and number of its shape, coordinates (c,).
+
+    shape_values: effect to the values of its shape's parameters where they have been fitted further; "weight" to what
+    the weight is off by.
+    """
+
+    deviations: np.ndarray
+    effects: dict
+    shape_values: dict = field(default_factory=dict)
+
+    @property
+    def weight(self):
+        """What weight is off by, by name, empty where that was not fitted, see `rrru.diagnosis.payload_nuisance`."""
+        return self.shape_values.get(WEIGHT, {})
+
+    def under(self, weight):
+        """The state with another weight."""
+        return replace(self, shape_values=self.shape_values | {WEIGHT: weight})
+
+    def shape(self, library, key):
+        """Values of the shape's parameters of one effect (name, shape) by name."""
+        name, number = key
+        if key in self.effects and name in self.shape_values:
+            # one that was searched may not be among those that a library lists
+            return self.shape_values[name]
+        return library[name].coordinates.shapes[number]
+
+    def contribution(self, library, key, motion, coordinates=None, shape=None):
+        """What one effect (name, shape) changes along a motion, at its own coordinates and shape or other ones."""
+        coordinates = self.effects[key] if coordinates is None else coordinates
+        effect = library[key[0]]
+        values = effect.coordinates.to_values(coordinates, shape or self.shape(library, key))
+        borne = motion.under(*self.weight.values()) if self.weight and gives_way(effect) else motion
+        made = effect.contribute(borne, values)
+        if not (getattr(effect, "needs", ()) and (lacking := lacks_values(effect, motion)).any()):
+            return made
+        # what it changes there is unknown; `rrru.diagnosis.evidence` does not count these readings for it
+        return Contribution(np.where(lacking[:, None, None], 0.0, made.twists))
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The sim linearised about a state.
+
+    data (m, 3): what was read minus model, with the state's effects taken out again; base (m, 3, p): derivative by the
+    mechanism's deviations; columns: (effect, shape) to the derivative (m, 3, c) by the effect's coordinates;
+    shape_columns: effect of the state to what its shape's parameters may be wrong by, (m, 3, q), each column one
+    standard deviation; shape_steps: effect to these parameters, each (name, value, stepped value); drive (m, 3, K):
+    derivative by the actuator values; by_weight: (effect, shape) of what bears loads to what a step of each of q
+    numbers of the weight makes of its columns, (m, 3, q c); weight_steps: these numbers, each (name, value, stepped
+    value, prior mean of so many steps); base_prior: standard deviations (p,) and means (p,) of the geometric errors'
+    priors, the means as steps from where they stand, None for flat priors.
+    """
+
+    data: np.ndarray
+    base: np.ndarray
+    columns: dict
+    shape_columns: dict
+    shape_steps: dict
+    drive: np.ndarray
+    by_weight: dict = field(default_factory=dict)
+    weight_steps: tuple = ()
+    base_prior: tuple | None = None
+
+    def at(self, rows):
+        """The linearisation at some of its rows (m,)."""
+        arrays = {name: getattr(self, name)[rows] for name in ("data", "base", "drive")}
+        columns = {name: getattr(self, name) for name in ("columns", "shape_columns", "by_weight")}
+        chosen = {name: {key: values[rows] for key, values in made.items()} for name, made in columns.items()}
+        return replace(self, **arrays, **chosen)

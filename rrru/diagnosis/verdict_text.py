@@ -1,0 +1,445 @@
+"""The answer of a diagnosis for people and for scripts: sentences in plain words, and the same facts as `verdict.json`.
+
+`workflow/schemas/verdict.schema.yaml` says what stands in it. mm, rad; sizes are root mean squares of 3-D distances.
+"""
+
+import numpy as np
+
+from rrru.diagnosis.design.run_limits import NO_PAYLOAD, WITHIN_LIMITS
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN
+from rrru.diagnosis.verdict import POSSIBLE
+from rrru.effects.causes import cause_texts
+from rrru.robots.drive_words import DriveWords
+
+SCHEMA = 1
+_VERDICT = ("gap_rms_mm", "gap_after_rms_mm", "share_closed", "share_closed_low", "share_closed_high", "noise_rms_mm")
+_NOISE = ("noise_stated_mm", "noise_correlation", "noise_runs_mm", "noise_from")
+_PART = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probability")
+_WORST = ("name", "unit", "drive_value", "error", "low_95", "high_95")
+_NUMBER = ("parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound")
+_FOLLOWS = ("follows", "explained", "scale", "unit", "rms_mm")
+_RUN = ("run", "kind", "trajectory", "reverse", "speed_mm_s", "payload_kg", "points", "separates", "gain_nats")
+_APART = ("none", "unexplained")
+_OUTSIDE = {"none": "that nothing acts", "unexplained": "something that the library does not hold"}
+_CHECK = (
+    "Next: check units, signs and order of the drives, frame and places of targets, and whether the file is of this "
+    "robot: make check-data FILE=... names what reconciles them."
+)
+# first words of what no file holds where none was written
+NOT_CORRECTED = "not corrected: "
+_WORDS = DriveWords()
+# units of sentences for those of tables, and the factor: without rows of zeros
+_READABLE = {"1": ("", 1.0), "rad/(N mm)": ("mrad/(N m)", 1e6), "mm/(N mm)": ("µm/(N m)", 1e6)}
+_READABLE |= {"mm/N": ("µm/N", 1e3), "1/K": ("µm/(m K)", 1e6), "mm/s": ("µm/s", 1e3), "rad/s": ("µrad/s", 1e6)}
+_LIMITED = (NO_PAYLOAD, WITHIN_LIMITS)
+_UNSURE = "No cause is probable enough to be named; the most probable answer follows."
+_RANDOM = "random error above the stated noise. Repeatability is unknown: no pose was measured twice."
+
+
+def answer(campaign, verdict, tables, drives=_WORDS):
+    """The facts of one campaign as a mapping, which `rrru.store.json_files` writes.
+
+    verdict: the row of `gap_verdicts` as a mapping; tables: the frames of the other tables of the diagnosis by name;
+    drives: the robot's DriveWords.
+    """
+    budget = [_row(part, _PART) for part in tables["gap_budget"].to_dict("records")]
+    budget = [part | {"probability": _clipped(part["probability"])} for part in budget]
+    names = [name for name in verdict["effects"].split("+") if name not in _APART]
+    facts = {
+        "schema": SCHEMA,
+        "campaign": campaign,
+        "effects": [_effect(name, tables, budget, drives) for name in names],
+        "unexplained": "unexplained" in verdict["effects"].split("+"),
+        "probability": _clipped(verdict["probability"]),
+        "leg": verdict["leg"] or None,
+        "where": verdict["where"],
+        "confusable_with": [name for name in verdict["confusable_with"].split(", ") if name],
+        "groups": [_group(names.split(" | "), tables, budget) for names in verdict["groups"].split("; ") if names],
+        "searches_apart": verdict["searches_apart"],
+        **_row(verdict, _VERDICT + _NOISE),
+        "unexplained_follows": [_row(row, _FOLLOWS) for row in tables["gap_remainder"].to_dict("records")],
+        "worst_mm": [verdict[f"worst_{axis}_mm"] for axis in "xyz"],
+        "budget": budget,
+        "next": [_row(run, _RUN) for run in tables["gap_next_runs"].to_dict("records")],
+        "undecided": _undecided(verdict["undecided"], drives),
+        **_row(verdict, ("points", "dropped_points")),
+        "left_out": [_row(row, ("reason", "points")) for row in tables["gap_left_out"].to_dict("records")],
+        "notes": [note for note in verdict["notes"].split("; ") if note],
+        "no_answer": verdict["no_answer"],
+        "corrected_file": _corrected_file(verdict),
+    }
+    return facts | {"sentences": sentences(facts)}
+
+
+def _corrected_file(verdict):
+    """What the robot's corrected file is worth; None where the robot has no file."""
+    known = np.isfinite(verdict["file_error_mm"])
+    if not (known or verdict["not_in_model"]):
+        return None
+    return {
+        **{key: verdict[f"file_{key}"] if known else None for key in ("error_mm", "error_fresh_mm")},
+        "remainder": verdict["file_remainder"],
+        "headline": verdict["file_headline"],
+        "not_in_model": [one for one in verdict["not_in_model"].split("; ") if one],
+    }
+
+
+def sentences(facts):
+    """What the facts say, the headline first, for somebody who knows the robot and no statistics."""
+    if facts["no_answer"]:
+        return [_no_answer(facts), _CHECK]
+    file = facts["corrected_file"] or {"headline": ""}
+    said = [f"{file['headline'][0].upper()}{file['headline'][1:]}."] if file["headline"] else []
+    said += [_missed(facts), *_causes(facts), *_scatter(facts)]
+    said += _left(facts) if facts["effects"] else []
+    return [*said, *_open(facts), *_next(facts)]
+
+
+def readable(name):
+    """The name of an effect, or of several joined by +, as words."""
+    return name.replace("_", " ").replace("+", " + ")
+
+
+def rounded(value, digits=2):
+    """A number to some significant digits, without an exponent."""
+    if not (value and np.isfinite(value)):
+        return "0"
+    places = digits - 1 - int(np.floor(np.log10(abs(value))))
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def with_interval(value, low, high, unit=""):
+    """A number with its 95 % interval, all to two digits of the interval's half width.
+
+    >>> with_interval(0.12014, 0.11902, 0.12126, "mm")
+    '0.1201 mm (95 %: 0.1190 to 0.1213)'
+    """
+    places = 1 - int(np.floor(np.log10(0.5 * (high - low))))
+    # a rounded number below zero that is zero has no sign
+    value, low, high = (f"{round(one, places) + 0.0:.{max(places, 0)}f}" for one in (value, low, high))
+    return f"{value}{' ' if unit else ''}{unit} (95 %: {low} to {high})"
+
+
+def probability(value):
+    """A probability to two digits that claims no certainty."""
+    return "more than 0.99" if value > 0.995 else "less than 0.01" if value < 0.005 else f"{value:.2f}"
+
+
+def percent(share):
+    """A share in per cent; what effects that imitate each other have too much is left out."""
+    return f"{100.0 * min(max(share, 0.0), 1.0):.0f} %"
+
+
+def small_percent(share):
+    """A share in per cent that is not rounded to nothing."""
+    return "less than 1 %" if 0.0 < share < 0.005 else percent(share)
+
+
+def share_with_interval(part, follow=""):
+    """The share of a part of the budget, or of an effect, with its 95 % interval."""
+    return f"{percent(part['share'])}{follow} (95 %: {percent(part['share_low'])} to {percent(part['share_high'])})"
+
+
+def _row(values, names):
+    """Some entries of a mapping."""
+    return {name: values[name] for name in names}
+
+
+def _clipped(value):
+    """A probability that is a sum without what rounding adds to 1; NaN stays."""
+    return value if np.isnan(value) else min(value, 1.0)
+
+
+def _effect(name, tables, budget, drives):
+    """Facts of one effect of the verdict."""
+    share = next((part for part in budget if part["part"] == name and part["kind"] == "effect"), {})
+    cause = tables["gap_attribute"].set_index("effect").loc[name]
+    legs = cause["legs"] if isinstance(cause["legs"], str) else ""
+    numbers = tables["gap_parameters"].query("effect == @name").to_dict("records")
+    places = tables["gap_drive_functions"].query("effect == @name and worst")
+    one = (int(legs),) if legs.isdigit() else ()
+    return {
+        "name": name,
+        **vars(cause_texts(name, drives, one)),
+        "probability": _clipped(cause["probability"]),
+        "decision": cause["decision"],
+        "legs": legs,
+        "place": drives.place(*one) if one else "",
+        **{key: share.get(key) for key in ("rms_mm", "share", "share_low", "share_high")},
+        "parameters": [_row(number, _NUMBER) for number in numbers],
+        "worst_places": [_row(place, _WORST) for place in places.to_dict("records")],
+    }
+
+
+def _group(names, tables, budget):
+    """Facts of causes that cannot be told apart."""
+    causes = tables["gap_attribute"].set_index("effect").loc[names]
+    shares = {part["part"]: part["share"] for part in budget if part["kind"] == "effect"}
+    return {
+        "names": names,
+        "probabilities": [_clipped(float(one)) for one in causes["probability"]],
+        "probability": _clipped(float(causes["group_probability"].iloc[0])),
+        # they exclude each other, or nearly so
+        "share": sum(shares.get(name, 0.0) for name in names),
+    }
+
+
+def _no_answer(facts):
+    """Why nothing is said of causes."""
+    return f"No cause is named: {facts['no_answer']}."
+
+
+def _missed(facts):
+    """How far off the calibrated robot is at points that its calibration has not seen."""
+    gap, noise = (rounded(facts[name]) for name in ("gap_rms_mm", "noise_rms_mm"))
+    if facts["effects"] or facts["unexplained"]:
+        return f"After calibration the robot still misses by {gap} mm at points left out of it (noise taken out)."
+    sure = probability(facts["probability"])
+    return (
+        f"After calibration nothing systematic is left that these data could show (probability {sure}): "
+        f"the robot misses by {gap} mm, the measuring noise is {noise} mm."
+    )
+
+
+def _causes(facts):
+    """What makes the gap, and how sure that is."""
+    with_shares = _shares_told(facts)
+    groups = {group["names"][0]: group for group in facts["groups"]}
+    single = [effect for effect in facts["effects"] if effect["name"] not in groups]
+    small = [effect["name"] for effect in single if with_shares and _is_small(effect, facts)]
+    if len(small) == len(facts["effects"]):
+        # of causes that are all small none is more worth a sentence than the others
+        small = []
+    said = [_by_share(facts, groups, len(small))] if with_shares and len(facts["effects"]) > 1 else []
+    said = ([_UNSURE] if any(effect["decision"] == POSSIBLE for effect in single) else []) + said
+    single = [effect for effect in single if effect["name"] not in small]
+    said += [_cause(effect, "" if number else " of that", with_shares) for number, effect in enumerate(single)]
+    said += [_of_group(group, with_shares) for group in groups.values()]
+    if not with_shares and said:
+        small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
+        why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
+        said.append(f"{why}: their shares of the gap cannot be determined.")
+    elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
+        said.append("These shares overlap, since the effects imitate each other in part.")
+    if facts["unexplained"]:
+        share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
+        if said:
+            said.append(f"Another {share} is systematic and like no effect of the library.")
+        else:
+            said.append(
+                f"It is systematic, and no effect of the library explains it: {share} of it is like none of them."
+            )
+        said += _looks_like(facts["unexplained_follows"])
+    return [*said, *_sure(facts, groups)] if said else []
+
+
+def _looks_like(rows):
+    """What the unexplained part follows, from rows of `gap_remainder`, the best first."""
+    if not rows:
+        return []
+    best = rows[0]
+    size = f"{rounded(best['rms_mm'])} mm rms"
+    if best["explained"] < OPTIONS.min_followed_share:
+        return [
+            f"The unexplained part follows no single variable that was tried: {best['follows']} comes next, a smooth "
+            f"function of it predicts {percent(best['explained'])} at left-out points."
+        ]
+    how = "steps with" if not np.isfinite(best["scale"] or np.nan) else "a smooth function of"
+    scale, unit = best["scale"], best["unit"]
+    if unit == "rad" and how.startswith("a"):
+        scale, unit = np.degrees(scale), "degrees"
+    over = f", which changes over about {rounded(scale)} {unit}," if how.startswith("a") else ""
+    return [
+        f"The unexplained part follows {best['follows']}: {how} it{over} predict{'' if how[0] == 's' else 's'} "
+        f"{percent(best['explained'])} of it at left-out points ({size})."
+    ]
+
+
+def _is_small(effect, facts):
+    """Whether an effect's part of the gap is too small for a sentence."""
+    small = (effect["rms_mm"] or 0.0) < OPTIONS.min_cause_per_noise * facts["noise_rms_mm"]
+    return effect["share"] is not None and (small or effect["share"] < OPTIONS.min_cause_share)
+
+
+def _by_share(facts, groups, small):
+    """All causes in a line, each with its share, the small ones of so many counted."""
+    listed = []
+    for effect in facts["effects"]:
+        if group := groups.get(effect["name"]):
+            listed.append((group["share"], " or ".join(map(readable, group["names"]))))
+        elif not (small and _is_small(effect, facts)):
+            listed.append((effect["share"] or 0.0, readable(effect["name"])))
+    words = [f"{name} {small_percent(share)}" for share, name in sorted(listed, key=lambda one: (-one[0], one[1]))]
+    words += [f"{small} small one{'s' if small > 1 else ''}"] * bool(small)
+    return f"Causes by their share of the gap: {', '.join(words)}."
+
+
+def _of_group(group, with_shares):
+    """Causes of which one acts, and which these data cannot tell apart."""
+    names = [readable(name) for name in group["names"]]
+    each = ", ".join(f"{name} {probability(p)}" for name, p in zip(names, group["probabilities"], strict=True))
+    share = f"; together they make {small_percent(group['share'])} of the gap" if with_shares else ""
+    return (
+        f"One of these acts, and these data cannot tell which: {each} (probability that one does: "
+        f"{probability(group['probability'])}){share}. The corrected model has {names[0]}."
+    )
+
+
+def _sure(facts, groups):
+    """How probable each cause is, and the answer as a whole."""
+    each = [one for one in facts["effects"] if one["name"] not in groups]
+    exactly = probability(facts["probability"])
+    if not each:
+        return [f"Probability of this answer: {exactly}."]
+    listed = ", ".join(f"{readable(one['name'])} {probability(one['probability'])}" for one in each)
+    return [f"Probability that it acts: {listed}. Probability of exactly this answer: {exactly}."]
+
+
+def _shares_told(facts):
+    """Whether parts of the gap are shares of it, and not, beside the noise, larger than the whole."""
+    shares = [effect["share"] or 0.0 for effect in facts["effects"]]
+    shares.append(sum(part["share"] for part in _scatter_parts(facts)))
+    return facts["gap_rms_mm"] > 0.0 and max(shares) <= OPTIONS.max_mentioned_share
+
+
+def _cause(effect, follow, told):
+    """One effect: its share, or its size where shares are not told, name, leg, sizes and meaning."""
+    share = "Also there is"
+    if effect["share"] is not None:
+        share = f"{share_with_interval(effect, follow)} is" if told else f"{rounded(effect['rms_mm'])} mm is"
+    place = f" {effect['place']}" if effect["place"] else ""
+    sizes = _sizes(effect["parameters"])
+    listed = ", ".join(sizes) if len(sizes) <= OPTIONS.max_listed_numbers else f"{len(sizes)} numbers"
+    size = f", {listed}" if sizes else ""
+    meaning = f": {effect['meaning']}" if effect["meaning"] else ""
+    return f"{share} {readable(effect['name'])}{place}{size}{meaning}.{_worst(effect['worst_places'])}"
+
+
+def _worst(places):
+    """Where the drive errs most of those whose errors have the unit of the largest; empty without places."""
+    if not places:
+        return ""
+    one = max(places, key=lambda place: (place["unit"] == places[0]["unit"], abs(place["error"])))
+    turning = one["unit"] == "rad"
+    at = f"{np.degrees(one['drive_value']):.1f} degrees" if turning else f"{one['drive_value']:.1f} mm"
+    size = with_interval(one["error"], one["low_95"], one["high_95"], one["unit"])
+    return f" It is largest for {one['name']} at {at}: {size} off its mean over the measured range."
+
+
+def _sizes(parameters):
+    """Numbers that were fitted with their 95 % intervals, those that are one number under several names once."""
+    by_size = {}
+    for one in parameters:
+        if np.isfinite(one["standard_error"] or np.nan):
+            unit, factor = _READABLE.get(one["unit"], (one["unit"], 1.0))
+            size = with_interval(*(factor * one[key] for key in ("value", "low_95", "high_95")), unit)
+            by_size.setdefault(size, []).append(one["parameter"])
+    return [f"{' = '.join(names)} = {size}" for size, names in by_size.items()]
+
+
+def _scatter(facts):
+    """What does not repeat, where it acts and matters."""
+    parts = _scatter_parts(facts, OPTIONS.min_scatter_probability)
+    share = sum(part["share"] for part in parts)
+    if share < OPTIONS.min_mentioned_share:
+        return []
+    unknown = REPEATABILITY_UNKNOWN in facts["notes"]
+    if not _shares_told(facts):
+        if unknown:
+            return [f"Some of it is {_RANDOM}"]
+        return ["Some of it does not repeat from pass to pass: no model can take that away."]
+    # of a sum the interval is not known
+    acting = [part for part in parts if part["share"]]
+    size = share_with_interval(acting[0]) if len(acting) == 1 else percent(share)
+    if unknown:
+        return [f"{size} is {_RANDOM}"]
+    return [f"{size} does not repeat from pass to pass: no model can take that away."]
+
+
+def _scatter_parts(facts, least=0.0):
+    """Parts of the gap that do not repeat and act with a least probability."""
+    parts = (part for part in facts["budget"] if part["kind"] in ("scatter", "runs"))
+    return [part for part in parts if not part["probability"] < least]
+
+
+def _left(facts):
+    """What is left once the effects are in the simulator."""
+    after, noise = (rounded(facts[name]) for name in ("gap_after_rms_mm", "noise_rms_mm"))
+    what = "it" if len(facts["effects"]) == 1 else "them"
+    return [f"Add {what} to the simulator and {after} mm is left on runs it has not seen; the noise is {noise} mm."]
+
+
+def _open(facts):
+    """What else it could be: the rivals that are named, and what the runs that are advised would decide."""
+    named = [effect["name"] for effect in facts["effects"]]
+    contests = [_apart(run["separates"]) for run in facts["next"]]
+    asked = dict.fromkeys(name for sides in contests for name in sorted(set().union(*sides)))
+    # of groups there is a sentence
+    grouped = [name for group in facts["groups"] for name in group["names"]]
+    others = dict.fromkeys(name for name in [*facts["confusable_with"], *asked] if name not in [*named, *grouped])
+    listed = [_OUTSIDE.get(name, readable(name)) for name in others]
+    doubted = {name for sides in contests if not all(sides) for name in set().union(*sides)}
+    listed += [f"that {readable(name)} does not act" for name in named if name in doubted]
+    if not listed:
+        return []
+    first = "Parts of it could be" if facts["unexplained"] else "These data cannot rule out"
+    return [f"{first}: {', '.join(listed)}."]
+
+
+def _next(facts):
+    """What to measure next, and what would decide where nothing that can be simulated does."""
+    said = [_undecidable(facts)] if facts["undecided"] else []
+    if facts["next"]:
+        best = facts["next"][0]
+        what = f"measure {best['run']} (see gap_next_poses)" if best["kind"] == "poses" else f"drive {best['run']}"
+        return [*said, f"Next: {what}. That decides {_contest(best['separates'])}."]
+    if said:
+        return said
+    if facts["unexplained"]:
+        return ["Next: no run is advised, since the library has nothing to test; see where the gap lies."]
+    decided = not (facts["groups"] or facts["confusable_with"])
+    least = min((effect["probability"] for effect in facts["effects"]), default=facts["probability"])
+    if max(least if decided else 0.0, facts["probability"]) >= OPTIONS.min_sure_probability:
+        return ["Next: nothing more needs to be measured for this answer."]
+    return ["Next: no further run that was tried in computation would settle it."]
+
+
+def _undecided(separates, drives):
+    """The two answers that no run decides between, and what to inspect instead of each cause; None where there are
+    none.
+    """
+    if not separates:
+        return None
+    names = sorted(set().union(*_apart(separates)))
+    inspect = [{"name": name, "inspect": cause_texts(name, drives).inspect} for name in names]
+    return {"separates": separates, "inspect": inspect}
+
+
+def _undecidable(facts):
+    """What would decide between two answers where nothing that can be simulated does: inspection of their causes."""
+    undecided = facts["undecided"]
+    limited = " within the limits" if any(note.startswith(_LIMITED) for note in facts["notes"]) else ""
+    would = " ".join(
+        f"{_initial(readable(one['name']))}: {one['inspect'] or 'add a sensor at the part itself.'}"
+        for one in undecided["inspect"]
+    )
+    first = f"Next: nothing that can be simulated{limited} would decide {_contest(undecided['separates'])}"
+    return f"{first}; inspection would. {would}"
+
+
+def _initial(text):
+    """A text with a capital first letter."""
+    return text[:1].upper() + text[1:]
+
+
+def _contest(separates):
+    """In what two answers "a+b / a+c" differ, in words."""
+    sides = [" + ".join(map(readable, sorted(side))) for side in _apart(separates)]
+    return f"between {sides[0]} and {sides[1]}" if all(sides) else f"whether {''.join(sides)} acts"
+
+
+def _apart(separates):
+    """The effects, as two sets, that one of two answers "a+b / a+c" has and the other has not."""
+    first, second = (set(side.split("+")) - {"none"} for side in separates.split(" / "))
+    return first - second, second - first

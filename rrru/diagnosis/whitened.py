@@ -1,0 +1,129 @@
+"""The columns of calibration and effects along the runs, whitened at every level of the discrepancy.
+
+The discrepancy's covariance along a run is diagonal in its cosine basis, as is that of the noise; see
+`rrru.diagnosis.evidence`. Lengths in mm.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rrru.campaign.noise import along_runs
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.payload_nuisance import WEIGHT
+from rrru.diagnosis.terms import EACH, SAME, per_leg, spread
+from rrru.estimation.noise_model import NoiseModel, lengths
+
+LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
+
+
+def levels_of(noise):
+    """Deviations (levels,) of the discrepancy over those of a NoiseModel: LEVELS, moved so that one is what it found.
+
+    Between two levels intervals would be up to 1.8 times too wide or too narrow.
+    """
+    if not noise.discrepancy:
+        return LEVELS
+    nearest = LEVELS[1 + np.abs(np.log(LEVELS[1:] / noise.discrepancy)).argmin()]
+    return LEVELS * noise.discrepancy / nearest
+
+
+def spectrum(wave):
+    """Variance (n,) of the discrepancy by half-wave number (n,), 1 on average."""
+    density = 1.0 / (1.0 + (wave / OPTIONS.discrepancy_half_density_wave_number) ** 2) + OPTIONS.discrepancy_white_share
+    return density / density.mean()
+
+
+@dataclass(frozen=True)
+class Whitened:
+    """Gram matrices of all columns of a linearisation, made when they are asked for.
+
+    library: effects by name; linear: `rrru.diagnosis.state.Linear`; run (n,): the series of each row; noise: a
+    NoiseModel.
+    """
+
+    library: dict
+    linear: object
+    run: np.ndarray
+    noise: NoiseModel
+
+    def __len__(self):
+        return len(self.run)
+
+    @cached_property
+    def layout(self):
+        """Numbers of all columns but the calibration's by (effect, shape, "each" or "same") and effect.
+
+        With the matrix (K, k) that makes them, those of one value on all legs being sums, of the linearisation's.
+        """
+        linear = self.linear
+        blocks = [((*key, EACH), columns.shape[-1]) for key, columns in linear.columns.items()]
+        blocks += [(name, columns.shape[-1]) for name, columns in linear.shape_columns.items()]
+        blocks += [((*key, WEIGHT), columns.shape[-1]) for key, columns in linear.by_weight.items()]
+        ends = np.cumsum([0, *(size for _, size in blocks)])
+        numbers = {key: np.arange(first, first + size) for (key, size), first in zip(blocks, ends, strict=False)}
+        made = [np.zeros((ends[-1], 0))]
+        for name, shape in linear.columns:
+            if per_leg(self.library[name]):
+                own, sums = numbers[name, shape, EACH], spread(self.library[name].coordinates, SAME)
+                numbers[name, shape, SAME] = ends[-1] + sum(part.shape[1] for part in made) + np.arange(sums.shape[1])
+                made.append(np.zeros((ends[-1], sums.shape[1])))
+                made[-1][own] = sums
+        return numbers, np.concatenate(made, axis=1)
+
+    @cached_property
+    def _together(self):
+        """Columns of calibration and effects, and the data, (m, 3, k), by the runs' cosines; waves (m,)."""
+        linear = self.linear
+        beside = *linear.shape_columns.values(), *linear.by_weight.values()
+        blocks = linear.base, *linear.columns.values(), *beside, linear.data[..., None]
+        return along_runs(np.concatenate(blocks, axis=-1), self.run)
+
+    @cached_property
+    def whole(self):
+        """Sum of squares (k,) of each column over the noise, the calibration not projected out."""
+        # cosines change no sum of squares
+        columns = self._together[0][..., self.linear.base.shape[-1] : -1].reshape(3 * len(self), -1)
+        sums = columns @ self.layout[1]
+        return np.concatenate([np.einsum("ij,ij->j", part, part) for part in (columns, sums)]) / self.noise.mean_mm**2
+
+    @cached_property
+    def _made(self):
+        """Grams of the levels that have been asked for."""
+        return {}
+
+    def _white(self, level):
+        """Whitened columns (m, k), of which the first p are the calibration's; variances; and p.
+
+        The last rows are the priors of the calibration's parameters.
+        """
+        (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
+        own = self.noise.variance(wave, lengths(self.run)) / unit**2
+        variance = own + levels_of(self.noise)[level] ** 2 * spectrum(wave)[:, None]
+        white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
+        if self.linear.base_prior is None:
+            return white, variance, p
+        sd, mean = self.linear.base_prior
+        stated = np.isfinite(sd)
+        prior = np.zeros((p, white.shape[1]))
+        prior[:, :p], prior[:, -1] = np.diag(1.0 / sd), np.where(stated, mean, 0.0) / sd
+        return np.concatenate([white, prior[stated]]), variance, p
+
+    def gram(self, level):
+        """Gram matrix (k, k) of the whitened columns at a level (an index), their moments (k,), log evidence of none.
+
+        The calibration is projected out.
+        """
+        if level not in self._made:
+            white, variance, p = self._white(level)
+            basis, triangle = np.linalg.qr(white[:, :p])
+            rest = white[:, p:]
+            rest -= basis @ (basis.T @ rest)
+            gram, sums = rest.T @ rest, self.layout[1]
+            none = -0.5 * np.log(variance).sum() - np.log(np.abs(np.diag(triangle))).sum() - 0.5 * gram[-1, -1]
+            gram, moment = gram[:-1, :-1], gram[:-1, -1]
+            across = gram @ sums
+            gram = np.block([[gram, across], [across.T, sums.T @ across]])
+            self._made[level] = gram, np.concatenate([moment, sums.T @ moment]), none
+        return self._made[level]

@@ -1,0 +1,79 @@
+"""Joints that follow driven ones, for `rrru.formats.robot_file`: the mimics of a URDF, the joint equalities of an MJCF.
+
+A follower's value is an offset and a factor times that of its driver. MuJoCo counts both from the reference
+configuration, as `rrru.formats.mjcf_reader` does. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from rrru.formats.mjcf_reader import MM
+
+_EQ, _SLIDE = mujoco.mjtEq, mujoco.mjtJoint.mjJNT_SLIDE
+
+
+@dataclass(frozen=True)
+class Follows:
+    """A follower's value: offset, in its own unit, and factor times the value of its driver, MuJoCo's joint."""
+
+    driver: int
+    factor: float
+    offset: float
+
+
+def of_mimics(assembly, mimics):
+    """Follows by MuJoCo's joint from mimics {joint's name: (driver's name, factor, offset)} of a URDF, m and rad.
+
+    Raises ConfigError for the mimic of a mimic and of a joint that is not on the chain.
+    """
+    own = {move.origin: move.joint for move in assembly.moves.values()}
+    result = {}
+    for name, (driver, factor, offset) in mimics.items():
+        if name not in own:
+            continue
+        if driver not in own or driver in mimics:
+            known = ", ".join(one for one in own if one not in mimics) or "none here"
+            raise assembly.error(f"joint {name} mimics {driver!r}; allowed: driven joints of the chain, {known}")
+        result[own[name]] = _follows(assembly.model, own[name], own[driver], factor, offset)
+    return result
+
+
+def of_equalities(assembly, driven):
+    """Follows by MuJoCo's joint from the active joint equalities of an MJCF's legs; driven: joints with actuators.
+
+    Raises ConfigError for a follower of what no actuator drives, with an actuator of its own, or of a curve.
+    """
+    model, result = assembly.model, {}
+    own = {move.joint for move in assembly.moves.values()}
+    for k in np.flatnonzero(model.eq_active0):
+        joint, driver = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        if model.eq_type[k] != _EQ.mjEQ_JOINT or joint not in own:
+            continue
+        name = f"joint {assembly.joint_name(joint)}"
+        if driver < 0:
+            raise assembly.error(f"{name} is held by {assembly.eq_name(k)}; allowed: a joint that it follows")
+        leader = assembly.joint_name(driver)
+        if joint in driven or joint in result:
+            raise assembly.error(f"{name} follows {leader} and is driven besides; allowed: one of both")
+        if driver not in driven:
+            raise assembly.error(f"{name} follows {leader}; allowed: a joint of the legs that an actuator drives")
+        offset, factor, *bent = model.eq_data[k, :5]
+        if np.any(bent):
+            raise assembly.error(f"{name} follows {leader} along a curve; allowed: polycoef of two numbers")
+        result[joint] = _follows(model, joint, driver, float(factor), float(offset))
+    return result
+
+
+def coupling(driven, follows):
+    """The coupling (D, K) of Legs whose driven values are those of the driven joints, then of the followers."""
+    number = {joint: k for k, joint in enumerate(driven)}
+    rows = [[one.factor * (number[one.driver] == k) for k in range(len(number))] for one in follows.values()]
+    return np.array([*np.eye(len(number)), *rows]) if rows else None
+
+
+def _follows(model, joint, driver, factor, offset):
+    """The Follows of numbers in m and rad."""
+    own, other = (MM if model.jnt_type[one] == _SLIDE else 1.0 for one in (joint, driver))
+    return Follows(driver, factor * own / other, offset * own)

@@ -1,0 +1,234 @@
+"""What small errors of a robot's legs change in the file that it came from.
+
+A twist at a site is a placement T before the motion of the site's joint. In the file a body's joints S move it from its
+placement P in its parent's frame, and with all T that act there it stands at
+
+    P X_0 S_1 X_1 .. S_n X_n
+
+with X in the body's own frame. A connect's anchors move with the T before and behind it. What lies between two axes of
+one ball joint no file holds. Lengths in mm, angles in rad; placements are (4, 4).
+"""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.formats.joint_graph import Move, placed, undone
+from rrru.formats.mjcf_reader import ends_of
+from rrru.kinematics.legs import TOOL, WORLD
+
+_BALL = mujoco.mjtJoint.mjJNT_BALL
+_NOTHING, _STAYS = np.zeros(6), (np.eye(4), "")
+# the name of the measured point in a file, where it has moved
+MEASURED_TOOL = "measured_tool"
+# smaller changes, in mm and rad, are rounding
+SAME = 1e-10
+
+
+@dataclass(frozen=True)
+class Changes:
+    """bodies: by number the placements X, one more than it has joints; anchors: by connect's number its points on its
+    first and second body (3,); frames: by name places on the platform; lost: what no file holds, in words.
+    """
+
+    bodies: dict
+    anchors: dict
+    frames: dict
+    lost: tuple
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a diagnosis has found of a robot.
+
+    twists: (6,) by site; spread: (q, 6) by site, what q independent errors of one standard deviation each make of them;
+    reflectors: place (3,) on the platform, before its twist, by the site of each one that was read; tool_mm (3,): the
+    measured point; compliance, play: by number of the drive (value, standard error), in rad/(N mm) or mm/N, and in rad
+    or mm; loads: by drive the largest one, in N mm or N.
+    """
+
+    twists: dict
+    spread: dict = field(default_factory=dict)
+    reflectors: dict = field(default_factory=dict)
+    tool_mm: tuple = (0.0, 0.0, 0.0)
+    compliance: dict = field(default_factory=dict)
+    play: dict = field(default_factory=dict)
+    loads: dict = field(default_factory=dict)
+
+
+def changes_of(structure, found, twists):
+    """The Changes that twists (6,) by site make in the file of a Structure; found: of its reflectors."""
+    assembly, lost = structure.assembly, []
+    between, tip = _between(structure, twists, lost)
+    bodies, anchors = {}, {}
+    for number in sorted({number for path in assembly.paths for number in path}):
+        seam, own = assembly.seams[number], between.get(number, {})
+        if seam.body is None:
+            anchors |= _anchors(assembly, seam, own, lost)
+        else:
+            bodies[seam.body] = _of_body(assembly, seam, own, lost)
+    if tip is not None:
+        bodies[assembly.platform] = (tip,)
+    return Changes(bodies, anchors, _frames(found, twists), tuple(dict.fromkeys(lost)))
+
+
+def held_by(structure, candidates):
+    """Names of the Candidates whose twists the file of a Structure can hold."""
+    return [one.name for one in candidates if not changes_of(structure, Found({}), one.twists).lost]
+
+
+def scatter(numbers, twists, spread):
+    """Standard errors by key of what `numbers` makes of twists (6,) by site, under the spread (q, 6) by site.
+
+    Of vectors (3,) they are (3,), of placements (6,): of the shift, and of the turn about the own axes.
+    """
+    squares, count = {}, max((len(one) for one in spread.values()), default=0)
+    for k in range(count):
+        steps = ({s: sign * one[k] for s, one in spread.items()} for sign in (-1.0, 1.0))
+        low, high = (numbers(twists | {s: twists.get(s, _NOTHING) + one for s, one in step.items()}) for step in steps)
+        for key, value in high.items():
+            squares[key] = squares.get(key, 0.0) + (0.5 * difference(low[key], value)) ** 2
+    return {key: np.sqrt(value) for key, value in squares.items()}
+
+
+def difference(low, high):
+    """Between two vectors (3,), or two placements: shift, and turn about the own axes."""
+    if high.ndim == 1:
+        return high - low
+    return np.concatenate([high[:3, 3] - low[:3, 3], Rotation.from_matrix(low[:3, :3].T @ high[:3, :3]).as_rotvec()])
+
+
+def placement_of(twist):
+    """The placement of a twist (6,)."""
+    return placed(twist[:3], Rotation.from_rotvec(twist[3:]).as_matrix())
+
+
+def _frames(found, twists):
+    """Places on the platform of the tool, where it has moved, and of the reflectors."""
+    twist, tool_mm, frames = twists.get(TOOL, _NOTHING), np.asarray(found.tool_mm), {}
+    tool = placement_of(twist)
+    if np.any(twist):
+        frames[MEASURED_TOOL] = placed(tool_mm) @ tool
+    for name, place in found.reflectors.items():
+        at = placed(tool_mm) @ tool @ placed(place - tool_mm)
+        frames[name] = placed(twists.get(name, _NOTHING)[:3]) @ at
+    return frames
+
+
+def _between(structure, twists, lost):
+    """Placements by number of the seam and of its item before which they act, from near to far, each with its site.
+
+    And what a chain's end changes of the place of a platform that is fixed to the last body, None where it is not.
+    """
+    assembly, own = structure.assembly, _of_chains(structure, twists)
+    base = placement_of(twists.get(WORLD, _NOTHING)) @ own.get(structure.open_legs.legs[0].joints[0].name, np.eye(4))
+    result, tip, ends = {}, None, {}
+    for path, leg in zip(assembly.paths, structure.open_legs.legs, strict=True):
+        part = assembly.base
+        for number in path:
+            seam, at = assembly.seams[number], result.setdefault(number, {})
+            forward = part == seam.near
+            for k, item in enumerate(seam.items):
+                site = structure.chains.sites[item.name] if isinstance(item, Move) else None
+                if site in own:
+                    seat = structure.chains.seats[site]
+                    acts = seat @ own[site] @ undone(seat)
+                    at[k if forward else k + 1] = (acts if forward else undone(acts)), site
+            part = seam.other(part)
+        first, last, end = path[0], path[-1], own.get(leg.joints[-1].name, np.eye(4))
+        _at_end(result, assembly.seams[first], first, assembly.base, base)
+        if _hangs_on(assembly, last):
+            tip = end
+        elif np.allclose(ends.setdefault(last, end), end, rtol=0.0, atol=1e-12):
+            _at_end(result, assembly.seams[last], last, assembly.platform, undone(end))
+        else:
+            lost.append(f"{leg.joints[-1].name}: legs that meet before the platform end at one place")
+    return result, tip
+
+
+def _at_end(result, seam, number, part, placement):
+    """Enter what moves a seam's end at a part, seen from there."""
+    if part == seam.near:
+        result[number][0] = placement, ""
+    else:
+        result[number][len(seam.items)] = undone(placement), ""
+
+
+def _hangs_on(assembly, last):
+    """Whether the platform is a body without joints that one chain ends in, so that its own place can be changed."""
+    model, body, seam = assembly.model, assembly.platform, assembly.seams[last]
+    if len(assembly.paths) > 1 or model.body_jntnum[body] or seam.body is None or seam.far != assembly.platform:
+        return False
+    while body and not model.body_jntnum[body]:
+        body = int(model.body_parentid[body])
+    return body == seam.body
+
+
+def _of_chains(structure, twists):
+    """Placements by site of the chains without bars."""
+    result = {name: placement_of(twist) for name, twist in twists.items() if np.any(twist)}
+    for number, cut in structure.cuts.items():
+        leg, chain = structure.legs.legs[number], structure.open_legs.legs[number]
+        seat, (bar, end) = chain.joints[len(leg.joints) - 1], leg.bar_sites
+        near, length, far = (twists.get(name, _NOTHING) for name in (leg.joints[-1].name, bar, end))
+        result[seat.name] = placed(seat.turn.T @ near[:3])
+        result[cut.behind] = placed(length[0] * cut.along)
+        result[chain.joints[-1].name] = placed(far[:3])
+    return result
+
+
+def _of_body(assembly, seam, between, lost):
+    """The placements X of a body with joints."""
+    model, items = assembly.model, seam.items
+    first, result = int(model.body_jntadr[seam.body]), [np.eye(4) for _ in range(int(model.body_jntnum[seam.body]) + 1)]
+    moves = [(k, item) for k, item in enumerate(items) if isinstance(item, Move)]
+    # the value of a ball joint at home is a turn behind its axes
+    balls = {k + 1 for k, move in moves if model.jnt_type[move.joint] == _BALL and not isinstance(items[k + 1], Move)}
+    here, places = np.eye(4), [undone(items[0])]
+    for k, item in enumerate(items[1:], 1):
+        places.append(here @ undone(item) if k in balls else here)
+        here = here if isinstance(item, Move) or k in balls else here @ item
+    places.append(here)
+    for k, (placement, site) in sorted(between.items()):
+        before, behind = ([m for at, m in moves if (at < k) == side] for side in (True, False))
+        if before and behind and before[-1].joint == behind[0].joint:
+            _lose(lost, site, placement)
+            continue
+        slot = before[-1].joint - first + 1 if before else 0
+        acts = places[k] @ placement @ undone(places[k])
+        result[slot] = acts @ result[slot] if k == 0 else result[slot] @ acts
+    return tuple(result)
+
+
+def _anchors(assembly, seam, between, lost):
+    """Points (3,) of the connects of a seam on their first and second bodies."""
+    moves = [k for k, item in enumerate(seam.items) if isinstance(item, Move)]
+    near, far = np.eye(4), np.eye(4)
+    for k, item in enumerate(seam.items):
+        if k > moves[-1]:
+            far = far @ between.get(k, _STAYS)[0] @ item
+        elif k <= moves[0]:
+            near = near @ between.get(k, _STAYS)[0] @ (np.eye(4) if k == moves[0] else item)
+        elif k in between:
+            _lose(lost, between[k][1], between[k][0])
+    far = far @ between.get(len(seam.items), _STAYS)[0]
+    moved = {
+        seam.near: near @ undone(seam.items[0]),
+        seam.far: undone(far) @ seam.items[moves[-1] + 1] @ seam.items[-1],
+    }
+    result = {}
+    for number in seam.connects:
+        first, at_first, second, at_second = ends_of(assembly.model, number)
+        result[number] = tuple(
+            (undone(there) @ moved[part] @ there @ at)[:3, 3]
+            for (part, there), at in ((assembly.frames[first], at_first), (assembly.frames[second], at_second))
+        )
+    return result
+
+
+def _lose(lost, site, placement):
+    """Note what shifts one axis of a ball joint against another."""
+    if np.abs(placement[:3, 3]).max() > 0.0:
+        lost.append(f"{site}: the axes of a ball joint meet in a point")

@@ -1,0 +1,90 @@
+"""Point masses of an Assembly's bodies, fixed in frames of the legs, for `rrru.formats.robot_file`.
+
+Six points on a body's principal axes have its mass m, centre and inertia I:
+
+    each m / 6, at +- sqrt(3 S_k / m) from the centre along axis k,   S_k = (trace I) / 2 - I_k
+
+Of a bar only what lies along it is known: two points have its mass, its centre's place along it and its inertia across.
+Lengths in mm, masses in kg.
+"""
+
+import numpy as np
+
+from rrru.formats.joint_graph import placed, turn_of, undone
+from rrru.formats.mjcf_reader import MM
+from rrru.formats.urdf_reader import NO_MASS_KG
+from rrru.kinematics.chain import Twists, walk
+from rrru.kinematics.legs import turn_about
+from rrru.kinematics.point_masses import PLATFORM, Lump
+
+
+def points_of(model, body):
+    """Points (6, 3) in mm in a body's frame, each of a sixth of its mass, that have its centre and inertia."""
+    mass, inertia = model.body_mass[body], model.body_inertia[body]
+    # triangle inequalities may be missed by rounding
+    second = np.maximum(0.5 * inertia.sum() - inertia, 0.0)
+    arms = turn_of(model.body_iquat[body]) * np.sqrt(3.0 * second / mass)
+    return MM * (model.body_ipos[body] + np.concatenate([arms.T, -arms.T]))
+
+
+def lumps_of(chains, open_legs, legs):
+    """Lumps of all bodies that move with Legs; open_legs: the same ones without bars."""
+    assembly, result = chains.assembly, []
+    for body in range(1, assembly.model.nbody):
+        mass, holder = float(assembly.model.body_mass[body]), _holder(chains, body)
+        if mass <= 2.0 * NO_MASS_KG or holder is None:
+            continue
+        part, there = assembly.frames[holder]
+        home = undone(assembly.home_of(holder)) @ assembly.home_of(body)
+        at = _moved(there @ home, points_of(assembly.model, body))
+        if part == assembly.frames[assembly.platform][0]:
+            result += [Lump(PLATFORM, mass / 6.0, point) for point in at]
+            continue
+        place = chains.parts[part]
+        at, leg = _moved(place.placement, at), legs.legs[place.leg]
+        if leg.bar and place.joint >= len(leg.joints) - 1:
+            result += _of_bar(open_legs, legs, place, mass, at)
+        else:
+            result += [Lump(leg.joints[place.joint].name, mass / 6.0, point) for point in at]
+    return tuple(result)
+
+
+def _holder(chains, body):
+    """The body itself, or what it hangs on at home, that is part of a leg; None for what stands still or is loose."""
+    assembly = chains.assembly
+    while body and assembly.frames[body][0] not in (assembly.base, *chains.parts):
+        body = int(assembly.model.body_parentid[body])
+    return body if assembly.frames[body][0] in chains.parts else None
+
+
+def _moved(placement, points):
+    """Points (n, 3) behind a placement."""
+    return points @ placement[:3, :3].T + placement[:3, 3]
+
+
+def _of_bar(open_legs, legs, place, mass, at):
+    """Two Lumps of a body of a bar whose points (6, 3) are at a Place of the leg without the bar."""
+    chain, leg = open_legs.legs[place.leg], legs.legs[place.leg]
+    actuators, passive = open_legs.home_drives[None], open_legs.home_passive[None]
+    way = walk(open_legs, chain, actuators, passive, Twists(open_legs))
+    near = walk(legs, leg, actuators, legs.home_passive[None], Twists(legs)).place[0]
+    far = way.place[0] + way.turn[0] @ leg.bar.platform_mm
+    line = (far - near) / np.linalg.norm(far - near)
+    spots = _moved(_behind(open_legs, chain, way, place.joint), at)
+    slides = [k for k, joint in enumerate(chain.joints) if joint.kind == "P" and k >= len(leg.joints) - 1]
+    moving = bool(slides) and place.joint >= slides[0]
+    middle = spots.mean(axis=0)
+    along = (spots - middle) @ line
+    arm = np.sqrt(0.5 * (((spots - middle) ** 2).sum(axis=1) + along**2).mean())
+    centre = (middle - (far if moving else near)) @ line
+    site = leg.bar_sites[1 if moving else 0]
+    return [Lump(site, 0.5 * mass, np.array([centre + side * arm, 0.0, 0.0])) for side in (1.0, -1.0)]
+
+
+def _behind(legs, chain, way, number):
+    """Placement behind the motion of a joint of a chain in the home pose, way: its Walk."""
+    joint, turn, place = chain.joints[number], way.turns[number][0], way.places[number][0]
+    value = joint.home if joint.drive is None else legs.driven(legs.home_drives)[joint.drive]
+    if joint.kind == "P":
+        place = place + value * way.axes[number][0]
+    return placed(place, turn @ turn_about(joint.axis, value) if joint.kind == "R" else turn)

@@ -1,0 +1,71 @@
+"""What joins the rigid parts of a mechanism: seams of placements (4, 4) and moves, for `rrru.formats.robot_file`.
+
+Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """One freedom of a seam: "R" about or "P" along axis (3,), at home at the value `home`.
+
+    joint: MuJoCo's number of its joint, None for a connect; origin: the joint's or connect's name in the file.
+    """
+
+    name: str
+    kind: str
+    axis: np.ndarray
+    origin: str
+    joint: int | None = None
+    home: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """What joins two parts: placements and Moves, in their order from the part `near` to the part `far`.
+
+    body: MuJoCo's number of the body whose joints these are, None for connects, whose numbers are `connects`.
+    """
+
+    near: int
+    far: int
+    items: tuple
+    body: int | None = None
+    connects: tuple = ()
+
+    def other(self, part):
+        """The other one of both parts."""
+        return self.far if part == self.near else self.near
+
+    def items_from(self, part):
+        """The items in their order from one of both parts to the other."""
+        if part == self.near:
+            return self.items
+        return tuple(
+            undone(item) if isinstance(item, np.ndarray) else replace(item, axis=-item.axis)
+            for item in reversed(self.items)
+        )
+
+
+def placed(shift_mm=(0.0, 0.0, 0.0), turn=None):
+    """The placement of a shift (3,) and a turn (3, 3)."""
+    result = np.eye(4)
+    result[:3, 3] = shift_mm
+    if turn is not None:
+        result[:3, :3] = turn
+    return result
+
+
+def undone(placement):
+    """The inverse of a placement."""
+    turn = placement[:3, :3].T
+    return placed(-turn @ placement[:3, 3], turn)
+
+
+def turn_of(quaternion):
+    """Rotation matrix (3, 3) of MuJoCo's quaternion (4,), of any length."""
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()

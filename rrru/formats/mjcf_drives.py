@@ -1,0 +1,142 @@
+"""Stiffness and play of drives in an MJCF: a servo's kp, and a joint with a range between motor and driven joint.
+
+Between both a rotor as heavy as what the joint moves is assumed, without which they could not be told apart. Friction F
+on the arm, along a tendon over both joints, holds it within its play against its load. The servo has to overcome it, so
+that a drive turns back by the play and 2 F / kp before the arm does: the width w that was found is their sum. Where
+friction alone winds up more there is no play, and F = w kp / 2.
+"""
+
+import mujoco
+import numpy as np
+
+from rrru.formats.mjcf_reader import MM
+from rrru.formats.xml_text import sizes, words
+
+_SERVOS = ("position", "general")
+# a limit that gives way by far less than any play
+_STIFF = "0.9999 0.9999 0.0001"
+# ASSUME friction holds an arm against this many times the largest load of the campaign
+_HOLDS = 1.25
+# ASSUME and drags an arm that carries no load along at this, by kind: rad/s^2, m/s^2
+_DRAGS = {"R": 2.0, "P": 1.0}
+_NONE = dict.fromkeys(("ref", "springref", "stiffness", "damping", "frictionloss", "margin"), "0")
+
+
+def write_stiffness(document, structure, found):
+    """Write the stiffness of the drives' servos into a document; returns what it cannot hold, in words."""
+    model, lost = structure.assembly.model, []
+    ratio = any("dampratio" in one.attrib for one in document.root.iter())
+    for number, (compliance, error) in found.compliance.items():
+        if not compliance > 0.0:
+            continue
+        move = structure.driven[number]
+        servos = [
+            k for k in range(model.nu) if _is_servo(model, k, move.joint) and document.actuators[k].tag in _SERVOS
+        ]
+        if len(servos) != 1:
+            lost.append(f"compliance of {move.origin}: it has {len(servos)} position servos, not one")
+            continue
+        # from rad per N mm to N m per rad, from mm per N to N per m
+        unit, scale = ("N m/rad", 1.0 / MM) if move.kind == "R" else ("N/m", MM)
+        stiffness, element = scale / compliance, document.actuators[servos[0]]
+        gain, bias = model.actuator_gainprm[servos[0], 0], model.actuator_biasprm[servos[0]]
+        document.note(element, f"corrected: stiffness +- {sizes(stiffness * error / compliance)} {unit}; was {gain:g}")
+        # as well damped as it was
+        damping = -bias[2] * np.sqrt(stiffness / gain)
+        if element.tag == "general":
+            element.set("gainprm", words(stiffness))
+            element.set("biasprm", words([bias[0], -stiffness, -damping]))
+            continue
+        element.set("kp", words(stiffness))
+        if damping and not ratio:
+            element.set("kv", words(damping))
+    return lost
+
+
+def _is_servo(model, k, joint):
+    """Whether an actuator is a position servo of a joint."""
+    return bool(
+        model.actuator_trnid[k, 0] == joint and model.actuator_biasprm[k, 1] == -model.actuator_gainprm[k, 0] != 0.0
+    )
+
+
+def write_plays(document, structure, found, lines):
+    """Write the lost motion of drives into a document; lines: (axis, point in mm) of changed joints, by joint."""
+    inertia = _inertia(structure.assembly.model)
+    for number, (width, error) in found.play.items():
+        if not width > 0.0:
+            continue
+        move = structure.driven[number]
+        for tag in ("joint", "fixed"):
+            # the file may have been corrected before
+            document.drop(tag, f"{move.origin}_play")
+        # to m and N m, or rad and N
+        scale, force, unit = (1.0, 1.0 / MM, "rad") if move.kind == "R" else (1.0 / MM, 1.0, "m")
+        load = max(force * found.loads.get(number, 0.0), _DRAGS[move.kind] * inertia[move.joint])
+        whole, holding = scale * width, _HOLDS * load
+        stiffness = _stiffness(structure, found, number)
+        play = whole - 2.0 * holding / stiffness
+        told = f"lost motion of {whole:.4g} +- {sizes(scale * error)} {unit} at {move.origin}"
+        hard = {"solreffriction": _hard(structure), "solimpfriction": _STIFF}
+        if play <= 0.0:
+            element = document.joints[move.joint]
+            element.attrib |= hard | {"frictionloss": words(0.5 * whole * stiffness)}
+            document.note(element, f"found: {told}, less than what friction against its load winds up: friction alone")
+            continue
+        line = lines.get(move.joint, _line(structure, move.joint))
+        element = _write_play(document, structure, (move, line, play), inertia[move.joint])
+        document.note(element, f"found: {told}, of which friction on the arm winds up {whole - play:.2g}")
+        section = document.root.find("tendon")
+        section = document.inside(document.root, "tendon", {}) if section is None else section
+        tendon = {"name": f"{move.origin}_play", "frictionloss": words(holding)}
+        tendon = document.inside(section, "fixed", tendon | hard)
+        document.note(tendon, f"assumed: {_HOLDS:g} times the largest load, or inertia, holds the arm within its play")
+        for name in (move.origin, f"{move.origin}_play"):
+            document.inside(tendon, "joint", {"joint": name, "coef": "1"})
+
+
+def _stiffness(structure, found, number):
+    """Stiffness of a drive in the corrected file, N m/rad or N/m, inf where no servo gives way."""
+    model, move = structure.assembly.model, structure.driven[number]
+    compliance, _ = found.compliance.get(number, (0.0, 0.0))
+    if compliance > 0.0:
+        return (1.0 / MM if move.kind == "R" else MM) / compliance
+    gains = [model.actuator_gainprm[k, 0] for k in range(model.nu) if _is_servo(model, k, move.joint)]
+    return sum(gains) or np.inf
+
+
+def _line(structure, joint):
+    """Axis and point in mm of a joint in the file as it came."""
+    return structure.assembly.model.jnt_axis[joint], MM * structure.assembly.model.jnt_pos[joint]
+
+
+def _hard(structure):
+    """A solref as stiff as the file's step allows."""
+    return words([2.0 * structure.assembly.model.opt.timestep, 1.0])
+
+
+def _write_play(document, structure, what, inertia):
+    """Write a joint with a range behind a driven one; what: its Move, line (axis, point in mm) and play."""
+    (move, (axis, point), play), model = what, structure.assembly.model
+    half = 0.5 * play * (np.degrees(1.0) if move.kind == "R" and document.degrees else 1.0)
+    own_rotor = model.dof_armature[model.jnt_dofadr[move.joint]] > 0.0
+    attributes = {
+        "name": f"{move.origin}_play",
+        "type": "hinge" if move.kind == "R" else "slide",
+        "axis": words(axis),
+        "pos": words(point / MM),
+        "limited": "true",
+        "range": words([-half, half]),
+        "armature": words(0.0 if own_rotor else inertia),
+        "solreflimit": _hard(structure),
+        "solimplimit": _STIFF,
+    }
+    return document.behind(document.joints[move.joint], "joint", attributes | _NONE)
+
+
+def _inertia(model):
+    """Inertia (joints,) about or along each joint in the reference configuration, kg m^2 or kg."""
+    data, matrix = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, matrix)
+    return np.diag(matrix)[model.jnt_dofadr]

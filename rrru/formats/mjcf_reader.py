@@ -1,0 +1,244 @@
+"""The bodies of a MuJoCo model as rigid parts, and what joins these, for `rrru.formats.robot_file`.
+
+Bodies without a joint and welded ones make one part. Seams join parts: the joints between a body and its parent, and
+the connects between two parts, where one is a ball joint and two are a hinge. A leg is a path of seams from the base to
+the platform. Values of joints count from the file's reference configuration (MuJoCo's qpos less ref); those of ball
+joints, three turns about x, y and z, from the home pose. Lengths in mm, angles in rad; placements are (4, 4).
+"""
+
+from functools import cached_property
+
+import mujoco
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.formats.joint_graph import Move, Seam, placed, turn_of, undone
+from rrru.kinematics.legs import X, Y, Z
+
+MM = 1000.0
+_EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
+# two joints are on one line within this, in m and rad
+_SAME = 1e-9
+
+
+def plays_of(model):
+    """Joints that are the play of driven ones: of the same body, kind and line, with a range and without an actuator.
+
+    They stand in the middle; by joint the driven one.
+    """
+    kinds = [int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)]
+    driven = {
+        int(j) for j, kind in zip(model.actuator_trnid[:, 0], model.actuator_trntype, strict=True) if kind in kinds
+    }
+    result = {}
+    for joint in set(np.flatnonzero(model.jnt_limited).tolist()) - driven:
+        for other in driven:
+            same = model.jnt_bodyid[joint] == model.jnt_bodyid[other] and model.jnt_type[joint] == model.jnt_type[other]
+            if same and _on_one_line(model, joint, other):
+                result[joint] = other
+    return result
+
+
+def _on_one_line(model, joint, other):
+    """Whether two joints of a body move about or along one line."""
+    axis, apart = model.jnt_axis[other], model.jnt_pos[joint] - model.jnt_pos[other]
+    slides = model.jnt_type[joint] == _JOINT.mjJNT_SLIDE
+    off = 0.0 if slides else np.linalg.norm(np.cross(axis, apart))
+    return bool(np.linalg.norm(np.cross(axis, model.jnt_axis[joint])) < _SAME and off < _SAME)
+
+
+def ends_of(model, k):
+    """Both bodies of a connect or weld, and the placements on them that it holds together."""
+    data = model.eq_data[k]
+    first, second = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+    if model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE:
+        at = [placed(MM * model.site_pos[s], turn_of(model.site_quat[s])) for s in (first, second)]
+        return int(model.site_bodyid[first]), at[0], int(model.site_bodyid[second]), at[1]
+    if model.eq_type[k] == _EQ.mjEQ_CONNECT:
+        return first, placed(MM * data[:3]), second, placed(MM * data[3:6])
+    return first, placed(MM * data[3:6], turn_of(data[6:10])), second, placed(MM * data[:3])
+
+
+class Assembly:
+    """The parts and seams of a compiled model between two of its bodies, by number, in a home pose qpos.
+
+    frames: by body its part and its placement there; a part is called by the number of one body, whose frame it has.
+    limits: by joint the effort in N m or N and the velocity in rad/s or m/s that the file allows its drive, NaN where
+    none is stated.
+    """
+
+    def __init__(self, model, file, base, platform, qpos):
+        self.model, self.file, self.base, self.platform = model, file, base, platform
+        self.limits = {}
+        self.data = mujoco.MjData(model)
+        self.data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, self.data)
+        kinds = {k: int(model.eq_type[k]) for k in range(model.neq) if model.eq_active0[k]}
+        self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
+        if self.frames[platform][0] == base:
+            raise self.error(f"body {self.body_name(platform)} is fixed to the base; allowed: a body that moves")
+        self._names, self._plays = set(), plays_of(model)
+        connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
+        self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
+        for k, kind in kinds.items():
+            if kind not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD, _EQ.mjEQ_JOINT):
+                name = _EQ(kind).name.removeprefix("mjEQ_").lower()
+                raise self.error(f"equality {self.eq_name(k)} is of the kind {name}; allowed: connect, weld, joint")
+
+    def error(self, text):
+        """The ConfigError of a text about the file."""
+        return ConfigError(f"{self.file}: {text}")
+
+    def body_name(self, body):
+        """Name of a body."""
+        return self.model.body(body).name or f"body {body}"
+
+    def joint_name(self, joint):
+        """Name of a joint, if it has none from its body's."""
+        body = int(self.model.jnt_bodyid[joint])
+        number = joint - int(self.model.body_jntadr[body]) + 1
+        return self.model.joint(joint).name or f"{self.body_name(body)} joint {number}"
+
+    def eq_name(self, k):
+        """Name of an equality."""
+        return self.model.eq(k).name or f"equality {k + 1}"
+
+    def home_of(self, body):
+        """Placement of a body at home in MuJoCo's world."""
+        return placed(MM * self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
+
+    def own(self, body):
+        """Placement of a body in its parent's, joints at zero."""
+        return placed(MM * self.model.body_pos[body], turn_of(self.model.body_quat[body]))
+
+    def _frames(self, welds):
+        """Part and placement there of every body, the parts named after base and platform first."""
+        near = {body: [] for body in range(self.model.nbody)}
+        fixed = [(int(self.model.body_parentid[b]), b, self.own(b)) for b in near if b and self._jointless(b)]
+        for k in welds:
+            first, at_first, second, at_second = ends_of(self.model, k)
+            fixed.append((first, second, at_first @ undone(at_second)))
+        for first, second, placement in fixed:
+            near[first].append((second, placement))
+            near[second].append((first, undone(placement)))
+        result = {}
+        for part in (self.base, self.platform, *near):
+            todo = [] if part in result else [(part, np.eye(4))]
+            for body, placement in todo:
+                if body not in result:
+                    result[body] = (part, placement)
+                    todo += [(other, placement @ there) for other, there in near[body]]
+        return result
+
+    def _jointless(self, body):
+        """Whether a body is fixed to its parent."""
+        return self.model.body_jntnum[body] == 0
+
+    def _joint_seams(self):
+        """Seams of the bodies' joints; a free body has none."""
+        result, model = [], self.model
+        for body in range(1, model.nbody):
+            first, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+            if not count or model.jnt_type[first] == _JOINT.mjJNT_FREE:
+                continue
+            (near, before), (far, after) = self.frames[int(model.body_parentid[body])], self.frames[body]
+            items = [before @ self.own(body)]
+            for joint in range(first, first + count):
+                items += self._joint_items(joint) if joint not in self._plays else []
+            if near != far:
+                result.append(Seam(near, far, (*items, undone(after)), body))
+        return result
+
+    def _joint_items(self, joint):
+        """Placements and Moves of one joint, in its body's frame."""
+        model, name, kind = self.model, self.joint_name(joint), self.model.jnt_type[joint]
+        at, address = MM * model.jnt_pos[joint], int(model.jnt_qposadr[joint])
+        if kind == _JOINT.mjJNT_BALL:
+            return self._ball_items(name, at, turn_of(self.data.qpos[address : address + 4]), at, joint)
+        value, axis = float(self.data.qpos[address] - model.qpos0[address]), model.jnt_axis[joint].copy()
+        if kind == _JOINT.mjJNT_SLIDE:
+            return [placed(at), Move(self._unique(name), "P", axis, name, joint, MM * value), placed(-at)]
+        return [placed(at), Move(self._unique(name), "R", axis, name, joint, value), placed(-at)]
+
+    def _connect_seams(self, connects):
+        """Seams of connects, those of the same two parts taken together."""
+        groups = {}
+        for k in connects:
+            first, at_first, second, at_second = ends_of(self.model, k)
+            (near, before), (far, after) = self.frames[first], self.frames[second]
+            near_mm, far_mm = (before @ at_first)[:3, 3], (after @ at_second)[:3, 3]
+            if near > far:
+                near, far, near_mm, far_mm = far, near, far_mm, near_mm
+            if near != far:
+                groups.setdefault((near, far), []).append((k, near_mm, far_mm))
+        return [
+            Seam(*parts, tuple(self._connect_items(*parts, group)), connects=tuple(k for k, *_ in group))
+            for parts, group in groups.items()
+        ]
+
+    def _connect_items(self, near, far, group):
+        """Placements and Moves of all connects (number, point of near, point of far) of two parts."""
+        turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
+        (first, near_mm, far_mm), *others = group
+        name = self.eq_name(first)
+        if not others:
+            return self._ball_items(name, near_mm, turn, far_mm)
+        if len(others) > 1:
+            bodies = f"{self.body_name(near)} and {self.body_name(far)}"
+            raise self.error(f"{len(group)} connects between {bodies}; allowed: one, two for a hinge, or a weld")
+        along, own = others[0][1] - near_mm, others[0][2] - far_mm
+        if min(np.linalg.norm(along), np.linalg.norm(own)) < 1e-6:
+            raise self.error(
+                f"connects {name} and {self.eq_name(others[0][0])} are at one point; allowed: two points make a hinge"
+            )
+        along, own = along / np.linalg.norm(along), turn @ own / np.linalg.norm(own)
+        cross, cosine = np.cross(own, along), own @ along
+        skew = np.cross(np.eye(3), cross)
+        turn = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ turn
+        return [placed(near_mm), Move(self._unique(name), "R", along, name), placed(turn=turn), placed(-far_mm)]
+
+    @cached_property
+    def moves(self):
+        """Moves of all paths by name."""
+        items = [item for path in self.paths for number in path for item in self.seams[number].items]
+        return {item.name: item for item in items if isinstance(item, Move)}
+
+    @cached_property
+    def paths(self):
+        """Paths of seams from the base to the platform that meet no part twice, in the order of their constraints."""
+        result, target = [], self.frames[self.platform][0]
+
+        def go(part, met, path):
+            if part == target:
+                result.append(path)
+                return
+            for number, seam in enumerate(self.seams):
+                if part in (seam.near, seam.far) and seam.other(part) not in met:
+                    go(seam.other(part), met | {seam.other(part)}, (*path, number))
+
+        go(self.base, {self.base}, ())
+        return sorted(result, key=lambda path: (tuple(n for n in path if self._closes(n)), path))
+
+    def names_along(self, path):
+        """Names of the joints and connects along a path."""
+        items = [item for number in path for item in self.seams[number].items]
+        return tuple(dict.fromkeys(item.origin for item in items if isinstance(item, Move)))
+
+    def _closes(self, number):
+        """Whether a seam is one of connects."""
+        return all(move.joint is None for move in self.seams[number].items if isinstance(move, Move))
+
+    def _ball_items(self, name, near_mm, turn, far_mm, joint=None):
+        """Placements and Moves of a ball joint between two points, at home turned by `turn`."""
+        moves = [
+            Move(self._unique(f"{name} {letter}"), "R", axis, name, joint)
+            for letter, axis in zip("xyz", (X, Y, Z), strict=True)
+        ]
+        return [placed(near_mm), *moves, placed(turn=turn), placed(-far_mm)]
+
+    def _unique(self, name):
+        """A name that no other Move has."""
+        while name in self._names:
+            name += "'"
+        self._names.add(name)
+        return name

@@ -1,0 +1,110 @@
+"""The legs of an Assembly, closed at home, and how they came about, for `rrru.formats.robot_file` and what writes
+files.
+
+Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.formats.chains import Chains, with_bars
+from rrru.formats.couplings import coupling
+from rrru.formats.joint_graph import undone
+from rrru.formats.mjcf_reader import Assembly
+from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
+from rrru.kinematics.closure import Closure
+from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.legs import Legs
+from rrru.kinematics.mobility import free_motions
+
+# a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
+# where more joints than needed do not fit each other; below the last it is not closed at all
+_OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """The legs of an Assembly.
+
+    chains: Chains of its joints; open_legs: Legs of these alone; cuts: by number of leg the Cut of one that ends in a
+    bar; legs: with bars, closed at home; servos: by driven joint the ranges that its servos allow; follows: by joint;
+    up (3,): away from the ground.
+    """
+
+    assembly: Assembly
+    chains: Chains
+    open_legs: Legs
+    cuts: dict
+    legs: Legs
+    servos: dict
+    follows: dict
+    up: tuple
+
+    @property
+    def driven(self):
+        """Moves of the driven joints, in the order of the drives, and after them of their followers."""
+        moves = self.assembly.moves.values()
+        return [next(m for m in moves if m.joint == joint) for joint in (*self.servos, *self.follows)]
+
+
+def structure_of(assembly, servos, follows, up=None):
+    """The Structure of an Assembly.
+
+    servos: by driven joint ranges (low, high) of qpos that its servos allow; follows: Follows by joint; up (3,): by
+    default against the file's gravity. Raises ConfigError where the legs do not hold the platform or do not close.
+    """
+    if not assembly.paths:
+        raise assembly.error(f"no joints lead from the base to {assembly.body_name(assembly.platform)}; allowed: a leg")
+    if not servos:
+        raise assembly.error("no actuator drives a joint of the legs; allowed: one or more")
+    offsets = {joint: one.offset for joint, one in follows.items()}
+    chains, home = Chains(assembly, [*servos, *follows], offsets), undone(assembly.home_of(assembly.base))
+    pose = home @ assembly.home_of(assembly.platform)
+    values = np.array([next(m.home for m in assembly.moves.values() if m.joint == joint) for joint in servos])
+    open_legs = Legs(chains.legs, values, pose[:3, 3], pose[:3, :3], coupling=coupling(servos, follows))
+    gravity = home[:3, :3] @ assembly.model.opt.gravity
+    if up is None:
+        up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
+    each, cuts = with_bars(open_legs)
+    legs = _closed(assembly, replace(open_legs, legs=each), up)
+    return Structure(assembly, chains, open_legs, cuts, legs, servos, follows, up)
+
+
+def _closed(assembly, legs, up):
+    """Legs whose home pose closes all loops next to the file's; raises ConfigError where it cannot."""
+    start = Poses(legs.home_mm[None], legs.home_turn[None], legs.home_passive[None], None, None)
+    gaps = _gaps(legs, start)
+    if gaps.max() > _OPEN_MM:
+        joints = ", ".join(assembly.names_along(assembly.paths[gaps.argmax()]))
+        text = f"the leg through {joints} misses the platform by {gaps.max():.3f} mm at the home pose"
+        raise assembly.error(f"{text}; allowed: up to {_OPEN_MM:g} mm; a keyframe may set it")
+    if free := free_motions(legs, up):
+        text = f"body {assembly.body_name(assembly.platform)} is free to {'; '.join(free)} at the home pose"
+        raise assembly.error(f"{text}; allowed: legs that hold it with locked drives")
+    if gaps.max() < _CLOSED_MM:
+        return legs
+    poses = Closure(legs).solve(legs.home_drives[None], start)
+    left = _gaps(legs, poses).max() if poses.closed.all() else gaps.max()
+    if left > _LEFT_MM:
+        raise assembly.error(f"the loops stay open by {left:.3f} mm; allowed: up to {_LEFT_MM:g} mm")
+    homes = dict(zip((joint.name for joint in legs.passive_joints), poses.passive[0], strict=True))
+    chains = tuple(
+        replace(leg, joints=tuple(replace(j, home=homes[j.name]) if j.passive else j for j in leg.joints))
+        for leg in legs.legs
+    )
+    return replace(legs, legs=chains, home_mm=poses.position_mm[0], home_turn=poses.turn[0])
+
+
+def _gaps(legs, poses):
+    """What every leg lacks (legs,) in mm at one pose with drives at home, angles counted in the arm."""
+    result, actuators, twists = [], legs.home_drives[None], Twists(legs)
+    for leg in legs.legs:
+        way = walk(legs, leg, actuators, poses.passive, twists)
+        if leg.bar:
+            result.append(abs(bar_pose(legs, leg, way, poses, actuators, twists).lack_mm[0]))
+        else:
+            off = Rotation.from_matrix(way.turn[0] @ poses.turn[0].T).magnitude()
+            result.append(np.linalg.norm(way.place - poses.position_mm) + ARM_MM * off)
+    return np.array(result)

@@ -1,0 +1,139 @@
+"""The geometric numbers of any robot, and which of them positions can tell apart. Lengths in mm, angles in rad."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from rrru.kinematics.legs import TOOL, WORLD, unit_twist
+from rrru.parameters import Parameter, ParameterSet
+
+# so far off may be a drive whose zero is lost, in rad and in mm
+_LOST = {"rad": 0.6, "mm": 100.0}
+_AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A geometric number: its name, unit ("mm", "rad"), number of its drive (0: none), and twists (6,) by site."""
+
+    name: str
+    unit: str
+    leg: int
+    twists: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Reads:
+    """What the readings of a campaign leave open.
+
+    reflectors: names of the sites of the reflectors that were read, none where the tool was; fitted: those of them
+    whose place on the tool is not known; turned: whether orientations were read; frame: whether it is only roughly
+    known how the instrument's frame, and where orientations were read the tool's, lie.
+    """
+
+    reflectors: tuple[str, ...] = ()
+    fitted: tuple[str, ...] = ()
+    turned: bool = False
+    frame: bool = False
+
+
+def open_numbers(reads: Reads) -> tuple[Candidate, ...]:
+    """Candidates that Reads leave open: places of reflectors, the tool's pose where orientations tell it, the frame."""
+    first = 3 if reads.fitted else 0
+    tool = range(first, 6) if reads.turned and reads.frame else ()
+    places = [(name, k) for name in reads.fitted for k in range(3)] + [(TOOL, k) for k in tool]
+    return tuple(_at(*place) for place in places + [(WORLD, k) for k in range(6) if reads.frame])
+
+
+def candidates_of(legs, parts, reads=None):
+    """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
+
+    What Reads leave open comes before the rest of tool and world.
+    """
+    reads = reads or Reads()
+    drives = [
+        Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, drive.twists)
+        for number, drive in enumerate(parts.drives, 1)
+    ]
+    taken = {(drive.site, int(np.abs(drive.twist).argmax())) for drive in parts.drives}
+    lengths, shifts, turns = [], [], []
+    for joint in legs.joints:
+        if joint.kind == "fixed" and not np.any(joint.shift_mm) and np.array_equal(joint.turn, np.eye(3)):
+            continue
+        along = int(np.abs(joint.turn.T @ joint.shift_mm).argmax()) if np.any(joint.shift_mm) else None
+        for k in range(3):
+            (lengths if k == along else shifts).append((joint.name, k))
+            turns.append((joint.name, k + 3))
+    for leg in legs.legs:
+        if leg.bar:
+            bar, end = leg.bar_sites
+            lengths.append((bar, 0))
+            shifts += [(end, k) for k in range(3)]
+    # of several hands the last frame of each is its tool
+    tool = () if legs.hands else range(6 if reads.turned or reads.reflectors else 3)
+    own = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
+    numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
+    every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in own)]
+    return tuple({one.name: one for one in every}.values())
+
+
+def _at(site, component):
+    """The Candidate of one component of a site's twist."""
+    name = f"{site.replace(' ', '_')}_{_AXES[component]}"
+    return Candidate(name, "mm" if component < 3 else "rad", 0, {site: unit_twist(component)})
+
+
+def bounded(candidates, limits):
+    """The ParameterSet of Candidates, nominally zero, bounded by their unit's limit, drives by what may be lost."""
+    most = (max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0) for one in candidates)
+    return ParameterSet(
+        tuple(
+            Parameter(one.name, one.unit, 0.0, -high, high, "bounds assumed", one.leg)
+            for one, high in zip(candidates, most, strict=True)
+        )
+    )
+
+
+def stages(candidates, outside):
+    """Which Candidates (p,) are of sites outside the robot, such as the frame, and which are these or drives."""
+    frames = np.array([outside.issuperset(one.twists) for one in candidates])
+    return frames, frames | np.array([one.leg > 0 for one in candidates])
+
+
+def direction(legs, candidate):
+    """The twists (sites, 6) of a unit of a Candidate."""
+    result = np.zeros((len(legs.sites), 6))
+    for site, twist in candidate.twists.items():
+        result[legs.site_numbers[site]] += twist
+    return result
+
+
+def offered(legs, candidates):
+    """Which components (sites, 6) of twists Candidates stand for."""
+    return np.any([direction(legs, one).astype(bool) for one in candidates], axis=0)
+
+
+def choose(columns, allowed, least, basis=None):
+    """Numbers of the columns (m, c) that those chosen before them leave more than the share `least` of.
+
+    allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. With {number:
+    combination (k,) of the chosen before it} of the others.
+    """
+    basis, chosen, stands = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
+    for number, column in enumerate(columns.T):
+        left = column - basis @ (basis.T @ column)
+        left -= basis @ (basis.T @ left)
+        size = np.linalg.norm(column)
+        if allowed[number] and size > least and np.linalg.norm(left) > least * size:
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            chosen.append(number)
+        else:
+            stands[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
+    return chosen, stands
+
+
+def in_words(combination, names):
+    """A combination (k,) of the first k names, such as "0.71 base1_x - 0.2 dl1"; "nothing" where it is none."""
+    return (
+        " + ".join(f"{c:.3g} {name}" for c, name in zip(combination, names, strict=False) if abs(c) > 1e-6) or "nothing"
+    )

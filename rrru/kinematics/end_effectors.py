@@ -1,0 +1,222 @@
+"""Robots with several hands: arms that share their first joints, the trunk, and end apart.
+
+Every arm is a leg from the base to its own hand; what is measured is of one hand or the other, pose by pose. A twist
+moves a hand as the serial arm to it does, and a twist at a joint that the arm does not have moves nothing; so A of
+`rrru.kinematics.parameter_jacobian` is the identity, and the wrenches of all legs but the one that is read are zero.
+Which hand a pose is of follows from the position near which it is looked for: that of the hand that nominally is
+nearest. The masses of all arms load the trunk. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from itertools import cycle, islice
+
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.kinematics.chain import Poses, Twists, walk
+from rrru.kinematics.general_robot import GeneralRobot
+from rrru.kinematics.legs import Legs, Parts
+from rrru.kinematics.point_masses import PLATFORM
+
+_EYE = np.eye(6)
+# point masses of two arms' descriptions are the same within this
+_SAME_MM = 1e-6
+
+
+@dataclass(frozen=True)
+class HandPoses(Poses):
+    """Poses of hands; leg (n,): number of the leg whose end each is."""
+
+    leg: np.ndarray
+
+
+class Ends:
+    """The ends of legs that end apart, as `rrru.kinematics.closure.Closure` is of legs that hold one platform."""
+
+    row_count = 6
+
+    def __init__(self, legs):
+        self.legs, self.rows = legs, [slice(0, 6)] * len(legs.legs)
+
+    def wrenches(self, _ways, poses):
+        """Wrenches (n, 6, 6) of every leg: all six where its hand is read, none elsewhere."""
+        return [np.where((poses.leg == number)[:, None, None], _EYE, 0.0) for number in range(len(self.legs.legs))]
+
+    def inverse(self, wrenches):
+        """Twists (n, 6, 6) of the hand per constraint."""
+        return np.broadcast_to(_EYE, wrenches[0].shape)
+
+    def solve(self, actuators, start, twists=None):
+        """HandPoses (n) of the hands of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
+        every, own = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
+        rows = np.arange(len(own))
+        position, turn = (np.stack(part)[own, rows] for part in zip(*every, strict=True))
+        known = np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
+        position[~known], turn[~known] = np.nan, np.nan
+        return HandPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
+
+
+def ends(legs, actuators, twists):
+    """Positions (n, 3) and orientations (n, 3, 3) of the end of every leg."""
+    passive = np.zeros((len(actuators), 0))
+    return [(way.place, way.turn) for way in (walk(legs, leg, actuators, passive, twists) for leg in legs.legs)]
+
+
+@dataclass(frozen=True, eq=False)
+class HandedRobot(GeneralRobot):
+    """A GeneralRobot of several hands. Its inverse is that of the first one."""
+
+    @cached_property
+    def model(self):
+        """The ends of the legs."""
+        return Ends(self.legs)
+
+    def near(self, position_mm, actuators):
+        """HandPoses (n) of those whose tools nominally are nearest to positions (n, 3), at actuator values (n, K)."""
+        actuators = np.asarray(actuators, dtype=float)
+        off = np.nan_to_num(self._tools(actuators) - np.asarray(position_mm))
+        none, leg = np.zeros((len(actuators), 0)), np.linalg.norm(off, axis=2).argmin(axis=0)
+        return self.model.solve(actuators, HandPoses(None, None, none, None, None, leg))
+
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) of the tools of the hands that carry targets (n,), by default of the first hand.
+
+        Raises ConfigError for a target that no hand carries.
+        """
+        owner = {target: number for number, hand in enumerate(self.legs.hands) for target in hand}
+        wanted = [self.legs.hands[0][0]] * len(actuators) if targets is None else list(targets)
+        if unknown := [target for target in wanted if target not in owner]:
+            allowed = ", ".join(owner)
+            raise ConfigError(f"robot {self.name}: no hand carries the target {unknown[0]!r}; allowed: {allowed}")
+        return self._tools(actuators)[[owner[target] for target in wanted], np.arange(len(wanted))]
+
+    def _tools(self, actuators):
+        """Nominal positions (hands, n, 3) of the tools of all hands at actuator values (n, K)."""
+        every = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs))
+        return np.stack([place + turn @ np.asarray(self.tool_mm) for place, turn in every])
+
+    def _workspace(self):
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) of the hands in turn."""
+        actuators, _ = super()._workspace()
+        return actuators, self.guess(actuators, list(islice(cycle(h for h, *_ in self.legs.hands), len(actuators))))
+
+
+def with_hands(arms, shared, carries=None):
+    """The HandedRobot that arms by name, robots of one leg of driven joints each, make.
+
+    shared: number of joints, the base's frame among them, from the base to where the arms part, alike in all of them;
+    carries: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
+    shared are the first arm's; fixed frames of the arms get the hand's name before theirs. Raises ConfigError for
+    joints of two arms with one name.
+    """
+    first, carries = next(iter(arms.values())), carries or {}
+    if unknown := [name for name in carries if name not in arms]:
+        raise ConfigError(f"robot {first.name}: targets of {unknown[0]!r}; allowed: {', '.join(arms)}")
+    hands = tuple(tuple(carries.get(name, (name,))) for name in arms)
+    every = [target for hand in hands for target in hand]
+    if len(set(every)) < len(every) or not all(hands):
+        raise ConfigError(f"robot {first.name}: targets {', '.join(every)}; allowed: one or more a hand, of their own")
+    arms = {name: _apart(arm, name, shared) for name, arm in arms.items()}
+    chains, order = _chains(arms, shared, first.name)
+    drives, ranges, home = _drives(arms.values())
+    followers = {one.site: one for arm in arms.values() for one in arm.parts.followers}
+    coupling = _coupling(arms.values(), order, list(drives))
+    options = {one.name: getattr(first, one.name) for one in fields(first)}
+    own = {
+        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
+        "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
+        "drive_range": ranges,
+        "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),
+        "lumps": _lumps([*arms.values()], shared),
+        **{name: _limits(arms.values(), name, drives) for name in ("effort_limits", "velocity_limits")},
+    }
+    return HandedRobot(**options | own)
+
+
+def _drives(arms):
+    """Drives by column of all arms, with all that follows them in any, their ranges (K, 2) and home values (K,)."""
+    drives, ranges, homes = {}, {}, {}
+    for arm in arms:
+        for drive, own, home in zip(arm.parts.drives, arm.drive_range, arm.legs.home_drives, strict=True):
+            known = drives.get(drive.column, drive)
+            drives[drive.column] = replace(known, others=known.others | drive.others)
+            ranges.setdefault(drive.column, own)
+            homes.setdefault(drive.column, home)
+    return drives, np.array([*ranges.values()]), np.array([*homes.values()])
+
+
+def _limits(arms, name, columns):
+    """One of `effort_limits` and `velocity_limits` of arms, by the columns of all drives; None where no arm has any."""
+    known = {}
+    for arm in arms:
+        if (limits := getattr(arm, name)) is not None:
+            known |= dict(zip(arm.parts.columns, limits, strict=True))
+    return np.array([known.get(column, np.nan) for column in columns]) if known else None
+
+
+def shared_joints(arms):
+    """Number of joints up to which arms by name have the same names, the base's frame among them."""
+    chains = zip(*(_names(arm) for arm in arms.values()), strict=False)
+    return next((number for number, names in enumerate(chains) if len(set(names)) > 1), 0)
+
+
+def _lumps(arms, shared):
+    """The point masses of arms: of the trunk those that all have there, as one may count another arm to its trunk."""
+    first, *others = arms
+    trunk = set(_names(first)[:shared])
+    common = [one for one in first.lumps if one.joint in trunk and all(_has(arm, one) for arm in others)]
+    return (*common, *(lump for arm in arms for lump in arm.lumps if lump.joint not in trunk))
+
+
+def _has(arm, lump):
+    """Whether an arm has a point mass."""
+    alike = (one for one in arm.lumps if (one.joint, one.mass_kg) == (lump.joint, lump.mass_kg))
+    return any(np.allclose(one.at_mm, lump.at_mm, rtol=0.0, atol=_SAME_MM) for one in alike)
+
+
+def _names(arm):
+    """Names of the joints of an arm, its base's frame first."""
+    return [joint.name for joint in arm.legs.legs[0].joints]
+
+
+def _apart(arm, hand, shared):
+    """An arm whose fixed frames behind the shared joints are called by the hand as well; the last one is the hand."""
+    (leg,) = arm.legs.legs
+    new = {joint.name: f"{hand} {joint.name}" for joint in leg.joints[shared:] if joint.kind == "fixed"}
+    new[PLATFORM] = new.get(leg.joints[-1].name, leg.joints[-1].name)
+    joints = tuple(replace(joint, name=new.get(joint.name, joint.name)) for joint in leg.joints)
+    lumps = tuple(replace(lump, joint=new.get(lump.joint, lump.joint)) for lump in arm.lumps)
+    return replace(arm, legs=replace(arm.legs, legs=(replace(leg, name=hand, joints=joints),)), lumps=lumps)
+
+
+def _chains(arms, shared, robot):
+    """The legs of arms, with the first one's shared joints in all of them, and names of the driven joints in order."""
+    trunk, driven, result, taken = None, {}, [], set()
+    for name, arm in arms.items():
+        (leg,) = arm.legs.legs
+        if leg.bar or arm.legs.passive_joints:
+            raise ConfigError(f"robot {robot}: {name} is no chain of driven joints; allowed: arms")
+        own = _names(arm)[shared:]
+        if again := taken.intersection(own):
+            raise ConfigError(f"robot {robot}: two arms have a joint {again.pop()!r}; allowed: names of their own")
+        taken.update(own)
+        joints = [
+            joint if joint.drive is None else replace(joint, drive=driven.setdefault(joint.name, len(driven)))
+            for joint in leg.joints
+        ]
+        trunk = trunk or joints[:shared]
+        result.append(replace(leg, joints=(*trunk, *joints[shared:])))
+    return tuple(result), list(driven)
+
+
+def _coupling(arms, joints, columns):
+    """Driven values (D, K) of joints per drive, each told by the arms that have it; None where they are the same."""
+    result = np.zeros((len(joints), len(columns)))
+    for arm in arms:
+        own = {joint.drive: joint.name for joint in arm.legs.joints if joint.drive is not None}
+        matrix = np.eye(len(own)) if arm.legs.coupling is None else arm.legs.coupling
+        for (row, number), factor in np.ndenumerate(matrix):
+            result[joints.index(own[row]), columns.index(arm.parts.columns[number])] = factor
+    same = result.shape[0] == result.shape[1] and np.array_equal(result, np.eye(len(result)))
+    return None if same else result

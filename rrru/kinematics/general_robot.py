@@ -1,0 +1,301 @@
+"""A robot that has no file of its own: legs from a description, everything else by the general model.
+
+Its parameters are directions at sites. "frame" is what a campaign's readings leave open alone, frame and reflectors;
+"zero" are its drives' offsets beside it; "full" is every geometric number that positions can tell, drives first, then
+lengths, then angles: a number that those before it imitate over the workspace is left out, and `gauge` says what stands
+for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+from rrru.kinematics import base_parameters
+from rrru.kinematics.base_parameters import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
+from rrru.kinematics.inverse import bar_lengths, drives_from_home, end_of, followed, in_range, near_or_followed
+from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts
+from rrru.kinematics.point_masses import base_moment, driven_loads, member_forces, moments
+from rrru.kinematics.robot import Robot
+
+SETS = ("frame", "zero", "full")
+# poses over which a number has to be told from the others, their tilt, and the share of it that must be left
+_POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
+_SEEN = 1e-6  # share of the largest singular value that others need to count
+
+
+@dataclass(frozen=True, eq=False)
+class GeneralRobot(Robot):
+    """A robot of any legs.
+
+    drive_range (K, 2): actuator values between which it works; assumed: columns of the drives that nobody states a
+    range of, which may go beyond it; parameter_set: one of SETS; lumps: point masses of its links; sample: actuator
+    values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names
+    that it is chosen from, by default all; reads: what a campaign's readings leave open; effort_limits,
+    velocity_limits: of `Robot`.
+    """
+
+    name: str
+    legs: Legs
+    parts: Parts
+    drive_range: np.ndarray
+    angle_arm_mm: float = 500.0
+    parameter_set: str = "zero"
+    angle_limit_rad: float = 0.1
+    length_limit_mm: float = 30.0
+    tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    lumps: tuple = ()
+    assumed: frozenset[str] = frozenset()
+    sample: tuple | None = None
+    among: tuple[str, ...] = ()
+    reads: Reads = field(default_factory=Reads)
+    effort_limits: np.ndarray | None = None
+    velocity_limits: np.ndarray | None = None
+
+    TRACKED = RICHEST = "full"
+    SEARCHED = ""  # an objective that is not compiled is too slow for a genetic algorithm
+
+    def __post_init__(self):
+        if self.parameter_set not in SETS:
+            raise ConfigError(f"{self.name}: parameter_set is {self.parameter_set!r}; allowed: {', '.join(SETS)}")
+
+    @cached_property
+    def candidates(self):
+        """All Candidates, see `rrru.kinematics.base_parameters`."""
+        return candidates_of(self.legs, self.parts, self.reads)
+
+    @cached_property
+    def _chosen(self):
+        """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
+        wanted = self._wanted
+        if self.parameter_set != "full" and not self.sample:
+            return wanted, {}
+        actuators, position, readings = self.sample or (*self._workspace(), None)
+        poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
+        seen = poses.closed
+        at = self.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
+        columns = at.columns(np.stack([direction(self.legs, one) for one in self.candidates], axis=-1))
+        sizes = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self.candidates])
+        names = {one.name for one in wanted} & set(self.among or [one.name for one in wanted])
+        allowed = [one.name in names for one in self.candidates]
+        chosen, stands = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
+        gauge = {
+            self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
+        }
+        return tuple(self.candidates[k] for k in chosen), gauge
+
+    @property
+    def offered(self):
+        """Which components (sites, 6) of constant twists its parameters are chosen from."""
+        return offered(self.legs, self._wanted)
+
+    @cached_property
+    def _wanted(self):
+        """The Candidates that the set is chosen from."""
+        if self.parameter_set == "full":
+            return self.candidates
+        drives = self.candidates[: len(self.parts.drives)] if self.parameter_set == "zero" else ()
+        return (*drives, *open_numbers(self.reads))
+
+    def _workspace(self):
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) near those of the tool."""
+        generator = np.random.default_rng(0)
+        if self._bars_only:
+            low, high = np.asarray(self.drive_range, dtype=float).T
+            position = self.legs.home_mm + 0.3 * (high - low).min() * generator.uniform(-1.0, 1.0, (_POSES, 3))
+            turn = Rotation.from_rotvec(_TILT_RAD * generator.uniform(-1.0, 1.0, (_POSES, 3))).as_matrix()
+            place = position, turn @ self.legs.home_turn
+            actuators = bar_lengths(self.legs, self.drive_range, place, self.twists())
+            known = np.isfinite(actuators).all(axis=1)
+            return actuators[known], position[known]
+        low, high = np.asarray(self.drive_range, dtype=float).T
+        actuators = low + (high - low) * generator.random((_POSES, len(low)))
+        return actuators, np.tile(self.legs.home_mm, (_POSES, 1))
+
+    @cached_property
+    def parameters(self):
+        """The parameters of the chosen set, nominally zero."""
+        return base_parameters.bounded(self._chosen[0], {"mm": self.length_limit_mm, "rad": self.angle_limit_rad})
+
+    @cached_property
+    def gauge(self):
+        """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
+        return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
+
+    def confounded_outside(self, name):
+        """Candidates of frame, tool and reflectors that a parameter imitates, and its size for a unit of each."""
+        names, (_, gauge) = self.parameters.names, self._chosen
+        known = {one.name: one for one in self.candidates if self._outside.issuperset(one.twists)}
+        sizes = {left: dict(zip(names, of.tolist(), strict=False)).get(name, 0.0) for left, of in gauge.items()}
+        return tuple((known[left], size) for left, size in sizes.items() if left in known and size)
+
+    @property
+    def _outside(self):
+        """Sites that are no part of the robot."""
+        return {WORLD, TOOL, *self.legs.reflectors}
+
+    @property
+    def stages(self):
+        """Frame, tool and reflectors, and then with them the drives."""
+        return base_parameters.stages(self._chosen[0], self._outside)
+
+    @cached_property
+    def directions(self):
+        """Twists (sites, 6, p) that a unit of each parameter makes."""
+        each = [direction(self.legs, one)[..., None] for one in self._chosen[0]]
+        return np.concatenate([np.zeros((len(self.legs.sites), 6, 0)), *each], axis=-1)
+
+    @property
+    def deviation_names(self):
+        """Names of the deviations that `twists_of` knows: all Candidates."""
+        return tuple(one.name for one in self.candidates)
+
+    def twists_of(self, values):
+        """Twists (1, sites, 6) of deviations by name."""
+        known = {one.name: one for one in self.candidates}
+        twists = [value * direction(self.legs, known[name]) for name, value in values.items()]
+        return np.sum(twists, axis=0)[None] if twists else self.twists()
+
+    def identifiable(self, values):
+        """Mapping of the parameters from values of any Candidates: what is left out counts by what stands for it."""
+        result = dict.fromkeys(self.parameters.names, 0.0)
+        for name, value in values.items():
+            if name in result:
+                result[name] += value
+            for stands, share in zip(self._chosen[0], self._chosen[1].get(name, ()), strict=False):
+                result[stands.name] += share * value
+        return result
+
+    def reading(self, reads):
+        """The robot with what a campaign's readings leave open, `rrru.kinematics.base_parameters.Reads`."""
+        return replace(self, legs=replace(self.legs, reflectors=reads.reflectors), reads=reads)
+
+    def seen_at(self, actuators, position_mm, readings=None):
+        """The robot with its set chosen on poses of a campaign, (n, K) and (n, 3), by what noise lets tell.
+
+        readings: what was read at these poses, by default positions of the tool. Of a robot so chosen, on poses of a
+        part of its campaign, it keeps a part of the numbers.
+        """
+        among = () if self.sample is None else self.parameters.names
+        sample = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float), readings
+        return replace(self, sample=sample, among=among)
+
+    @property
+    def reach_mm(self):
+        """Upper bound of how far the tool can get from the foot of the leg that takes it farthest."""
+        return self._longest_mm(1)
+
+    @property
+    def orients(self):
+        """Whether its drives can orient its platform beside moving it."""
+        return self.freedoms[1] > 0
+
+    @property
+    def size_mm(self):
+        """Upper bound of how far the tool can get from the origin."""
+        return self._longest_mm(0)
+
+    farthest_mm = size_mm  # searching for it would take the inverse of many points
+
+    def _longest_mm(self, first):
+        """Length of the longest leg from its joint of this number on, slides and bars out, to the tool."""
+        travel = np.abs(np.asarray(self.drive_range, dtype=float)).max(axis=1)
+        return self.legs.longest_mm(first, travel) + float(np.linalg.norm(self.tool_mm))
+
+    def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
+        """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from the home pose does not end.
+
+        Under deviations positions are met as nearly as the drives can. turn (n, 3, 3): the platform's orientation, by
+        default the home pose's, where the drives can choose it; of the assemblies there is only the home pose's.
+        """
+        position, twists = np.asarray(position_mm, dtype=float), self.twists(deviations)
+        wanted = np.broadcast_to(self.legs.home_turn, (len(position), 3, 3)) if turn is None else turn
+        if self._bars_only:
+            place = position - np.einsum("nij,j->ni", wanted, self.tool_mm), wanted
+            return bar_lengths(self.legs, self.drive_range, place, twists)
+        return drives_from_home(self, (position, wanted), twists, deviations is not None)
+
+    @property
+    def strokes(self):
+        """Widths (K,) of the drives' ranges, NaN where none is stated."""
+        stated = [column not in self.assumed for column in self.parts.columns]
+        return np.where(stated, np.ptp(np.asarray(self.drive_range, dtype=float), axis=1), np.nan)
+
+    def in_range(self, actuators):
+        """Actuator values (n, K), those of turning drives by whole turns within their ranges; NaN outside of these."""
+        return in_range(self, np.asarray(actuators, dtype=float))
+
+    def unreached(self, values, as_home=True):
+        """What keeps the robot from a point: a drive's range where only some of the values (K,) are NaN.
+
+        as_home: whether its platform was to be turned as in the home pose.
+        """
+        names = [name for name, lost in zip(self.parts.columns, np.isnan(values), strict=True) if lost]
+        where = "out of reach" if len(names) == len(values) else f"out of the range of {', '.join(names)}"
+        return where + (", with the platform turned as in the home pose" if self.orients and as_home else "")
+
+    def own_load(self, _masses, motion, poses, gravity_mm_s2):
+        """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see
+        `rrru.kinematics.point_masses`.
+        """
+        return driven_loads(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+
+    def own_member_forces(self, motion, poses, gravity_mm_s2):
+        """Forces (n, members) in N of the robot's point masses on its members, compression positive."""
+        return member_forces(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+
+    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
+        """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
+        return moments(self, motion, poses, gravity_mm_s2, at_mm) if self.lumps else 0.0
+
+    def own_base_moment(self, motion, poses, gravity_mm_s2):
+        """Moments (n, 3) in N mm of the robot's point masses about the origin."""
+        return base_moment(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+
+    @property
+    def workspace_lines(self):
+        """Grid lines over its reach: fewer where every point's inverse takes a search."""
+        return Robot.workspace_lines if self._bars_only else 30
+
+    @property
+    def _bars_only(self):
+        """Whether every drive is a bar's length."""
+        bars = [leg.bar.drive for leg in self.legs.legs if leg.bar]
+        return None not in bars and len(bars) == len(self.parts.drives) and self.legs.coupling is None
+
+    @cached_property
+    def freedoms(self):
+        """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
+        actuators, position = (part[:10] for part in self._workspace())
+        poses = self.solve(actuators, position)
+        at = self.map(actuators[poses.closed], poses.of(poses.closed))
+        position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
+        turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
+        both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
+        return int(position_rank), int(both - position_rank)
+
+    @cached_property
+    def _driven_leg(self):
+        """A leg that is all driven, whose end is the platform's place; None where there is none."""
+        legs = (leg for leg in self.legs.legs if not leg.bar and not any(joint.passive for joint in leg.joints))
+        return next(legs, None)
+
+    def near(self, position_mm, actuators):
+        """Poses near which the legs close: of a leg that is all driven its own end, else upright or followed."""
+        actuators = np.asarray(actuators, dtype=float)
+        if self._driven_leg:
+            return end_of(self.legs, self._driven_leg, actuators)
+        return near_or_followed(self, actuators, super().near(position_mm, actuators))
+
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) of the tool at actuator values (n, K): a driven leg's end, or followed from home.
+
+        The home position's where they are lost.
+        """
+        actuators = np.asarray(actuators, dtype=float)
+        known = end_of(self.legs, self._driven_leg, actuators) if self._driven_leg else followed(self, actuators)
+        position = known.point(self.tool_mm)
+        return np.where(np.isfinite(position), position, self.legs.home_mm)

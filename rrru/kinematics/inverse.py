@@ -1,0 +1,172 @@
+"""Actuator values of a robot without a file: Newton steps, lengths of driven bars. Lengths in mm, angles in rad."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.cache import last_kept
+from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
+
+# an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
+# less: longer ones end in other assemblies, or nowhere
+_STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
+# singular values below this share count as lost; where they leave steps below a share of the drives' ranges, it takes
+# a step of another share to get away
+_LOST, _STILL, _AWAY = 1e-9, 1e-6, 0.01
+_FREEDOMS = 6
+# values beyond a drive's range by no more than this share of it are in it
+_SLACK = 1e-6
+# a pose followed from home counts if it is so much closer than home to where it should be
+_CLOSE = 0.1
+
+
+def drives_from_home(robot, place, twists, nearest):
+    """`drives_at` near the home pose."""
+    count, legs = len(place[0]), robot.legs
+    start = np.tile(legs.home_drives, (count, 1)).astype(float), np.tile(legs.home_mm, (count, 1))
+    return drives_at(robot, place, start, twists, nearest)
+
+
+def drives_at(robot, place, start, twists, nearest=True):
+    """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
+
+    place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
+    them; start: actuator values (n, K) and positions (n, 3) near which to look; nearest: whether positions may be met
+    as nearly as the drives can.
+    """
+    (position, wanted), (actuators, near) = place, start
+    poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
+    (low, high), widths = np.asarray(robot.drive_range, dtype=float).T, _widths(robot)
+    rows, going = np.arange(len(position)), np.isfinite(actuators).all(axis=1)
+    for _ in range(_STEPS):
+        going = going & poses.closed & ~(left[rows] < _REACHED_MM)
+        rows, poses = rows[going], poses.of(going)
+        if not len(rows):
+            break
+        own = twists[rows] if len(twists) > 1 else twists
+        at = robot.map(actuators[rows], poses, own)
+        lack = position[rows] - robot.measured(at.poses, own)
+        turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
+        step, held, lost = drive_step(at, robot.freedoms, lack, turning, widths)
+        longest, gain = np.abs(step).max(axis=1), (at.drive_response @ (widths * step)[:, :, None])[:, :, 0]
+        # what no drive changes stays: a point off the plane that a planar robot keeps to
+        off = np.linalg.norm(lack - gain, axis=1)
+        going = nearest | lost | (longest >= _STILL) | (off < 1e3 * _REACHED_MM)
+        if nearest:
+            # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
+            lack = np.where(lost[:, None], lack, gain)
+        left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
+        # a stretched arm is led nowhere by what it cannot do there
+        still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
+        step[still] = np.where(actuators[rows] - low > high - actuators[rows], -_AWAY, _AWAY)[still]
+        actuators[rows] += widths * step
+        poses = robot.model.solve(actuators[rows], poses, own)
+    return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
+
+
+@last_kept
+def followed(robot, actuators):
+    """Poses (n) at actuator values (n, K), followed in short steps of the drives from the home pose; NaN where lost."""
+    legs, n = robot.legs, len(actuators)
+    turn, passive = np.broadcast_to(legs.home_turn, (n, 3, 3)), np.tile(legs.home_passive, (n, 1))
+    poses = Poses(np.tile(legs.home_mm, (n, 1)), turn, passive, None, None)
+    for share in np.linspace(0.0, 1.0, _steps_from_home(robot, actuators) + 1)[1:]:
+        poses = robot.model.solve(legs.home_drives + share * (actuators - legs.home_drives), poses)
+    return poses
+
+
+def near_or_followed(robot, actuators, near):
+    """Poses `near` (n) which to look at actuator values (n, K), or those followed from home if these are close by.
+
+    Passive joints far from home are not known from the platform's place alone.
+    """
+    if not len(robot.legs.passive_joints) or _steps_from_home(robot, actuators) < 2:
+        return near
+    poses = followed(robot, actuators)
+    off = np.linalg.norm(poses.position_mm - near.position_mm, axis=1)
+    close = off < _CLOSE * np.linalg.norm(robot.legs.home_mm - near.position_mm, axis=1)
+    return poses.where(close, near)
+
+
+def _steps_from_home(robot, actuators):
+    """Number of the steps in which drives may go from home to actuator values (n, K), at least one."""
+    away = np.abs(actuators - robot.legs.home_drives) / _widths(robot)
+    return max(1, int(np.ceil(np.nanmax(away, initial=0.0) / _LONGEST_STEP)))
+
+
+def _widths(robot):
+    """How far (K,) each drive goes, a turning one no further than a turn; a turn where no range is known."""
+    turning = np.array(robot.parts.units) == "rad"
+    own = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
+    turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
+    return np.where((own > 0.0) & np.isfinite(own), own, turn)
+
+
+def in_range(robot, actuators):
+    """Actuator values (n, K), those of turning drives whole turns further where their ranges want it; NaN outside."""
+    legs, slack = robot.legs, _SLACK * _widths(robot)
+    low, high = np.asarray(robot.drive_range, dtype=float).T + np.outer([-1.0, 1.0], slack)
+    coupling = np.eye(len(legs.driven_kinds)) if legs.coupling is None else legs.coupling
+    turning, whole = np.array(legs.driven_kinds) == "R", np.isclose(coupling, np.rint(coupling))
+    # a turn of such a drive brings back all that it moves
+    periodic = ((coupling == 0.0) | (turning[:, None] & whole)).all(axis=0)
+    turns = np.ceil((low - actuators) / (2.0 * np.pi))
+    assumed = np.array([drive.column in robot.assumed for drive in robot.parts.drives])
+    beyond = ~assumed & ~((low <= actuators) & (actuators <= high))
+    result = np.where(beyond & periodic, actuators + 2.0 * np.pi * turns, actuators)
+    return np.where(beyond & ~((low <= result) & (result <= high)), np.nan, result)
+
+
+def drive_step(at, ranks, lack_mm, turning_rad, widths):
+    """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
+
+    ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have; widths
+    (K,): how far each drive goes, in shares of which the smallest changes are found and given. With the size (n,) in
+    rad of the change of orientation that they can and should still make, and where (n,) a pose lacks some freedom.
+    """
+    response, turn = at.drive_response * widths, at.platform[:, 3:] @ at.drive_counts * widths
+    reach, stretched = _inverse_of_rank(response, ranks[0], response)
+    step = reach @ lack_mm[:, :, None]
+    beside = np.eye(len(widths)) - reach @ response
+    inverse, aligned = _inverse_of_rank(turn @ beside, ranks[1], turn)
+    more = beside @ inverse @ (turning_rad[:, :, None] - turn @ step)
+    held = np.linalg.norm((turn @ more)[:, :, 0], axis=1)
+    if sum(ranks) == _FREEDOMS:
+        # every orientation can be met, in another pose if not here
+        held = np.where(aligned, np.linalg.norm(turning_rad, axis=1), held)
+    return (step + more)[:, :, 0], held, stretched | aligned
+
+
+def _inverse_of_rank(matrices, rank, whole):
+    """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values, and which (n,) lack one.
+
+    Values that are nothing beside the matrices (n, j, k) of which these are a part are left out.
+    """
+    u, size, vt = np.linalg.svd(matrices, full_matrices=False)
+    size = size[:, :rank]
+    lost = size <= _LOST * np.linalg.norm(whole, axis=(1, 2))[:, None]
+    shares = np.where(lost, 0.0, 1.0 / np.where(lost, 1.0, size))
+    return (vt[:, :rank].transpose(0, 2, 1) * shares[:, None]) @ u[:, :, :rank].transpose(0, 2, 1), lost.any(axis=1)
+
+
+def end_of(legs, leg, actuators):
+    """Poses (n) at which a leg ends whose joints are all driven, at actuator values (n, K)."""
+    passive = np.zeros((len(actuators), len(legs.passive_joints)))
+    way = walk(legs, leg, actuators, passive, Twists(legs))
+    return Poses(way.place, way.turn, passive, None, None)
+
+
+def bar_lengths(legs, drive_range, place, twists):
+    """Lengths (n, K) of driven bars at places of the platform, NaN where one is outside of its range (K, 2).
+
+    place: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
+    """
+    poses = Poses(*place, np.zeros((len(place[0]), 0)), None, None)
+    none, own = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
+    needed = none.copy()
+    for leg in legs.legs:
+        if leg.bar:
+            way = walk(legs, leg, none, poses.passive, own)
+            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, poses, none, own).lack_mm
+    low, high = np.asarray(drive_range, dtype=float).T
+    return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)

@@ -1,0 +1,316 @@
+"""A robot as legs of screws: what every robot's file describes and the general model computes with.
+
+A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
+placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
+cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
+by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk
+are legs that end apart: each has an end of its own, its hand, see `rrru.kinematics.end_effectors`.
+
+Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
+(the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
+own, the last ones the platform's. Lengths in mm, angles in rad.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from rrru.errors import ConfigError
+
+WORLD, TOOL = "world", "tool"
+X, Y, Z = np.eye(3)
+_NO_SHIFT, _NO_TURN = np.zeros(3), np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One joint and the link before it.
+
+    kind: "R" turns about, "P" slides along `axis` (3,), "fixed" only makes a site; shift_mm (3,) and turn (3, 3): its
+    frame in the frame behind the joint before it; drive: the number of its driven value, see `Legs`, counted from 0,
+    None for a passive joint; home: value of a passive joint from which searches start.
+    """
+
+    name: str
+    kind: str = "fixed"
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    shift_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
+    turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    drive: int | None = None
+    home: float = 0.0
+
+    def __post_init__(self):
+        if self.kind not in ("R", "P", "fixed"):
+            raise ConfigError(f"joint {self.name}: its kind is {self.kind!r}; allowed: R, P, fixed")
+
+    @property
+    def passive(self):
+        """Whether its value follows from the others."""
+        return self.kind != "fixed" and self.drive is None
+
+
+@dataclass(frozen=True, eq=False)
+class Bar:
+    """A link of length_mm between ball joints, from the last joint's frame to the point platform_mm (3,).
+
+    drive: number of the driven value that adds to its length, None for a link that keeps it.
+    """
+
+    length_mm: float
+    platform_mm: np.ndarray
+    drive: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A chain of joints whose last frame, turned by end_turn (3, 3), is the platform's or carries a bar to it.
+
+    The first joint's frame is where the leg stands, no length of the robot.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    end_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    bar: Bar | None = None
+
+    @property
+    def bar_sites(self):
+        """Names of the bar's site, whose x runs along it towards the platform, and of its end, in the platform's frame.
+
+        Empty without a bar.
+        """
+        return (f"{self.name} bar", f"{self.name} end") if self.bar else ()
+
+
+class Chain(NamedTuple):
+    """A leg with m joints as arrays for compiled code.
+
+    frames (m + 1, 4, 3): the placement before every joint and after the last, rows its axes and its place; motions (m,
+    6): the twist of a joint's motion in its frame, shift first; numbers (m, 2): its site, and its column in
+    passive values (k,) followed by driven ones (D,), -1 for a fixed joint.
+    """
+
+    frames: np.ndarray
+    motions: np.ndarray
+    numbers: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """All legs of a robot, and the sites and values that they make.
+
+    home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
+    reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured; coupling
+    (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same;
+    hands: of legs that end apart the names of the targets that each carries, empty where all hold one platform.
+    """
+
+    legs: tuple[Leg, ...]
+    home_drives: np.ndarray
+    home_mm: np.ndarray = field(default_factory=lambda: _NO_SHIFT)
+    home_turn: np.ndarray = field(default_factory=lambda: _NO_TURN)
+    reflectors: tuple[str, ...] = ()
+    coupling: np.ndarray | None = None
+    hands: tuple[tuple[str, ...], ...] = ()
+
+    def __post_init__(self):
+        owner = {}
+        for leg in self.legs:
+            for number, joint in enumerate(leg.joints):
+                before = leg.joints[:number]
+                if owner.setdefault(joint.name, (joint, before)) != (joint, before):
+                    raise ConfigError(f"joint {joint.name} of {leg.name}: another leg has it behind other joints")
+        if self.coupling is not None and len(self.coupling) != len(self.driven_kinds):
+            rows = f"{len(self.coupling)} rows for {len(self.driven_kinds)} driven values"
+            raise ConfigError(f"the coupling has {rows}; allowed: one each")
+
+    @property
+    def arm_joints(self):
+        """Names of the turning joints of an arm, a single leg without a bar, or of arms that end apart; else none."""
+        if (len(self.legs) > 1 and not self.hands) or self.legs[0].bar:
+            return ()
+        return tuple(joint.name for joint in self.joints if joint.kind == "R")
+
+    @cached_property
+    def joints(self):
+        """All joints, each once, in the order of the legs."""
+        return tuple({joint.name: joint for leg in self.legs for joint in leg.joints}.values())
+
+    @cached_property
+    def passive_joints(self):
+        """The passive joints: the meaning of every vector of passive values."""
+        return tuple(joint for joint in self.joints if joint.passive)
+
+    @cached_property
+    def driven_kinds(self):
+        """Kind of every driven value, "R" or "P"."""
+        kinds = {joint.drive: joint.kind for joint in self.joints} | {
+            leg.bar.drive: "P" for leg in self.legs if leg.bar
+        }
+        return tuple(kinds[drive] for drive in sorted(set(kinds) - {None}))
+
+    def driven(self, actuators):
+        """Driven values (n, D) at actuator values (n, K)."""
+        return actuators if self.coupling is None else actuators @ self.coupling.T
+
+    def per_actuator(self, columns):
+        """Columns (.., K) per actuator value from those (.., D) per driven value."""
+        return columns if self.coupling is None else columns @ self.coupling
+
+    @cached_property
+    def uncoupled(self):
+        """The legs with a drive of its own for every driven value."""
+        return replace(self, coupling=None, home_drives=self.driven(self.home_drives))
+
+    @cached_property
+    def sites(self):
+        """Names of all sites: world, then leg by leg the joints' seats, bar and end, then tool and its reflectors."""
+        names = [name for leg in self.legs for name in (*(joint.name for joint in leg.joints), *leg.bar_sites)]
+        return (WORLD, *dict.fromkeys(names), TOOL, *self.reflectors)
+
+    @cached_property
+    def site_numbers(self):
+        """Number of every site by its name."""
+        return {name: number for number, name in enumerate(self.sites)}
+
+    @cached_property
+    def passive_numbers(self):
+        """Number of every passive joint by its name."""
+        return {joint.name: number for number, joint in enumerate(self.passive_joints)}
+
+    @cached_property
+    def groups(self):
+        """Numbers of the legs of each group: those that share passive joints, and all that end apart, are one."""
+        if self.hands:
+            return (tuple(range(len(self.legs))),)
+        result = []
+        for number, leg in enumerate(self.legs):
+            own = {joint.name for joint in leg.joints if joint.passive}
+            # what legs share lies before where they part, in the first of them as in all
+            near = (group for group in result if own & {joint.name for joint in self.legs[group[0]].joints})
+            group = next(near, None)
+            if group is None:
+                result.append([number])
+            else:
+                group.append(number)
+        return tuple(map(tuple, result))
+
+    @cached_property
+    def chains(self):
+        """The Chain of every leg by its name."""
+        return {leg.name: self._chain(leg) for leg in self.legs}
+
+    def _chain(self, leg):
+        """The Chain of a leg."""
+        frames = [np.vstack([joint.turn.T, joint.shift_mm]) for joint in leg.joints]
+        frames.append(np.vstack([leg.end_turn.T, _NO_SHIFT]))
+        motions = [np.concatenate([joint.axis * (joint.kind == kind) for kind in "PR"]) for joint in leg.joints]
+        numbers = [(self.site_numbers[joint.name], self._column(joint)) for joint in leg.joints]
+        return Chain(np.array(frames), np.reshape(motions, (-1, 6)), np.reshape(numbers, (-1, 2)).astype(np.int64))
+
+    def _column(self, joint):
+        """Column of a joint's value in passive values followed by driven ones, -1 for a fixed joint."""
+        if joint.kind == "fixed":
+            return -1
+        return self.passive_numbers[joint.name] if joint.passive else len(self.passive_joints) + joint.drive
+
+    @property
+    def parallel(self):
+        """Whether every drive has a leg of its own, unlike those of arms."""
+        return len(self.legs) >= len(self.driven_kinds)
+
+    def longest_mm(self, first, travel):
+        """Length of the longest leg from its joint of this number on, to the platform's frame.
+
+        With its slides and its bar out as far as they go; travel (K,): the largest size of each actuator value.
+        """
+        far = travel if self.coupling is None else np.abs(self.coupling) @ travel
+        return float(max(self._length_mm(leg, first, far) for leg in self.legs))
+
+    def _length_mm(self, leg, first, far):
+        """Length of a leg from its joint of this number on, its driven values (D,) as far out as they go."""
+        slides = sum(far[joint.drive] for joint in leg.joints if joint.kind == "P" and joint.drive is not None)
+        length = sum(np.linalg.norm(joint.shift_mm) for joint in leg.joints[first:]) + slides
+        if leg.bar is None:
+            return length
+        driven = 0.0 if leg.bar.drive is None else far[leg.bar.drive]
+        return length + leg.bar.length_mm + driven + np.linalg.norm(leg.bar.platform_mm)
+
+    @property
+    def home_passive(self):
+        """Values (k,) of the passive joints from which searches start."""
+        return np.array([joint.home for joint in self.passive_joints])
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """One actuator value: its column in tables, its unit ("rad", "mm"), and what it moves.
+
+    site, twist (6,): a change of the value acts as this twist per unit at this site; others: and as these twists by
+    site, where more joints follow it.
+    """
+
+    column: str
+    unit: str
+    site: str
+    twist: np.ndarray
+    others: dict = field(default_factory=dict)
+
+    @property
+    def twists(self):
+        """Twists (6,) per unit by site."""
+        return {self.site: self.twist} | self.others
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Which sites of a robot the effects act on, by legs or drives, from the first to the last.
+
+    drives: of every actuator value; feet: sites at which the legs stand on the base, x outwards and y to the side;
+    links: name of a length to the sites whose x lies along it, several for a leg of several bars; members: the links
+    that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds;
+    followers: joints that follow drives and have none of their own, as if they had.
+    """
+
+    drives: tuple[Drive, ...]
+    feet: tuple[str, ...] = ()
+    links: dict = field(default_factory=dict)
+    members: tuple[tuple[str, ...], ...] = ()
+    held_from: tuple[str, ...] = ()
+    followers: tuple[Drive, ...] = ()
+
+    @property
+    def units(self):
+        """Unit of every actuator value."""
+        return tuple(drive.unit for drive in self.drives)
+
+    @property
+    def columns(self):
+        """Columns of the actuator values in tables."""
+        return [drive.column for drive in self.drives]
+
+
+def unit_twist(component, factor=1.0):
+    """The twist (6,) of one component, shift along x, y, z in mm and turn about them in rad."""
+    result = np.zeros(6)
+    result[component] = factor
+    return result
+
+
+def cross(first, second):
+    """Cross products (.., 3) of vectors (.., 3): `np.cross` takes longer to look at them than to multiply."""
+    result = np.empty(np.broadcast_shapes(np.shape(first), np.shape(second)))
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        result[..., k] = first[..., i] * second[..., j] - first[..., j] * second[..., i]
+    return result
+
+
+def turn_about(axis, angle_rad):
+    """Rotation matrices (..., 3, 3) about a unit axis (3,) by angles (...,)."""
+    x, y, z = axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.asarray(angle_rad, dtype=float)[..., None, None]
+    return _NO_TURN + np.sin(angle) * skew + (1.0 - np.cos(angle)) * (skew @ skew)

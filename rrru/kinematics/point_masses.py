@@ -1,0 +1,158 @@
+"""Loads on drives, members and base by a robot's own masses, given as point masses in its moving frames (virtual work).
+
+Every point mass m at x loads the driven value k with
+
+    tau_k = m (g - x'') . dx/dq_k
+
+The derivatives are central differences of the exactly closed legs. Lengths in mm, masses in kg, forces in N, time in s.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rrru.kinematics.chain import Twists, value_of, walks
+from rrru.kinematics.legs import cross, turn_about
+
+# steps of the differences: in time, and of a driven value in rad or mm
+_STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
+# what a lump of the platform is fixed in
+PLATFORM = "platform"
+
+
+@dataclass(frozen=True, eq=False)
+class Lump:
+    """A point mass in mass_kg at at_mm (3,) of the frame behind the motion of a joint, called by its site.
+
+    joint "platform": the platform's frame. Of a bar's mass, lumps of the site "<leg> bar" count along it from its first
+    ball joint, those of "<leg> end", at negative x, along it from its end: what moves with a driven slide.
+    """
+
+    joint: str
+    mass_kg: float
+    at_mm: np.ndarray
+
+
+def places(robot, actuators, poses, twists=None):
+    """Places (n, lumps, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them.
+
+    twists: finite ones (1, sites, 6) at the sites.
+    """
+    ways = dict(zip(robot.legs.legs, walks(robot.legs, actuators, poses, Twists(robot.legs, twists)), strict=True))
+    holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
+    result = []
+    for lump in robot.lumps:
+        if lump.joint == PLATFORM:
+            result.append(poses.point(lump.at_mm))
+            continue
+        leg = holders[lump.joint]
+        if lump.joint in leg.bar_sites:
+            result.append(_along_bar(leg, ways[leg], lump))
+        else:
+            result.append(_behind_joint(robot.legs, leg, ways[leg], lump, (poses, actuators)))
+    return np.stack(result, axis=1)
+
+
+def _behind_joint(legs, leg, way, lump, state):
+    """Places (n, 3) of a lump fixed in the frame behind the motion of a joint."""
+    (poses, actuators), number = state, [joint.name for joint in leg.joints].index(lump.joint)
+    joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
+    if joint.kind != "fixed":
+        known = value_of(legs, joint, actuators, poses.passive)
+        if joint.kind == "R":
+            turn = turn @ turn_about(joint.axis, known)
+        else:
+            place = place + known[:, None] * way.axes[number]
+    return place + turn @ lump.at_mm
+
+
+def _along_bar(leg, way, lump):
+    """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
+    end = way.bar.near if lump.joint == leg.bar_sites[0] else way.bar.far
+    return end + lump.at_mm[0] * way.bar.line
+
+
+def driven_loads(robot, motion, poses, gravity_mm_s2):
+    """Loads (n, D) on the driven values, in N mm or N.
+
+    motion: values, rates and accelerations (n, K) of the drives; poses: the Poses there. NaN where a pose is not known.
+    """
+    robot, motion = _uncoupled(robot, motion)
+    force, actuators = _forces(robot, motion, poses, gravity_mm_s2), motion[0]
+    result = np.empty(actuators.shape)
+    for k, kind in enumerate(robot.legs.driven_kinds):
+        step = _STEP[kind] * np.eye(actuators.shape[1])[k]
+        slope = (_moved(robot, actuators + step, poses) - _moved(robot, actuators - step, poses)) / (2.0 * _STEP[kind])
+        result[:, k] = np.einsum("nla,nla->n", slope, force)
+    return result
+
+
+def member_forces(robot, motion, poses, gravity_mm_s2):
+    """Forces (n, members) in N that a robot's masses put on its members, compression positive.
+
+    A member that grows by s does the work f s on them: f = -sum m (g - x'') . dx/ds. motion, poses as in
+    `driven_loads`.
+    """
+    robot, motion = _uncoupled(robot, motion)
+    force, numbers = _forces(robot, motion, poses, gravity_mm_s2), robot.legs.site_numbers
+    result = np.zeros((len(motion[0]), len(robot.parts.members)))
+    for k, site in ((k, site) for k, group in enumerate(robot.parts.members) for site in group):
+        growth = np.zeros((1, len(numbers), 6))
+        growth[0, numbers[site], 0] = _STEP["P"]
+        longer, shorter = (_moved(robot, motion[0], poses, sign * growth) for sign in (1.0, -1.0))
+        result[:, k] -= np.einsum("nla,nla->n", (longer - shorter) / (2.0 * _STEP["P"]), force)
+    return result
+
+
+def moments(robot, motion, poses, gravity_mm_s2, at_mm):
+    """Moments (n, J, 3) in N mm of an arm's masses about the places at_mm (n, J, 3) of the joints that carry them.
+
+    The joints are `rrru.kinematics.legs.Legs.arm_joints`; motion, poses as in `driven_loads`.
+    """
+    robot, motion = _uncoupled(robot, motion)
+    force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
+    behind = _behind(robot.legs)
+    result = np.empty(at_mm.shape)
+    for k, name in enumerate(robot.legs.arm_joints):
+        carried = [lump.joint in (*behind[name], PLATFORM) for lump in robot.lumps]
+        lever = place[:, carried] - at_mm[:, k, None]
+        result[:, k] = cross(lever, force[:, carried]).sum(axis=1)
+    return result
+
+
+def base_moment(robot, motion, poses, gravity_mm_s2):
+    """Moments (n, 3) in N mm of a robot's masses about its origin; motion, poses as in `driven_loads`."""
+    robot, motion = _uncoupled(robot, motion)
+    force, place = _forces(robot, motion, poses, gravity_mm_s2), places(robot, motion[0], poses)
+    return cross(place, force).sum(axis=1)
+
+
+def _behind(legs):
+    """By joint's name the names of it and of all joints behind it, in every leg that has it."""
+    result = {}
+    for leg in legs.legs:
+        names = [joint.name for joint in leg.joints]
+        for number, name in enumerate(names):
+            result.setdefault(name, set()).update(names[number:])
+    return result
+
+
+def _uncoupled(robot, motion):
+    """The robot with all its driven values free, and a motion (values, rates, accelerations) of these."""
+    motion = tuple(robot.legs.driven(part) for part in motion)
+    return robot if robot.legs.coupling is None else replace(robot, legs=robot.legs.uncoupled), motion
+
+
+def _moved(robot, actuators, poses, twists=None):
+    """Places (n, lumps, 3) at other driven values (n, D) or under twists (1, sites, 6), from Poses nearby."""
+    return places(robot, actuators, robot.model.solve(actuators, poses, twists), twists)
+
+
+def _forces(robot, motion, poses, gravity_mm_s2):
+    """Weight and inertia force (n, lumps, 3) in N of every point mass."""
+    actuators, rate, acceleration = motion
+    bend = 0.5 * _STEP_S**2 * acceleration
+    steps = (_moved(robot, actuators + sign * _STEP_S * rate + bend, poses) for sign in (1.0, -1.0))
+    second = (sum(steps) - 2.0 * places(robot, actuators, poses)) / _STEP_S**2
+    mass = np.array([lump.mass_kg for lump in robot.lumps])
+    return mass[:, None] * (gravity_mm_s2 - second) / 1000.0

@@ -1,0 +1,137 @@
+"""What an instrument reads of a robot: places of reflectors on its tool, and the orientation of its platform.
+
+A residual holds three numbers in each of m rows: what is lacking at the n positions, in mm, and after them at the k
+orientations that were read, rotation vectors in rad times an arm in mm, so that all rows have the same noise.
+"""
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from rrru.kinematics.legs import TOOL, WORLD
+
+FloatArray = npt.NDArray[np.float64]
+
+_EYE = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """What was read at n poses.
+
+    position_mm (n, 3); reflectors (n,): names of the sites of the reflectors read, and place_mm (n, 3): where on the
+    platform they nominally sit, None where the tool itself was read; turn (n, 3, 3): orientations of the platform, NaN
+    where not read, None where none was; arm_mm: noise of the positions over that of the orientations, mm per rad;
+    on_world (n,): which reflectors are fixed to the world instead, with places in the robot's frame, None if none is.
+    """
+
+    position_mm: np.ndarray
+    reflectors: np.ndarray | None = None
+    place_mm: np.ndarray | None = None
+    turn: np.ndarray | None = None
+    arm_mm: float = np.nan
+    on_world: np.ndarray | None = None
+
+    def __len__(self):
+        return len(self.position_mm)
+
+    @property
+    def plain(self):
+        """Whether nothing but positions of the tool was read."""
+        return self.reflectors is None and self.turn is None
+
+    @cached_property
+    def turned(self):
+        """Poses (k,) whose orientation was read."""
+        return np.flatnonzero(_known(self.turn)) if self.turn is not None else np.zeros(0, dtype=int)
+
+    @cached_property
+    def rows(self):
+        """Pose (m,) of each row of a residual."""
+        return np.concatenate([np.arange(len(self)), self.turned])
+
+    def of(self, rows: npt.NDArray[Any]) -> "Readings":
+        """The readings of some poses."""
+        parts = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Readings(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
+
+
+def place_on_platform(robot: Any, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
+    """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
+
+    Of reflectors that are fixed to the world in the robot's.
+    """
+    numbers, tool_mm = robot.legs.site_numbers, np.asarray(robot.tool_mm)
+    tool = twists[:, numbers[TOOL]]
+    if readings is None or readings.reflectors is None:
+        return tool_mm + tool[:, :3]
+    count = len(readings)
+    own = np.broadcast_to(twists, (count, *twists.shape[1:]))[np.arange(count), reflector_numbers(robot.legs, readings)]
+    on_tool = tool_mm + turned_by(tool[:, 3:], readings.place_mm - tool_mm) + tool[:, :3]
+    if readings.on_world is not None:
+        on_tool = np.where(readings.on_world[:, None], readings.place_mm, on_tool)
+    return on_tool + own[:, :3]
+
+
+def points_read(robot, poses, twists, readings=None):
+    """Positions (n, 3) of what is read at Poses, in the robot's frame, under twists (n or 1, sites, 6)."""
+    place = place_on_platform(robot, twists, readings)
+    if readings is None or readings.on_world is None:
+        return poses.point(place)
+    return np.where(readings.on_world[:, None], place, poses.point(place))
+
+
+def reflector_numbers(legs, readings):
+    """Site's number (n,) of the reflector of each pose."""
+    return np.array([legs.site_numbers[name] for name in readings.reflectors])
+
+
+def orientation(robot: Any, poses: Any, twists: FloatArray) -> FloatArray:
+    """Orientations (n, 3, 3) of the platform as an instrument in the world's frame reads them."""
+    numbers = robot.legs.site_numbers
+    world, tool = (_turn(twists[:, numbers[site], 3:]) for site in (WORLD, TOOL))
+    return world @ poses.turn @ tool
+
+
+def lacking(robot: Any, readings: Readings, poses: Any, twists: FloatArray) -> FloatArray:
+    """Residual (m, 3) of readings at Poses under twists (n or 1, sites, 6): what was read minus the model."""
+    position = readings.position_mm - robot.measured(poses, twists, readings)
+    if not len(readings.turned):
+        return position
+    return np.concatenate([position, readings.arm_mm * turn_lacking(robot, readings, poses, twists)])
+
+
+def turn_lacking(robot, readings, poses, twists):
+    """Rotation vectors (k, 3) from the model's orientations to those that were read; NaN where the model has none."""
+    model, result = orientation(robot, poses, twists)[readings.turned], np.full((len(readings.turned), 3), np.nan)
+    good = _known(model)
+    off = readings.turn[readings.turned[good]] @ model[good].transpose(0, 2, 1)
+    result[good] = Rotation.from_matrix(off).as_rotvec() if good.any() else 0.0
+    return result
+
+
+def slope_of_turns(lack):
+    """How rotation vectors (k, 3) grow less by a small turn of the model, (k, 3, 3): Jr^-1 to second order in them."""
+    cross = np.cross(lack[:, None, :], _EYE).transpose(0, 2, 1)
+    return _EYE + 0.5 * cross + cross @ cross / 12.0
+
+
+def turned_by(vectors, points):
+    """Points (n, 3) turned by rotation vectors (n or 1, 3)."""
+    if not np.any(vectors):
+        return points
+    return np.einsum("nij,nj->ni", np.broadcast_to(_turn(vectors), (len(points), 3, 3)), points)
+
+
+def _turn(vectors):
+    """Rotation matrices (n, 3, 3) of rotation vectors (n, 3), which may be read-only."""
+    return Rotation.from_rotvec(np.array(vectors)).as_matrix()
+
+
+def _known(matrices):
+    """Which (n,) of matrices (n, 3, 3) are known."""
+    return np.isfinite(matrices).all(axis=(1, 2))

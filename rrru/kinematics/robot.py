@@ -1,0 +1,290 @@
+"""What every robot offers to calibration, plant and diagnosis, by the general model. Lengths in mm, angles in rad.
+
+A robot's class adds its legs, parts and parameters, and where it pays a closed form of what is here.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rrru.errors import UnreachableError
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.closure import Closure
+from rrru.kinematics.legs import Legs, Parts
+from rrru.kinematics.measurement_jacobian import ReadingMap
+from rrru.kinematics.parameter_jacobian import TwistMap
+from rrru.kinematics.readings import Readings, place_on_platform, points_read, turned_by
+from rrru.parameters import ParameterSet
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Robot(ABC):
+    """A robot as its controller believes it to be, with small deviations of its numbers.
+
+    name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.kinematics.legs.Legs`;
+    parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
+    parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
+    angle_arm_mm: the length that makes angles comparable with lengths; size_mm: how far its tool can be from the
+    origin, at most; up (3,): away from the ground.
+    """
+
+    name: str
+    parameters: ParameterSet
+    legs: Legs
+    parts: Parts
+    directions: np.ndarray
+    angle_arm_mm: float
+    size_mm: float
+    TRACKED: str
+    RICHEST: str
+    SEARCHED: str
+    up = (0.0, 0.0, 1.0)
+    tool_mm = (0.0, 0.0, 0.0)
+    # loads in N mm or N, and rates in rad/s or mm/s, that its file allows the drives (K,), NaN of a drive without one;
+    # None where it states none
+    effort_limits: FloatArray | None = None
+    velocity_limits: FloatArray | None = None
+    # whether its drives can orient its platform beside moving it
+    orients = False
+    # whether positions and their slopes are found without poses
+    closed_form = False
+    # grid lines over its longest reach in a picture of its workspace
+    workspace_lines = 130
+
+    @abstractmethod
+    def inverse(self, position_mm: np.ndarray, deviations: np.ndarray | None = None, elbow: str = "out") -> np.ndarray:
+        """Actuator values (n, K) for positions (n, 3) in an assembly ("out", "in"); NaN where out of reach."""
+
+    @property
+    def strokes(self):
+        """Widths (K,) of the drives' stated ranges, NaN where none is stated, as of most robots."""
+        return np.full(len(self.parts.drives), np.nan)
+
+    def in_range(self, actuators):
+        """Actuator values (n, K), NaN outside of the drives' stated ranges; of most robots none are stated."""
+        return actuators
+
+    def planned(self, position_mm, deviations=None):
+        """Actuator values (n, K) as `inverse` gives them, within the drives' ranges; NaN also outside of these."""
+        return self.in_range(self.inverse(position_mm, deviations))
+
+    @property
+    def z_down(self):
+        """Whether z of its frame points to the ground."""
+        return bool(self.up[2] < 0.0)
+
+    @cached_property
+    def model(self):
+        """The legs, closed."""
+        return Closure(self.legs)
+
+    def reading(self, reads):
+        """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""
+        from rrru.kinematics.augmented_robot import AsRead
+
+        return AsRead(self, reads) if reads.reflectors or reads.turned or reads.frame else self
+
+    def seen_at(self, _actuators, _position_mm, _readings=None):
+        """The robot with its parameters chosen for poses of a campaign; those of most robots stay as they are."""
+        return self
+
+    def widened(self, angle_rad, length_mm):
+        """The robot with other bounds of its parameters."""
+        return replace(self, angle_limit_rad=angle_rad, length_limit_mm=length_mm)
+
+    @property
+    def seats(self):
+        """Sites of the axes that a manufacturer may have set wrongly: those of all joints that move."""
+        return tuple(joint.name for joint in self.legs.joints if joint.kind != "fixed")
+
+    @property
+    def stages(self):
+        """Which parameters (p,) a search finds first where the nominal robot is far off, in turn."""
+        return ()
+
+    @property
+    def gauge(self):
+        """By number that is no parameter in words what stands for it; none of a fixed set."""
+        return {}
+
+    def confounded_outside(self, name):
+        """Candidates outside the robot that are no parameters since a parameter imitates them, and its size for a unit.
+
+        None of a fixed set.
+        """
+        return ()
+
+    @property
+    def offered(self):
+        """Which components (sites, 6) of constant twists its parameters are chosen from; none of a fixed set."""
+        return np.zeros((len(self.legs.sites), 6), dtype=bool)
+
+    @property
+    def deviation_names(self):
+        """Names of the deviations that `twists_of` knows."""
+        return self.parameters.names
+
+    def twists_of(self, values):
+        """Twists (1, sites, 6) of deviations by name."""
+        return self.twists(self.parameters.vector(values))
+
+    def twists(self, deviations: npt.ArrayLike | None = None) -> FloatArray:
+        """Twists (1, sites, 6) that deviations (p,) make."""
+        if deviations is None:
+            return np.zeros((1, len(self.legs.sites), 6))
+        return (self.directions @ np.asarray(deviations, dtype=float))[None]
+
+    def near(self, position_mm, actuators):
+        """Poses near which the legs close at positions (n, 3) and actuator values (n, K): an upright platform's."""
+        n = len(position_mm)
+        turn = np.broadcast_to(self.legs.home_turn, (n, 3, 3))
+        centre = np.asarray(position_mm, dtype=float) - self.legs.home_turn @ np.asarray(self.tool_mm)
+        return Poses(centre, turn, self.passive_near(centre, np.asarray(actuators, dtype=float)), None, None)
+
+    def passive_near(self, position_mm, actuators):
+        """Values (n, k) of the passive joints near platform centres (n, 3) and actuator values (n, K)."""
+        return np.broadcast_to(self.legs.home_passive, (len(position_mm), len(self.legs.passive_joints)))
+
+    def solve(self, actuators: FloatArray, position_mm: FloatArray, twists: FloatArray | None = None) -> Poses:
+        """Poses at actuator values (n, K) near positions (n, 3), under twists (n or 1, sites, 6) at the sites."""
+        return self.model.solve(actuators, self.near(position_mm, actuators), twists)
+
+    def measured(self, poses: Poses, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
+        """Positions (n, 3) in the world's frame at Poses, under the twists (n or 1, sites, 6) of both.
+
+        Of the tool, or of the reflectors of `rrru.kinematics.readings.Readings`.
+        """
+        return into_frame(points_read(self, poses, twists, readings), twists[:, 0])
+
+    def map(
+        self, actuators: FloatArray, poses: Poses, twists: FloatArray | None = None, readings: Readings | None = None
+    ) -> Any:
+        """The TwistMap at actuator values (n, K) and Poses that fit them under twists (n or 1, sites, 6).
+
+        Of the tool, or of Readings at these poses.
+        """
+        own = self.twists() if twists is None else twists
+        place = place_on_platform(self, own, readings)
+        if readings is None or readings.plain:
+            return TwistMap(self.model, actuators, poses, twists, place)
+        return ReadingMap(self, actuators, poses, own, place, readings)
+
+    def map_at(self, actuators, position_mm, deviations=None):
+        """The TwistMap under deviations (p,) at actuator values (n, K), near positions (n, 3)."""
+        twists = self.twists(deviations)
+        return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
+
+    def guess(self, actuators, targets=None):
+        """Positions (n, 3) from which to look for poses at actuator values (n, K): the home position's.
+
+        targets (n,): names of what is read, which of several hands tell the one that carries it.
+        """
+        return np.tile(self.legs.home_mm, (len(actuators), 1))
+
+    def forward(
+        self, actuators: FloatArray, deviations: FloatArray | None = None, guess_mm: FloatArray | None = None
+    ) -> FloatArray:
+        """Positions (n, 3) of the tool at actuator values (n, K); NaN where the legs do not close near guess_mm (n, 3).
+
+        Without a guess near that of `guess`.
+        """
+        twists = self.twists(deviations)
+        guess = self.guess(actuators) if guess_mm is None else guess_mm
+        return self.measured(self.solve(actuators, guess, twists), twists)
+
+    def forward_batch(self, actuators, deviations, guess_mm=None):
+        """Positions (m, n, 3) at n actuator values under m vectors of deviations (m, p); see `forward`."""
+        deviations, count = np.asarray(deviations, dtype=float), len(actuators)
+        twists = np.repeat(np.einsum("scp,mp->msc", self.directions, deviations), count, axis=0)
+        guess = self.guess(actuators) if guess_mm is None else guess_mm
+        every, near = np.tile(actuators, (len(deviations), 1)), np.tile(guess, (len(deviations), 1))
+        return self.measured(self.solve(every, near, twists), twists).reshape(len(deviations), count, 3)
+
+    def mean_distance(
+        self, actuators: FloatArray, nominal_mm: FloatArray, measured_mm: FloatArray
+    ) -> Callable[[FloatArray], FloatArray]:
+        """Objective: deviations (m, p) to mean distances (m,) in mm from measured positions (n, 3)."""
+
+        def evaluate(deviations):
+            off = np.linalg.norm(self.forward_batch(actuators, deviations, nominal_mm) - measured_mm, axis=2)
+            return np.where(np.isfinite(off).all(axis=1), off.mean(axis=1), np.inf)
+
+        return evaluate
+
+    def actuator_jacobian(self, position_mm, actuators, deviations=None):
+        """Derivative (n, 3, K) of the position by the actuator values."""
+        return self.map_at(actuators, position_mm, deviations).drive_response
+
+    def parameter_jacobian(
+        self, position_mm: FloatArray, actuators: FloatArray, deviations: FloatArray | None = None
+    ) -> FloatArray:
+        """Derivative (n, 3, p) of the position by the parameters."""
+        return self.map_at(actuators, position_mm, deviations).columns(self.directions)
+
+    def singularities(self, position_mm, actuators):
+        """How far poses are from singularities: translational measure, constraint measure and determinant, each (n,).
+
+        The constraint measure is the smallest singular value of the legs' unit wrenches, lengths counted in the robot's
+        angle_arm_mm, 0 where the platform can move with locked drives; the translational one that of the drives'
+        Jacobian over its largest, 0 where they cannot move the point in some direction.
+        """
+        at = self.map_at(actuators, position_mm)
+        return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
+
+    def own_load(self, masses, motion, poses, gravity_mm_s2):
+        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here.
+
+        motion: values, rates and accelerations (n, K) of the drives; gravity_mm_s2 (3,): in the robot's frame.
+        """
+        return 0.0
+
+    def own_member_forces(self, motion, poses, gravity_mm_s2):
+        """Forces (n, members) in N on the members, compression positive, by all but the platform's load; none here."""
+        return 0.0
+
+    def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
+        """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
+        return 0.0
+
+    def own_base_moment(self, motion, poses, gravity_mm_s2):
+        """Moments (n, 3) in N mm about the origin of all that moves but for the platform; none here."""
+        return 0.0
+
+    def drive_errors(self, twists):
+        """Changes (n, K) of the actuator values in twists (n, sites, 6), by least squares."""
+        numbers = self.legs.site_numbers
+        units = np.zeros((len(self.parts.drives), len(numbers), 6))
+        for unit, drive in zip(units, self.parts.drives, strict=True):
+            for site, twist in drive.twists.items():
+                unit[numbers[site]] = twist
+        flat = units.reshape(len(units), -1)
+        return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
+
+    def unreached(self, values, as_home=True):
+        """What keeps the robot from a point whose actuator values (K,) are NaN in part, for a message."""
+        return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
+
+    def require_reachable(self, position_mm, deviations=None):
+        """Actuator values as `planned` gives them; raises UnreachableError naming the first point out of reach."""
+        values = self.planned(position_mm, deviations)
+        bad = np.flatnonzero(np.isnan(values).any(axis=1))
+        if bad.size:
+            x, y, z = np.asarray(position_mm, dtype=float)[bad[0]]
+            raise UnreachableError(
+                f"point {bad[0] + 1} at ({x:.3f}, {y:.3f}, {z:.3f}) mm is {self.unreached(values[bad[0]])}; "
+                f"{bad.size} of {len(values)} points cannot be reached"
+            )
+        return values
+
+
+def into_frame(position_mm, frame):
+    """Positions (n, 3) carried by frames (n or 1, 6): shift in mm and rotation vector in rad."""
+    if not np.any(frame):
+        return position_mm
+    return turned_by(frame[:, 3:], position_mm) + frame[:, :3]

@@ -1,0 +1,98 @@
+"""Screws of passive joints, and the wrenches on the platform that these do not feel.
+
+Legs that share passive joints, behind which they part, make a group. Their screws are stacked, rows 6 m for m legs, a
+shared joint in all of them, and so are the wrenches W with W S = 0; where each leg ends is its own, where the platform
+is the same for all. Screws and twists are at the world's origin, the velocity first. Lengths in mm, angles in rad.
+"""
+
+import numpy as np
+
+from rrru.kinematics.chain import Twists, walk
+from rrru.kinematics.closure_kernel import ARM_MM
+from rrru.kinematics.legs import cross
+
+# passive motions that a leg's singular values, lengths counted in the arm, tell from none
+_RANK = 1e-7
+SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
+
+
+def screw(joint, axis, place):
+    """Screw (n, 6) of a joint with axes (n, 3) through places (n, 3)."""
+    turning = joint.kind == "R"
+    return np.concatenate([cross(place, axis), axis] if turning else [axis, np.zeros_like(axis)], axis=1)
+
+
+def group_screws(legs, group, ways, spare=frozenset()):
+    """Names (k,) of the passive joints of a group of m legs, without spare ones, and their screws (n, 6 m, k)."""
+    own = [[j for j in legs.legs[number].joints if j.passive and j.name not in spare] for number in group]
+    names = list(dict.fromkeys(joint.name for joints in own for joint in joints))
+    result = np.zeros((len(ways[group[0]].place), 6 * len(group), len(names)))
+    for row, (number, joints) in enumerate(zip(group, own, strict=True)):
+        for joint in joints:
+            k = legs.legs[number].joints.index(joint)
+            one = screw(joint, ways[number].axes[k], ways[number].places[k])
+            result[:, 6 * row : 6 * row + 6, names.index(joint.name)] = one
+    return names, result
+
+
+def spare_joints(legs):
+    """Names of the passive joints that depend on those before them a little off home, where joints may stand in line.
+
+    They keep their values: a link between two ball joints does not spin.
+    """
+    offset, result = 0.1 * np.sin(1.0 + np.arange(len(legs.passive_joints))), set()
+    drives, passive, twists = legs.home_drives[None], (legs.home_passive + offset)[None], Twists(legs)
+    ways = [walk(legs, leg, drives, passive, twists) for leg in legs.legs]
+    for group in legs.groups:
+        names, (screws,) = group_screws(legs, group, ways)
+        ranks = [rank_of(screws[:, :count]) for count in range(len(names) + 1)]
+        result |= {name for name, more in zip(names, np.diff(ranks), strict=True) if not more}
+    return result
+
+
+def rank_of(screws):
+    """Number of independent screws (6 m, k)."""
+    scale = np.resize(SCALE, len(screws))
+    return int(np.linalg.matrix_rank(screws / scale[:, None], tol=_RANK)) if screws.shape[1] else 0
+
+
+def constraints_of(legs, spare):
+    """Number of the wrenches of every group, `spare` the names of the joints that keep their values."""
+    result = []
+    for group in legs.groups:
+        joints = {joint.name for number in group for joint in legs.legs[number].joints if joint.passive}
+        result.append(1 if legs.legs[group[0]].bar else 6 * len(group) - len(joints - spare))
+    return result
+
+
+def wrenches_of(legs, spare, ways):
+    """Wrenches (n, r, 6) of every leg, which together with its group's others the passive joints do not feel.
+
+    spare: names of joints that keep their values.
+    """
+    result = [None] * len(legs.legs)
+    for group in legs.groups:
+        leg, way = legs.legs[group[0]], ways[group[0]]
+        if leg.bar:
+            # a unit force along it
+            line = way.bar.line
+            result[group[0]] = np.concatenate([line, cross(way.bar.near, line)], axis=1)[:, None]
+            continue
+        both = _beside(group_screws(legs, group, ways, spare)[1])
+        for row, number in enumerate(group):
+            result[number] = both[:, :, 6 * row : 6 * row + 6]
+    return result
+
+
+def _beside(screws):
+    """Wrenches (n, 6 m - k, 6 m) that independent screws (n, 6 m, k) do not feel."""
+    scale = np.resize(SCALE, screws.shape[1])
+    if not screws.shape[2]:
+        return np.broadcast_to(np.eye(len(scale)), (len(screws), len(scale), len(scale)))
+    u, _, _ = np.linalg.svd(screws / scale[:, None])
+    return u[:, :, screws.shape[2] :].transpose(0, 2, 1) / scale
+
+
+def by_group(legs, wrenches):
+    """Wrenches (n, r, 6) on the platform by groups of legs, from those of the legs."""
+    return [sum((wrenches[k] for k in group[1:]), wrenches[group[0]]) for group in legs.groups]

@@ -1,0 +1,227 @@
+"""Causes of a gap as MuJoCo's own elements: each changes an `Edit` at a site of the file, by a size.
+
+Sites are names in the MJCF: driven joints (a drive), joints, bodies, connects. A direction is `<name>.x` .. `.z` for
+shifts and `<name>.rx` .. `.rz` for turns: of a body's seat, or of the place where a connect or weld holds its first
+body, in the frame of what carries it. Sizes are in mm, rad, N, s and kg; what depends on the kind of its joint has rad
+and N mm of a hinge, mm and N of a slide.
+"""
+
+import mujoco
+import numpy as np
+
+from rrru.errors import ConfigError
+from rrru.simulation.mujoco_model import BASE, LIMITED, MM, SOLIMP, SOLREF, held_sites
+from rrru.simulation.mujoco_parts import damp_swinging, holding_friction, leash, put_on_base, spring, swinging_frequency
+
+_JOINT, _EQ, _OBJ = mujoco.mjtJoint, mujoco.mjtEq, mujoco.mjtObj
+_HINGE, _SLIDE = _JOINT.mjJNT_HINGE, _JOINT.mjJNT_SLIDE
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def _zero_offset(edit, site, size):
+    """A drive's zero is off: rad or mm."""
+    drive = _drive(edit, site)
+    edit.offsets[drive] = size * edit.units(drive)[0]
+
+
+def _placement(edit, site, size):
+    """A length or a seat is off, along or about a direction: mm or rad."""
+    edit.shifts[_place(edit, site)] = _of_direction(edit, site, size)
+
+
+def _warming(edit, site, size):
+    """A length or seat moves by this as the robot warms up, as 1 - exp(-t / time_s): mm or rad, and time_s in s."""
+    if site == "time_s":
+        edit.warming_s = _positive("warming.time_s", size)
+    else:
+        edit.grows[_place(edit, site)] = _of_direction(edit, site, size)
+
+
+def _actuator_stiffness(edit, site, size):
+    """A drive's servo gives: kp in N mm/rad or N/mm, damped as the file's."""
+    actuator, (length, force) = edit.drives[_drive(edit, site)], edit.units(site)
+    kp = _positive(site, size) * force / length
+    actuator.biasprm[2] *= np.sqrt(kp / actuator.gainprm[0])
+    actuator.gainprm[0], actuator.biasprm[1] = kp, -kp
+    edit.steady(edit.spec.joint(site), kp)
+
+
+def _servo_lag(edit, site, size):
+    """A drive's servo is slow: damping kv of kp times this in s, which its feedforward does not know."""
+    actuator = edit.drives[_drive(edit, site)]
+    edit.lags[site] = _positive(site, size)
+    actuator.biasprm[2] -= size * actuator.gainprm[0]
+
+
+def _speed_friction(edit, site, size):
+    """Friction in a joint grows with the square of its speed: N mm s^2/rad^2 or N s^2/mm^2."""
+    joint, (length, force) = edit.spec.joint(_joint(edit, site)), edit.units(site)
+    joint.damping[1] = _positive(site, size) * force / length**2
+
+
+def _joint_friction(edit, site, size):
+    """Dry friction in a joint: N mm or N."""
+    joint = edit.spec.joint(_joint(edit, site))
+    joint.frictionloss = _positive(site, size) * edit.units(site)[1]
+    joint.solref_friction, joint.solimp_friction = SOLREF, SOLIMP
+
+
+def _play(edit, site, size):
+    """Play between a drive's motor and its arm, from stop to stop: rad or mm. Friction on the base holds the arm."""
+    joint, name = edit.spec.joint(_drive(edit, site)), f"{site} play"
+    if len(joint.parent.joints) > 1:
+        others = ", ".join(one.name for one in joint.parent.joints if one.name != site)
+        raise ConfigError(f"play: {site} shares its body with {others}; allowed: a drive whose body has no other joint")
+    half, (length, _) = 0.5 * _positive(site, size), edit.units(site)
+    ends = {"range": (-half * length, half * length), "limited": LIMITED}
+    edit.add_joint(joint.parent.name, name, joint.type, joint.axis, pos=joint.pos, **ends)
+    arm = edit.spec.add_tendon(name=name)
+    arm.wrap_joint(site, 1.0)
+    arm.wrap_joint(name, 1.0)
+    arm.frictionloss = holding_friction(edit, site)
+    arm.solref_friction, arm.solimp_friction = SOLREF, SOLIMP
+
+
+def _play_friction(edit, site, size):
+    """The friction that holds an arm within its play: N mm or N; absent, what its weight may need."""
+    tendon = edit.spec.tendon(f"{_drive(edit, site)} play")
+    if tendon is None:
+        raise ConfigError(f"play_friction: {site} has no play; allowed: a drive that play names")
+    tendon.frictionloss = _positive(site, size) * edit.units(site)[1]
+
+
+def _link_stiffness(edit, site, size):
+    """A body gives against its joint, along or about a direction of its own: N/mm or N mm/rad."""
+    body, direction = _body_place(edit, site)
+    kind, length, force = (_HINGE, 1.0, 1.0 / MM) if direction > 2 else (_SLIDE, 1.0 / MM, 1.0)
+    name = f"{site} spring"
+    spring(edit, edit.add_joint(body, name, kind, np.eye(3)[direction % 3]), _positive(site, size) * force / length)
+
+
+def _clearance(edit, site, size):
+    """Radial clearance of a hinge, or that of a ball joint or connect in all directions: mm."""
+    gap, spec = _positive(site, size) / MM, edit.spec
+    if site in [one.name for one in spec.equalities if one.type == _EQ.mjEQ_CONNECT]:
+        spec.delete(spec.equality(site))
+        leash(edit, site, held_sites(site), gap)
+        damp_swinging(edit, site, gap)
+        return
+    joint = spec.joint(_joint(edit, site, "a hinge, ball joint or connect", (_HINGE, _JOINT.mjJNT_BALL)))
+    body, names = joint.parent, held_sites(f"{site} pin")
+    body.parent.add_site(name=names[0])  # where, its Shape says
+    body.add_site(name=names[1], pos=joint.pos)
+    edit.seats[names[0]] = names[1]
+    # joints in one body share their seat: what is loose there is loose in all directions
+    alone = len(body.joints) == 1 and joint.type == _HINGE
+    axes = np.linalg.svd(np.array(joint.axis)[None])[2][1:] if alone else np.eye(3)
+    for number, axis in enumerate(axes, 1):
+        name = f"{site} clearance {number}"
+        edit.add_joint(body.name, name, _SLIDE, axis)
+        edit.damped[name] = swinging_frequency(gap)
+    leash(edit, site, names, gap)
+
+
+def _payload(edit, site, size):
+    """A mass at a body's centre that nobody told the controller of: kg."""
+    edit.masses[_known(site, [body.name for body in edit.spec.bodies[1:]], "a body")] = _positive(site, size)
+
+
+def _base_tilt(edit, site, size):
+    """The base is not level: turned about its x or y against gravity, rad."""
+    edit.tilt["xy".index(_known(site, ("x", "y"), "x or y"))] = size
+
+
+def _base_stiffness(edit, site, size):
+    """The base stands on springs along or about the robot's axes: N/mm or N mm/rad; without one it is rigid."""
+    direction = DIRECTIONS.index(_known(site, DIRECTIONS, "a direction"))
+    if not edit.prefix:
+        put_on_base(edit)
+    kind, factor = (_HINGE, 1.0 / MM) if direction > 2 else (_SLIDE, MM)
+    joint = edit.add_joint(BASE, f"base {site}", kind, np.eye(3)[direction % 3])
+    spring(edit, joint, _positive(site, size) * factor)
+
+
+# in the order in which they are applied
+CAUSES = {
+    "zero_offset": _zero_offset,
+    "placement": _placement,
+    "warming": _warming,
+    "actuator_stiffness": _actuator_stiffness,
+    "servo_lag": _servo_lag,
+    "speed_friction": _speed_friction,
+    "joint_friction": _joint_friction,
+    "play": _play,
+    "play_friction": _play_friction,
+    "link_stiffness": _link_stiffness,
+    "clearance": _clearance,
+    "payload": _payload,
+    "base_tilt": _base_tilt,
+    "base_stiffness": _base_stiffness,
+}
+# what shows only while the robot moves
+MOVING = ("servo_lag", "speed_friction")
+
+
+def apply(edit, causes):
+    """Change an Edit by causes, {name: {site: size}}; raises ConfigError naming what does not fit."""
+    for name in causes:
+        if name not in CAUSES:
+            raise ConfigError(f"mujoco: unknown cause {name!r}; known: {', '.join(CAUSES)}")
+    for name, change in CAUSES.items():
+        for site, size in causes.get(name, {}).items():
+            try:
+                change(edit, site, float(size))
+            except ConfigError as error:
+                raise ConfigError(f"mujoco.causes.{name}: {error}") from None
+    if edit.grows and edit.warming_s is None:
+        raise ConfigError("mujoco.causes.warming: no time_s; allowed: the time constant in s beside the sites")
+
+
+def _known(site, allowed, what):
+    """The site, if it is one of those allowed."""
+    if site not in allowed:
+        raise ConfigError(f"{site!r} is not {what}; allowed: {', '.join(allowed)}")
+    return site
+
+
+def _positive(site, size):
+    """The size, if it is positive."""
+    if not size > 0.0:
+        raise ConfigError(f"{site} is {size:g}; allowed: a positive number")
+    return size
+
+
+def _drive(edit, site):
+    """The site, if it is a driven joint."""
+    return _known(site, tuple(edit.drives), "a drive")
+
+
+def _joint(edit, site, what="a joint", kinds=(_HINGE, _SLIDE, _JOINT.mjJNT_BALL)):
+    """The site, if it is a joint of the file of one of these kinds."""
+    nominal = edit.nominal
+    return _known(
+        site, [nominal.joint(j).name for j in range(nominal.njnt) if _JOINT(nominal.jnt_type[j]) in kinds], what
+    )
+
+
+def _body_place(edit, site):
+    """Body and number of the direction of a site `<body>.<direction>`."""
+    name, _, direction = site.rpartition(".")
+    bodies = [body.name for body in edit.spec.bodies[1:]]
+    if direction not in DIRECTIONS or name not in bodies:
+        raise ConfigError(f"{site!r} is no direction of a body; allowed: one of {', '.join(bodies)}, and .x to .rz")
+    return name, DIRECTIONS.index(direction)
+
+
+def _place(edit, site):
+    """Kind, name and number of the direction of what a placement moves."""
+    name, _, direction = site.rpartition(".")
+    held = [one.name for one in edit.spec.equalities if one.objtype == _OBJ.mjOBJ_SITE]
+    if direction in DIRECTIONS and name in held:
+        return "site", held_sites(name)[0], DIRECTIONS.index(direction)
+    return "body", *_body_place(edit, site)
+
+
+def _of_direction(edit, site, size):
+    """Size in m or rad of a site that ends in a direction."""
+    return size if site.rpartition(".")[2].startswith("r") else size / MM

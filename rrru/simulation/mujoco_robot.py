@@ -1,0 +1,89 @@
+"""A robot that MuJoCo simulates from its MJCF, with causes of a gap that are MuJoCo's own: a foreign real side."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import ConfigError
+from rrru.kinematics.chain import Poses
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
+from rrru.simulation import mujoco_model
+from rrru.simulation.driven import SETTLE_S, DrivenRobot
+from rrru.simulation.mujoco_causes import MOVING, apply
+from rrru.simulation.mujoco_run import Machine
+
+
+@dataclass(frozen=True)
+class MujocoRobot(DrivenRobot):
+    """A robot whose truth is a simulation of the MJCF that its mechanism was read from.
+
+    file, platform: of the MJCF; causes: sizes by site by the name of a cause, see `rrru.simulation.mujoco_causes`; the
+    rest as of DrivenRobot. Masses and inertias are the file's.
+    """
+
+    mechanism: Robot
+    file: Path
+    platform: str
+    causes: dict = field(default_factory=dict)
+    non_repeatability_mm: float = 0.0
+    masses: Masses = field(default_factory=lambda: Masses(0.0, 0.0, 0.0))
+    rotation_limit_rad: float = 0.05
+
+    def machine(self, payload_kg=0.0):
+        """The Machine of the file with its causes; payload_kg: the heaviest that it will carry.
+
+        Raises ConfigError where a cause or a drive does not fit the file.
+        """
+        drives = [column.rpartition("_")[0] for column in self.mechanism.parts.columns]
+        edit = mujoco_model.read(self.file, self.platform, self.mechanism.tool_mm, drives)
+        edit.payload_kg = float(payload_kg)
+        apply(edit, self.causes)
+        turn = Rotation.from_rotvec(edit.tilt).inv()
+        edit.spec.option.gravity = turn.apply(edit.nominal.opt.gravity)
+        return Machine(edit, self.file)
+
+    @property
+    def moves(self):
+        """Whether it is read on the way; else it rests at every point."""
+        return not set(MOVING).isdisjoint(self.causes)
+
+    def run(self, plan, *how, **more):
+        """Drive a plan, see DrivenRobot; a robot that rests at every point takes longer than the plan says."""
+        return super().run(plan if self.moves else plan.resting(SETTLE_S), *how, **more)
+
+    def posed(self, motion, target):
+        """Poses (n) along a Motion as simulated, with no twists; see Machine.drive for the errors raised."""
+        payload = np.nan_to_num(motion.payload_kg)
+        position, turn = self.machine(payload.max(initial=0.0)).drive(motion, self.moves)
+        count, legs = len(position), self.mechanism.legs
+        passive = np.broadcast_to(legs.home_passive, (count, len(legs.passive_joints)))
+        poses = Poses(position, turn, passive, np.zeros(count), np.ones(count, dtype=bool))
+        return poses, np.zeros((count, len(legs.sites), 6))
+
+
+def from_config(mechanism, dimensions, section):
+    """The robot of a `virtual_robots:` entry with `mujoco`, of a mechanism that a `robots:` entry with `mjcf` made.
+
+    Raises ConfigError where the entry has effects of our own laws, or the mechanism is from no MJCF.
+    """
+    if "mjcf" not in dimensions:
+        raise ConfigError(
+            f"virtual robot: mujoco drives {mechanism.name}, which has no mjcf; allowed: a robot with one"
+        )
+    own = [key for key in ("errors", "effects") if section.get(key)]
+    own += ["axis_errors"] * any(section.get("axis_errors", {}).get(key) for key in ("position_mm", "angle_rad"))
+    if own:
+        raise ConfigError(f"virtual robot: mujoco and {own[0]} in one entry; allowed: one of them, mujoco has causes")
+    robot = MujocoRobot(
+        mechanism,
+        Path(dimensions["mjcf"]),
+        dimensions["platform"],
+        section["mujoco"].get("causes", {}),
+        section.get("wobble_mm", 0.0),
+        rotation_limit_rad=section.get("rotation_limit_rad", MujocoRobot.rotation_limit_rad),
+    )
+    robot.machine()
+    return robot

@@ -1,0 +1,217 @@
+"""Drives a changed MJCF: from stop to stop at rest, or in time where a cause shows in motion only. SI units inside.
+
+The path between two stops is driven, never jumped, with a smooth start and end, so that play and friction keep what
+they remember. At each point the robot has come to rest and its loops are closed, or an error says how far they are not.
+"""
+
+import mujoco
+import numpy as np
+from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
+
+from rrru.errors import SimulationError, UnreachableError
+from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S
+from rrru.simulation.mujoco_shape import Shape
+
+# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: what
+# friction holds creeps in MuJoCo by some um/s
+CLOSED_MM, REST_MM_S = 1e-3, 1e-2
+_ARM = 0.5
+# the platform is pushed by a tenth of gravity at most: friction that holds an arm in its play holds it
+_ACCELERATION = 1.0
+_ASSEMBLY_STEPS, _BLOCKS, _MOST_BLOCKS = 2500, (37, 50), 400
+# peak acceleration of the smooth step 10 s^3 - 15 s^4 + 6 s^5
+_PEAK = 10.0 / np.sqrt(3.0)
+_SHORTEST_S = 0.02
+_WARNING = mujoco.mjtWarning
+_BURST = (_WARNING.mjWARN_BADQPOS, _WARNING.mjWARN_BADQVEL, _WARNING.mjWARN_BADQACC, _WARNING.mjWARN_BADCTRL)
+
+
+class Machine:
+    """A compiled Edit at home; file: for messages."""
+
+    def __init__(self, edit, file):
+        self.edit, self.file, self.model = edit, file, edit.spec.compile()
+        self.data, model = self._at_home(), self.model
+        for name, kilograms in edit.masses.items():
+            model.body(edit.prefix + name).mass += kilograms
+        self.shape = Shape(edit, model)
+        self.shape.write(0.0, 0.0)
+        self._weigh(0.0)
+        self._damp_added()
+        self.platform = model.body(edit.prefix + edit.platform).id
+        self.actuators = np.array([model.actuator(edit.prefix + name).id for name in edit.servos.values()])
+        kv, kp = -model.actuator_biasprm[self.actuators, 2], model.actuator_gainprm[self.actuators, 0]
+        # a servo sees the position at the beginning of a step and the control of its end
+        self.known_lag_s = kv / kp - STEP_S - [edit.lags.get(joint, 0.0) for joint in edit.servos]
+
+    def _weigh(self, payload_kg):
+        """Hang a payload on the platform."""
+        self.model.body(self.edit.prefix + PAYLOAD).mass = payload_kg
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self._balance_leashes()
+
+    def _balance_leashes(self):
+        """Tell MuJoCo how heavy what hangs on each leash is: at home it has no length and so no direction."""
+        model, data = self.model, self._at_home()
+        mujoco.mj_forward(model, data)
+        for name, sites in self.edit.leashes.items():
+            jacobians = np.zeros((2, 3, model.nv))
+            for jacobian, site in zip(jacobians, sites, strict=True):
+                mujoco.mj_jacSite(model, data, jacobian, None, model.site(self.edit.prefix + site).id)
+            across = np.ascontiguousarray(jacobians[1] - jacobians[0])
+            moved = np.zeros_like(across)
+            mujoco.mj_solveM(model, data, moved, across)
+            tendon = model.tendon(self.edit.prefix + name).id
+            model.tendon_invweight0[tendon] = np.linalg.eigvalsh(across @ moved.T)[-1]
+
+    def _at_home(self):
+        """New data in the home pose."""
+        data = mujoco.MjData(self.model)
+        for joint, values in self.edit.home.items():
+            data.joint(self.edit.prefix + joint).qpos = values
+        return data
+
+    def _damp_added(self):
+        """Critical damping of what causes have added, so that it comes to rest."""
+        model = self.model
+        for name, frequency in self.edit.damped.items():
+            joint = model.joint(self.edit.prefix + name)
+            dof, own = joint.dofadr[0], model.dof_M0[joint.dofadr[0]]
+            natural = np.sqrt(model.jnt_stiffness[joint.id] / own) if frequency is None else frequency
+            model.dof_damping[dof] = 2.0 * own * natural
+        for name, (leash, frequency) in self.edit.brakes.items():
+            mass = 1.0 / model.tendon_invweight0[model.tendon(self.edit.prefix + leash).id]
+            model.actuator(self.edit.prefix + name).biasprm[2] = -2.0 * mass * frequency
+
+    def controls(self, drives):
+        """Controls (N, K) for actuator values (N, K) in rad or mm; raises UnreachableError beyond the file's ranges."""
+        edit, model = self.edit, self.model
+        unit = np.array([edit.lengths[joint] for joint in edit.servos])
+        zero = np.array([edit.nominal.joint(joint).qpos0[0] for joint in edit.servos])
+        result = zero + unit * drives
+        for number, joint in enumerate(edit.servos):
+            low, high = edit.nominal.joint(joint).range if edit.nominal.joint(joint).limited[0] else (-np.inf, np.inf)
+            servo = self.actuators[number]
+            if model.actuator_ctrllimited[servo]:
+                low, high = max(low, model.actuator_ctrlrange[servo, 0]), min(high, model.actuator_ctrlrange[servo, 1])
+            out = np.flatnonzero(~((result[:, number] >= low) & (result[:, number] <= high)))
+            if out.size:
+                told = f"{joint} is told {result[out[0], number]:g} on its way"
+                raise UnreachableError(f"{self.file}: {told}; allowed: {low:g} to {high:g} (m, rad)")
+        return result + [edit.offsets.get(joint, 0.0) for joint in edit.servos]
+
+    def drive(self, motion, moving):
+        """Poses along a Motion: positions (n, 3) in mm and turns (n, 3, 3) of the platform at its points.
+
+        moving: whether points are read on the way, at their times, where the drives move there; else all at rest.
+        Raises SimulationError where the robot is not at rest or its loops are not closed.
+        """
+        path, index, payload = self.controls(motion.path_drive), motion.path_index, np.nan_to_num(motion.payload_kg)
+        way, time_s = _Way(path, motion, self.known_lag_s), motion.time_s
+        self._assemble(path[0], payload[0])
+        self._send(way.at_ease(0, index[0]))
+        positions, turns = [], []
+        for point in range(len(index)):
+            on_time = moving and point and way.moves(point)
+            if point:
+                if payload[point] != payload[point - 1]:
+                    self._weigh(payload[point])
+                self.shape.write(1.0, time_s[point])
+                self._send(
+                    way.in_time(point) if on_time else way.at_ease(*index[point - 1 : point + 1], way.far[point])
+                )
+            where = f"point {point + 1} of {len(index)}"
+            if not on_time or not way.moving[point]:
+                self._rest(where)
+            mujoco.mj_fwdPosition(self.model, self.data)
+            self._closed(where)
+            positions.append(MM * self.data.xpos[self.platform])
+            turns.append(self.data.xmat[self.platform].reshape(3, 3).copy())
+        return np.array(positions), np.array(turns)
+
+    def _assemble(self, controls, payload_kg):
+        """Bring the robot from home to its first controls, its weight and what is off growing from nothing."""
+        self._weigh(payload_kg)
+        home = np.concatenate([self.edit.home[joint] for joint in self.edit.servos])
+        full = np.array(self.model.opt.gravity)
+        for share in _smooth(_ASSEMBLY_STEPS):
+            self.model.opt.gravity = share * full
+            self.shape.write(share, 0.0)
+            self._send((home + share * (controls - home))[None])
+
+    def _send(self, controls):
+        """One step for every row of controls (m, K)."""
+        model, data = self.model, self.data
+        for row in controls:
+            data.ctrl[self.actuators] = row
+            mujoco.mj_step(model, data)
+
+    def _rest(self, where):
+        """Wait until the platform is at rest twice in a row."""
+        calm = 0
+        for block in range(_MOST_BLOCKS):
+            mujoco.mj_step(self.model, self.data, nstep=_BLOCKS[block % 2])
+            velocity = np.zeros(6)
+            mujoco.mj_objectVelocity(self.model, self.data, mujoco.mjtObj.mjOBJ_XBODY, self.platform, velocity, 0)
+            speed = MM * max(_ARM * np.linalg.norm(velocity[:3]), np.linalg.norm(velocity[3:]))
+            calm = calm + 1 if speed < REST_MM_S else 0
+            if calm == len(_BLOCKS):
+                return
+        self._unburst(where)
+        waited = f"still moves at {speed:.3g} mm/s after {STEP_S * _MOST_BLOCKS * np.mean(_BLOCKS):.1f} s"
+        raise SimulationError(f"{self.file}: {where} {waited}; allowed: less than {REST_MM_S:g}")
+
+    def _closed(self, where):
+        """Raise SimulationError where loops are open."""
+        self._unburst(where)
+        data = self.data
+        open_mm = MM * np.abs(data.efc_pos[: data.ne]).max(initial=0.0)
+        if not open_mm < CLOSED_MM:
+            raise SimulationError(f"{self.file}: {where}: loops are open by {open_mm:.3g} mm; allowed: {CLOSED_MM:g}")
+
+    def _unburst(self, where):
+        """Raise SimulationError where the simulation has burst, after which MuJoCo began anew."""
+        if any(self.data.warning[int(kind)].number for kind in _BURST):
+            raise SimulationError(f"{self.file}: {where}: the simulation has become unstable; allowed: softer causes")
+
+
+class _Way:
+    """Controls along a path (N, K) with points at rows (n,), those of a Motion."""
+
+    def __init__(self, path, motion, known_lag_s):
+        self.path, self.index, self.time_s, self.lag_s = path, motion.path_index, motion.time_s, known_lag_s
+        rate, spots = np.nan_to_num(motion.drive_rate), motion.position_mm / MM
+        self.moving = np.abs(rate).max(axis=1) > 0.0
+        slope = np.gradient(motion.path_drive, axis=0)[self.index] if len(path) > 1 else np.ones_like(rate)
+        # rows of the path in a second
+        self.speed = (rate * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-30)
+        self.far = np.linalg.norm(np.diff(spots, axis=0, prepend=spots[:1]), axis=1)
+
+    def moves(self, point):
+        """Whether the drives move at a point or the one before."""
+        return self.moving[point - 1] or self.moving[point]
+
+    def at_ease(self, first, last, far=0.0):
+        """Controls (m, K) from row to row of the path, at least so far in m, with a smooth start and end."""
+        rows = np.arange(len(self.path))
+        turned = np.abs(np.diff(self.path[first : last + 1], axis=0)).max(axis=1, initial=0.0).sum()
+        seconds = np.sqrt(_PEAK * max(far, _ARM * turned) / _ACCELERATION)
+        at = first + (last - first) * _smooth(round(max(seconds, _SHORTEST_S) / STEP_S))
+        return np.stack([np.interp(at, rows, drive) for drive in self.path.T], axis=1)
+
+    def in_time(self, point):
+        """Controls (m, K) from the point before to a point as the plan's times say, with the drives' feedforward."""
+        before, rests = slice(point - 1, point + 1), np.flatnonzero(~self.moving)
+        first, last = rests[rests < point].max(initial=0), rests[rests >= point].min(initial=len(self.moving) - 1)
+        rows = np.arange(self.index[first], self.index[last] + 1)
+        along = Akima1DInterpolator(rows, self.path[rows], method="makima")
+        at = CubicHermiteSpline(self.time_s[before], self.index[before], self.speed[before])
+        count = max(round(np.diff(self.time_s[before])[0] / STEP_S), 1)
+        controls = along(np.clip(at(np.linspace(*self.time_s[before], count + 1)), rows[0], rows[-1]))
+        return controls[1:] + self.lag_s * np.diff(controls, axis=0) / STEP_S
+
+
+def _smooth(steps):
+    """Shares (steps,) from above 0 to 1 that start and end smoothly."""
+    s = np.linspace(0.0, 1.0, steps + 1)[1:]
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

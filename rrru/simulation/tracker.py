@@ -1,0 +1,61 @@
+"""The instrument: a laser tracker that sees the tool or reflectors on it, and if asked the platform's orientation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.kinematics.legs import TOOL
+from rrru.kinematics.readings import orientation, turned_by
+from rrru.kinematics.robot import into_frame
+
+
+@dataclass(frozen=True)
+class Sees:
+    """What the tracker sees beside the tool's position.
+
+    targets: places (3,) in mm of reflectors on the platform by name, seen one after the other at every point instead of
+    the tool; noise_rad: noise of the orientations that it reads, one sigma per axis, None where it reads none.
+    """
+
+    targets: Mapping = field(default_factory=dict)
+    noise_rad: float | None = None
+
+    @property
+    def only_tool(self):
+        """Whether that is nothing."""
+        return not self.targets and self.noise_rad is None
+
+    def rows(self, count):
+        """The commanded point (m,) of each row of a table of `count` points."""
+        return np.repeat(np.arange(count), max(len(self.targets), 1))
+
+    def positions(self, robot, poses, twists):
+        """True positions (m, 3) of what it sees of a robot at n Poses under twists (n or 1, sites, 6)."""
+        if not self.targets:
+            return robot.measured(poses, twists)
+        tool, seat = twists[:, robot.legs.site_numbers[TOOL]], np.asarray(robot.tool_mm)
+        count = len(poses.position_mm)
+        levers = (np.tile(np.asarray(place) - seat, (count, 1)) for place in self.targets.values())
+        seen = [poses.point(seat + turned_by(tool[:, 3:], lever) + tool[:, :3]) for lever in levers]
+        return np.stack([into_frame(one, twists[:, 0]) for one in seen], axis=1).reshape(-1, 3)
+
+    def columns(self, robot, poses, twists, generator):
+        """Columns (m,) beside the positions: target, its place, orientations commanded and measured with noise."""
+        count = len(poses.position_mm)
+        told = {}
+        if self.targets:
+            told["target"] = np.array([*self.targets] * count, dtype=str)
+            told |= rows.vector_columns("target", np.tile([*self.targets.values()], (count, 1)).astype(float))
+        if self.noise_rad is not None:
+            noise = Rotation.from_rotvec(self.noise_rad * generator.standard_normal((count, 3))).as_matrix()
+            turns = noise @ orientation(robot, poses, twists)
+            told |= rows.turn_columns("measured", turns[self.rows(count)])
+        return told
+
+
+def measure(position_mm, noise_mm, generator):
+    """Positions (n, 3) with independent normal noise of `noise_mm` (1 sigma per axis, mm) from a numpy Generator."""
+    return np.asarray(position_mm, dtype=float) + noise_mm * generator.standard_normal(np.shape(position_mm))

@@ -1,0 +1,89 @@
+"""The virtual robot: nominal controller in front, exact closure with its effects behind."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from rrru.effects.library import active_effects
+from rrru.effects.motion import make_motion, standing
+from rrru.effects.protocol import bears_load, together
+from rrru.errors import ConfigError
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.robot import Robot
+from rrru.robots.rrru3 import Rrru3
+from rrru.simulation.driven import DrivenRobot
+
+# how often loads and where they make the robot stand are found from each other: what sags by a millimetre is still then
+_SAGS = 3
+
+
+@dataclass(frozen=True)
+class VirtualRobot(DrivenRobot):
+    """A robot whose truth is known: it drives plans and is measured.
+
+    mechanism: the robot that its controller believes in; deviations: names of any of its parameters to true values;
+    axis_deviations (sites, 6): displacements of its axes at the robot's sites, or 0; effects: those that act;
+    non_repeatability_mm: radius of the ball in which the platform lies at random, see `non_repeatability`;
+    rotation_limit_rad: a platform turned further than this from where the nominal one stands counts as unsolved.
+    """
+
+    mechanism: Robot = field(default_factory=Rrru3)
+    deviations: dict = field(default_factory=dict)
+    axis_deviations: np.ndarray | float = 0.0
+    effects: tuple = ()
+    non_repeatability_mm: float = 0.0
+    masses: Masses = field(default_factory=Masses)
+    rotation_limit_rad: float = 0.05
+
+    @cached_property
+    def twists(self):
+        """Twists (1, sites, 6) of its deviations and axes."""
+        return self.mechanism.twists_of(self.deviations) + self.axis_deviations
+
+    def motion(self, plan, controller):
+        """What the effects may know about a plan; the loads are those where the robot stands, off and sagged.
+
+        Where its platform cannot turn they are those at the commanded positions: there a millimetre changes them by a
+        share of a percent, elsewhere by several percent.
+        """
+        course = self.course(plan, controller)
+        motion, sent = make_motion(self.mechanism, self.masses, course), (course.drive, course.position_mm)
+        if self.mechanism.orients and any(bears_load(active.effect) for active in self.effects):
+            for _ in range(_SAGS):
+                at = standing(self.mechanism, sent, self.posed(motion, course.position_mm))
+                motion = make_motion(self.mechanism, self.masses, course, at)
+        return motion
+
+    def posed(self, motion, target):
+        """Poses (n) near targets (n, 3), and twists (n, sites, 6) of all that is off."""
+        twists, near = self.twists + together(self.effects, motion).twists, self.mechanism.near(target, motion.drive)
+        return self.mechanism.model.solve(motion.drive, near, twists), twists
+
+
+def from_config(mechanism, section):
+    """The virtual robot of one `virtual_robots:` entry; raises ConfigError naming the key."""
+    known = mechanism.deviation_names
+    for name in section["errors"]:
+        if name not in known:
+            raise ConfigError(f"virtual robot: unknown error {name!r}; known: {', '.join(known)}")
+    return VirtualRobot(
+        mechanism=mechanism,
+        deviations={name: float(value) for name, value in section["errors"].items()},
+        axis_deviations=_axis_deviations(mechanism, section["axis_errors"]) if "axis_errors" in section else 0.0,
+        effects=active_effects(section["effects"], mechanism),
+        non_repeatability_mm=section.get("wobble_mm", 0.0),
+        masses=Masses(section["platform_mass_kg"], section["forearm_mass_kg"], section["arm_mass_kg"]),
+        rotation_limit_rad=section.get("rotation_limit_rad", VirtualRobot.rotation_limit_rad),
+    )
+
+
+def _axis_deviations(mechanism, section):
+    """Displacements (sites, 6): normal draws of the stated sizes from the stated seed at the seats of all axes."""
+    numbers = mechanism.legs.site_numbers
+    result = np.zeros((len(numbers), 6))
+    draw = np.random.default_rng(section["seed"]).standard_normal((len(mechanism.seats), 6))
+    result[[numbers[site] for site in mechanism.seats]] = draw * np.repeat(
+        [section["position_mm"], section["angle_rad"]], 3
+    )
+    return result

@@ -1,0 +1,31 @@
+"""Facts as JSON files: nested mappings of numbers and texts, the same bytes for the same facts."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rrru.store.atomic_write import write_text
+
+
+def write(facts: dict[str, Any], path: str | Path) -> None:
+    """Write facts as JSON, as a whole or not at all; numbers of NumPy as plain ones, what is not finite as null."""
+    text = json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    write_text(f"{text}\n", path)
+
+
+def read(path: str | Path) -> dict[str, Any]:
+    """The facts of a file."""
+    return json.loads(Path(path).read_text())
+
+
+def _plain(value: Any) -> Any:
+    """Nested facts as JSON can hold them."""
+    if isinstance(value, dict):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -1,0 +1,71 @@
+"""What the diagnosis and other ways to find a cause say about a robot, from the same measurements and stated noise."""
+
+import json
+from time import perf_counter
+
+import numpy as np
+import pandas as pd
+
+from rrru.diagnosis.diagnose import diagnose
+from rrru.seeds import stream
+from rrru.studies.blind_validation import rivals
+from rrru.studies.blind_validation.verdicts import NONE, UNEXPLAINED, in_order
+
+
+def beliefs(measurements, known, settings):
+    """Frame `withheld_beliefs` of a measurement table of a MeasuredRobot, by GapSettings."""
+    found = []
+    for method, way in _WAYS.items():
+        start = perf_counter()
+        effects, probabilities, share = way(measurements, known, settings)
+        said = {"effects": effects, "probabilities": json.dumps(probabilities) if probabilities else ""}
+        found.append({"method": method, **said, "share_closed": share, "seconds": perf_counter() - start})
+    return pd.DataFrame(found).assign(robot=known.campaign)
+
+
+def _diagnosis(measurements, known, settings):
+    """Verdict, probability by set of effects, all that is unexplained being one set, and share closed."""
+    result = diagnose(measurements, known, settings, details=False)
+    probabilities = {}
+    for (effects, unexplained), probability in result.attribution.posterior.sets().items():
+        name = UNEXPLAINED if unexplained else in_order("+".join(effects)) or NONE
+        probabilities[name] = probabilities.get(name, 0.0) + probability
+    return result.verdict["effects"], probabilities, result.verdict["share_closed"]
+
+
+def _bic(measurements, known, settings):
+    """The most probable set, the probability of each, no share closed."""
+    campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
+    return _most_probable(rivals.bayes_information(campaign))
+
+
+def _lasso(measurements, known, settings):
+    """The same by the lasso."""
+    campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
+    return _most_probable(rivals.lasso(campaign, stream(settings.seed, "lasso", known.campaign)))
+
+
+def _spike_and_slab(measurements, known, settings):
+    """The same by the spike and slab."""
+    campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
+    return _most_probable(rivals.spike_and_slab(campaign, stream(settings.seed, "spike_and_slab", known.campaign)))
+
+
+def _gaussian_process(measurements, known, settings):
+    """No effects, no probabilities, the share closed."""
+    campaign = rivals.Campaign.of(measurements, known, settings.library(known.mechanism))
+    return "", {}, rivals.gaussian_process(campaign)
+
+
+def _most_probable(probabilities):
+    """The most probable set, the first by name of those alike, beside all and no share closed."""
+    return max(sorted(probabilities), key=probabilities.get), probabilities, np.nan
+
+
+_WAYS = {
+    "diagnosis": _diagnosis,
+    "bic": _bic,
+    "lasso": _lasso,
+    "spike_and_slab": _spike_and_slab,
+    "gaussian_process": _gaussian_process,
+}

@@ -1,0 +1,191 @@
+"""Causes as an engineer names them, each with the answer that is right. Lengths mm, angles rad, times s.
+
+Play, soft or slow servos, soft links, clearance and warming have a law in the library. A base that is not level and a
+load that nobody told of only change the weight: they show where the servos are soft, so that the drives' compliance is
+the answer (were the tracker level and the base not, that would be a matter of the frame). One leg's length and a tilted
+axis are numbers of a full calibration, no cause. A base on springs is a pedestal that turns and does not shift.
+Friction that grows with the square of the speed has no law of those that are tried.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from rrru.effects.library import find
+from rrru.effects.protocol import Effect, drive_parameters, of_drives, plain_coordinates
+from rrru.parameters import ParameterSet
+from rrru.studies.blind_validation.outside import OUTSIDE
+from rrru.studies.blind_validation.verdicts import NONE, PREFIX
+
+_FRICTION = {"rad": ("s^2/rad", 0.0, 1.0), "mm": ("s^2/mm", 0.0, 1e-2)}
+_FRICTION_SOURCE = dict.fromkeys(_FRICTION, "friction over the servo's stiffness, assumed")
+_FRICTION_SIZE = {"rad": 3e-3, "mm": 1e-5}
+
+
+def _speed_friction(robot):
+    """Friction that grows with the square of a drive's speed winds its servo up."""
+    drives = robot.parts.drives
+    parameters = ParameterSet(drive_parameters(drives, _FRICTION_SOURCE, ("friction", _FRICTION)))
+
+    def held_back(motion, values):
+        """Changes of the actuator values under frictions (K,)."""
+        rate = np.nan_to_num(motion.drive_rate)
+        return motion.at_drives(-values * rate * np.abs(rate))
+
+    coordinates = plain_coordinates(parameters, of_drives(drives, _FRICTION_SIZE))
+    return Effect("speed_friction", parameters, coordinates, held_back, ("drive_rate",))
+
+
+def _leaning_base(robot):
+    """The base turns about its two level axes under the moment of all weight."""
+    law = find("pedestal_compliance", robot)
+    # it turns, and does not shift besides
+    most = law.coordinates.typical * [1.0, 1.0, 0.0, 0.0]
+    positive = np.ones(len(most), dtype=bool)
+    return replace(law, coordinates=replace(law.coordinates, typical=most, positive=positive))
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of cause.
+
+    law: from a robot to the Effect that it is on our own plant, None where it is errors of the robot's own numbers;
+    answer: the effect that is right, empty where the calibration takes it up, None where the library has no law of it;
+    on: field of a Model that lists where it acts, empty for drives and the whole robot; typical: sizes of such errors;
+    more: further numbers by name, each with the span that it is drawn from.
+    """
+
+    law: Callable | None
+    answer: str | None
+    on: str = ""
+    typical: float = 0.0
+    more: dict = field(default_factory=dict)
+
+
+def _named(name, on="", **more):
+    """A kind that the library has a law for."""
+    return Kind(partial(find, name), name, on, more=more)
+
+
+_TILT = {"tilt_x_rad": (-0.03, 0.03), "tilt_y_rad": (-0.03, 0.03)}
+KINDS = {
+    "play": _named("backlash"),
+    "soft_servo": _named("drive_compliance"),
+    "slow_servo": _named("servo_lag"),
+    "soft_link": _named("link_flexure", "links"),
+    "clearance": _named("joint_clearance", "clearances"),
+    "warming": _named("thermal_growth", "growth_mm", time_constant=(125.0, 500.0)),
+    "soft_servo_on_a_slope": _named("drive_compliance", **_TILT),
+    "soft_servo_under_a_load": _named("drive_compliance", load_kg=(0.5, 2.0)),
+    "length": Kind(None, "", "lengths", 0.5),
+    "tilted_axis": Kind(None, "", "tilts", 1e-3),
+    "base_on_springs": Kind(_leaning_base, "pedestal_compliance"),
+    "speed_friction": Kind(_speed_friction, None),
+}
+# causes from outside that act in a robot of any kind, by the name of their kind
+OUTSIDE_OF_ANY = ("speed_friction", "tripod_sway", "tracker_bump")
+
+
+def kind_of(name):
+    """The Kind of a name in KINDS, of a cause from outside in `OUTSIDE`, or of an effect of the library."""
+    if name in OUTSIDE:
+        return Kind(lambda _: OUTSIDE[name], None)
+    return KINDS[name] if name in KINDS else _named(name)
+
+
+# what is given to the robots of one model, one after the other
+ORDER = (
+    *("play", NONE, "soft_servo", "base_on_springs", "slow_servo", "length", NONE, "soft_link", "speed_friction"),
+    *("clearance", "soft_servo_on_a_slope", NONE, "warming", "tilted_axis", "soft_servo_under_a_load"),
+)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A cause that acts: kind, sizes (c,) in the coordinates of its law or of the Model's list, further numbers by
+    name; leg: number of the one place that it is at, or 0; strength: gap over noise.
+    """
+
+    kind: str
+    sizes: tuple
+    more: dict
+    leg: int = 0
+    strength: float = 0.0
+
+    @classmethod
+    def from_mapping(cls, section):
+        """The fault of its fields, as JSON holds them."""
+        return cls(**(section | {"sizes": tuple(section["sizes"])}))
+
+    @property
+    def effect(self):
+        """Its name as a part of a gap, empty where it makes none."""
+        return self.kind if self.outside else kind_of(self.kind).answer
+
+    @property
+    def outside(self):
+        """Whether no law of the library holds it."""
+        return kind_of(self.kind).answer is None
+
+    @property
+    def truth(self):
+        """The right answer in words."""
+        return f"{PREFIX}:{self.kind}" if self.outside else kind_of(self.kind).answer or NONE
+
+    def scaled(self, factor):
+        """The same fault, so many times as large."""
+        return replace(self, sizes=tuple((factor * np.array(self.sizes)).tolist()))
+
+    def moves(self, robot):
+        """Whether it shows only while the robot moves; all others are read at rest."""
+        law = kind_of(self.kind).law
+        return bool(law and "drive_rate" in law(robot).needs)
+
+    def beyond(self, robot):
+        """Whether it is larger than the law of the library allows that is the right answer."""
+        kind = kind_of(self.kind)
+        return bool(kind.law and kind.answer and (np.abs(self.sizes) > kind.law(robot).coordinates.most).any())
+
+    def values(self, robot):
+        """Its Effect on a robot, and the law's parameter values by name."""
+        law = kind_of(self.kind).law(robot)
+        shape = {name: self.more.get(name, value) for name, value in law.coordinates.shapes[0].items()}
+        return law, law.parameters.mapping(law.coordinates.to_values(np.array(self.sizes), shape))
+
+    def numbers(self, robot):
+        """True values of the library's parameters by effect and name, as far as the fault is these."""
+        if not (kind_of(self.kind).law and kind_of(self.kind).answer) or "load_kg" in self.more:
+            return {}
+        law, values = self.values(robot)
+        return {law.name: values}
+
+
+def kinds_of(model, robot):
+    """The kinds of causes in ORDER that a robot of a Model can have."""
+    return tuple(kind for kind in ORDER if kind == NONE or _fits(KINDS[kind], model, robot))
+
+
+def _fits(kind, model, robot):
+    """Whether a robot has a place for a kind, and its library a law."""
+    return (not kind.on or len(getattr(model, kind.on)) > 0) and (not kind.law or kind.law(robot) is not None)
+
+
+def draw_fault(name, model, robot, generator):
+    """A fault of a kind with the ratios of its sizes drawn; of a third of those with several places one alone."""
+    kind = KINDS[name]
+    if kind.law:
+        coordinates = kind.law(robot).coordinates
+        typical, positive = coordinates.typical, coordinates.positive
+        several = bool(coordinates.legs.any())
+    else:
+        typical = np.full(len(getattr(model, kind.on)), kind.typical)
+        positive, several = np.zeros(len(typical), dtype=bool), True
+    sizes = typical * generator.standard_normal(len(typical))
+    sizes = np.where(positive, np.abs(sizes), sizes)
+    leg = int(generator.integers(1, len(sizes) + 1)) if several and generator.random() < 1.0 / 3.0 else 0
+    if leg:
+        sizes = np.where(np.arange(1, len(sizes) + 1) == leg, sizes, 0.0)
+    more = {key: float(generator.uniform(*span)) for key, span in kind.more.items()}
+    return Fault(name, tuple(sizes.tolist()), more, leg)

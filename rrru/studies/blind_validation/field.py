@@ -1,0 +1,39 @@
+"""Campaigns of another simulator, whose answers the user knows, scored as the check's own robots are."""
+
+import numpy as np
+import pandas as pd
+
+from rrru.effects.library import NAMES
+from rrru.errors import ConfigError
+from rrru.studies.blind_validation.states import VERDICT
+from rrru.studies.blind_validation.verdicts import in_order, is_outside, is_right, scores
+
+
+def field_verdicts(verdicts):
+    """Rows of `withheld_verdicts` from those of `gap_verdicts`."""
+    return verdicts[VERDICT].assign(check="field", robot=verdicts["campaign"], kind="file")
+
+
+def score_field(verdicts, answers):
+    """Frame `withheld_scores` from `field_verdicts` and the user's answers (campaign, effects, leg)."""
+    truth = answers.assign(effects=answers["effects"].map(in_order))
+    truth = truth.rename(columns={"campaign": "robot", "effects": "truth", "leg": "truth_leg"})
+    strength = verdicts["gap_rms_mm"] / verdicts["noise_rms_mm"]
+    told = verdicts.assign(strength=strength, oracle_detects=False, share_closed_true=np.nan).merge(truth, on="robot")
+    told = told.assign(file="", cause=told["truth"], numbers=0, held=0)
+    right = [is_right(*pair, "field") for pair in zip(told["truth"], told["effects"], strict=True)]
+    return scores(told.assign(right=right))
+
+
+def read_field_answers(path):
+    """The user's answers: a CSV file with the columns campaign, effects (joined by +), leg (0 for none or all)."""
+    answers = pd.read_csv(path, dtype={"campaign": str, "effects": str}, keep_default_na=False)
+    missing = {"campaign", "effects", "leg"} - set(answers.columns)
+    if missing:
+        raise ConfigError(f"withheld.field_answers: {path} lacks the columns {', '.join(sorted(missing))}")
+    for row, effects in zip(answers["campaign"], answers["effects"], strict=True):
+        for name in effects.split("+"):
+            if name not in (*NAMES, "none") and not is_outside(name):
+                known = f"none, outside, {', '.join(NAMES)}"
+                raise ConfigError(f"withheld.field_answers: campaign {row} has the effect {name!r}; known: {known}")
+    return answers.assign(leg=pd.to_numeric(answers["leg"], errors="coerce").fillna(0).astype(int))

@@ -1,0 +1,212 @@
+"""Other ways to find the cause of a gap, from the same campaign, linearisation and stated noise as the diagnosis.
+
+Bayes' information criterion of linear signatures (G. Schwarz, Annals of Statistics 6, 1978), the lasso with that
+criterion (H. Zou, T. Hastie, R. Tibshirani, Annals of Statistics 35, 2007) over resampled points, a spike and slab on
+linear signatures by Gibbs sampling (E. George, R. McCulloch, JASA 88, 1993), and a Gaussian process for whatever is
+left (M. C. Kennedy, A. O'Hagan, J. R. Stat. Soc. B 63, 2001), which names nothing.
+"""
+
+import warnings
+from collections import Counter
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from rrru.calibration.calibrate import calibrate
+from rrru.calibration.campaign_fit import select
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.problem import Case
+from rrru.diagnosis.state import State
+from rrru.diagnosis.terms import EACH, signatures, variants
+from rrru.studies.blind_validation.verdicts import NONE, in_order
+
+_RESAMPLED, _FOLDS = 50, 5
+# Gibbs sweeps over all effects, the first of which are dropped; probability that an effect acts; standard deviations of
+# its coefficients on columns of unit length, in units of the noise
+_SWEEPS, _DROPPED, _ACTS = 1500, 300, 0.1
+_SLABS = np.geomspace(3.0, 1000.0, 6)
+# a set's columns are as many as they have singular values above this share of the largest
+_RANK = 1e-5
+# what the calibration leaves less of than this share is not seen
+_LEAST_VISIBLE = 1e-6
+# points of which a Gaussian process learns its sizes
+_LEARNED_FROM = 250
+_NAMED = ("time_s", "speed_mm_s", "payload_kg")
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What all ways are given of n points: the case; over the stated noise the data (3n,), the calibration's columns
+    (3n, p), and those (3n, k) of every Term that the diagnosis tries: effect, shape and legs.
+    """
+
+    case: Case
+    data: np.ndarray
+    base: np.ndarray
+    columns: dict
+
+    @classmethod
+    def of(cls, measurements, known, library):
+        """The campaign of a measurement table of a MeasuredRobot, linearised about its calibration."""
+        mechanism = sim(known.mechanism)
+        case = make_case(measurements, mechanism, known.masses, known.noise_mm, library)
+        calibrated = State(calibrate(select(measurements, mechanism, ["*"])).deviations, {})
+        # the diagnosis finds the waves of laws of many coefficients; they are no signatures
+        effects = {name: effect for name, effect in case.effects.items() if not effect.coordinates.broad}
+        keys = [(name, k) for name, effect in effects.items() for k in range(len(effect.coordinates.shapes))]
+        linear = case.linearise(calibrated, keys)
+        terms = [term for effect in effects.values() for term in variants(effect)]
+        made = [linear.data, linear.base, *signatures(effects, linear, terms)]
+        data, base, *columns = (one.reshape(3 * len(case), -1) / case.noise_mm for one in made)
+        return cls(case, data[:, 0], base, dict(zip(terms, columns, strict=True)))
+
+
+def _unit(columns, base):
+    """Columns (n, k) without the part that the calibration's (n, p) take up, of unit length; zero where all is."""
+    basis, _ = np.linalg.qr(base)
+    left, whole = columns - basis @ (basis.T @ columns), np.linalg.norm(columns, axis=0)
+    size = np.linalg.norm(left, axis=0)
+    seen = size > _LEAST_VISIBLE * whole
+    return np.where(seen, left / np.where(seen, size, 1.0), 0.0)
+
+
+def bayes_information(campaign):
+    """Probability by set of up to two effects: exp(-BIC / 2) of the best choice of their shapes and legs."""
+    terms = list(campaign.columns)
+    ends = np.cumsum([0, *(columns.shape[1] for columns in campaign.columns.values())])
+    numbers = [np.arange(*pair) for pair in pairwise(ends)]
+    together = np.concatenate([*campaign.columns.values(), campaign.data[:, None]], axis=1)
+    basis, _ = np.linalg.qr(campaign.base)
+    data = campaign.data - basis @ (basis.T @ campaign.data)
+    unit = _unit(together[:, :-1], campaign.base)
+    gram, moment = unit.T @ unit, unit.T @ data
+    best = {NONE: 0.0}
+    pairs = (pair for pair in combinations(range(len(terms)), 2) if terms[pair[0]].effect != terms[pair[1]].effect)
+    for chosen in (*((k,) for k in range(len(terms))), *pairs):
+        index = np.concatenate([numbers[k] for k in chosen])
+        gain, rank = _explained(gram[np.ix_(index, index)], moment[index])
+        effects = _label(terms[k].effect for k in chosen)
+        best[effects] = max(0.5 * (gain - rank * np.log(len(data))), best.get(effects, -np.inf))
+    weights = np.exp(np.array(list(best.values())) - max(best.values()))
+    return dict(zip(best, (weights / weights.sum()).tolist(), strict=True))
+
+
+def _explained(gram, moment):
+    """Sum of squares that columns take off, from their Gram matrix (k, k) and moments (k,), and their rank."""
+    size, turned = np.linalg.eigh(gram)
+    kept = size > _RANK**2 * max(size[-1], 1e-300)
+    return float(((turned[:, kept].T @ moment) ** 2 / size[kept]).sum()), int(kept.sum())
+
+
+def lasso(campaign, generator):
+    """Share by set of effects of resamplings of the points in which the lasso keeps a coefficient of just these."""
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.linear_model import LassoLarsIC
+
+    chosen = {term: columns for term, columns in campaign.columns.items() if term.legs == EACH}
+    owner = np.repeat([term.effect for term in chosen], [columns.shape[1] for columns in chosen.values()])
+    columns, points = np.concatenate(list(chosen.values()), axis=1), len(campaign.data) // 3
+    found = Counter()
+    for _ in range(_RESAMPLED):
+        drawn = (3 * generator.integers(points, size=points)[:, None] + np.arange(3)).ravel()
+        base = campaign.base[drawn]
+        data = campaign.data[drawn] - base @ np.linalg.lstsq(base, campaign.data[drawn], rcond=None)[0]
+        model = LassoLarsIC(criterion="bic", fit_intercept=False, noise_variance=1.0)
+        with warnings.catch_warnings():
+            # columns that do the same are told apart by rounding
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            model.fit(_unit(columns[drawn], base), data)
+        found[_label(owner[model.coef_ != 0.0].tolist())] += 1
+    return {effects: count / _RESAMPLED for effects, count in found.items()}
+
+
+def spike_and_slab(campaign, generator):
+    """Share by set of effects of a Gibbs sampler's sweeps in which just these have coefficients other than zero.
+
+    Each effect acts with the same probability, in one of its shapes and choices of legs and with one of `_SLABS` for
+    all its coefficients, each alike; coefficients are averaged out.
+    """
+    terms = list(campaign.columns)
+    numbers = np.split(
+        np.arange(sum(one.shape[1] for one in campaign.columns.values())),
+        np.cumsum([one.shape[1] for one in campaign.columns.values()])[:-1],
+    )
+    basis, _ = np.linalg.qr(campaign.base)
+    unit = _unit(np.concatenate(list(campaign.columns.values()), axis=1), campaign.base)
+    gram, moment = unit.T @ unit, unit.T @ (campaign.data - basis @ (basis.T @ campaign.data))
+    choices = {}
+    for number, term in enumerate(terms):
+        choices.setdefault(term.effect, []).append(number)
+    state, found = {}, Counter()
+    for sweep in range(_SWEEPS):
+        for effect, own in choices.items():
+            rest = [one for name, one in state.items() if name != effect]
+            slab = state[effect][1] if effect in state else generator.choice(_SLABS)
+            log = [_marginal(gram, moment, numbers, [*rest, (number, slab)]) for number in own]
+            log = np.array([_marginal(gram, moment, numbers, rest) + np.log(len(own) * (1.0 / _ACTS - 1.0)), *log])
+            chosen = _drawn(log, generator)
+            state.pop(effect, None)
+            if chosen:
+                log = [_marginal(gram, moment, numbers, [*rest, (own[chosen - 1], one)]) for one in _SLABS]
+                state[effect] = own[chosen - 1], _SLABS[_drawn(np.array(log), generator)]
+        if sweep >= _DROPPED:
+            found[_label(state)] += 1
+    return {effects: count / (_SWEEPS - _DROPPED) for effects, count in found.items()}
+
+
+def _drawn(log, generator):
+    """A number drawn by the logarithms (n,) of weights."""
+    weights = np.exp(log - log.max())
+    return int(generator.choice(len(weights), p=weights / weights.sum()))
+
+
+def _marginal(gram, moment, numbers, chosen):
+    """Log marginal likelihood over that of no term of chosen (number of a term, slab), the coefficients averaged out.
+
+    gram (k, k), moment (k,): of all columns; numbers: of the columns of each term.
+    """
+    if not chosen:
+        return 0.0
+    index = np.concatenate([numbers[number] for number, _ in chosen])
+    scale = np.concatenate([np.full(len(numbers[number]), slab) for number, slab in chosen])
+    factor = np.linalg.cholesky(scale[:, None] * gram[np.ix_(index, index)] * scale + np.eye(len(index)))
+    half = solve_triangular(factor, scale * moment[index], lower=True, check_finite=False)
+    return 0.5 * half @ half - np.log(np.diag(factor)).sum()
+
+
+def gaussian_process(campaign):
+    """Share of the gap that a Gaussian process of place, direction, time, speed and payload predicts on left-out runs.
+
+    NaN where nothing is left above the noise.
+    """
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel
+    from sklearn.model_selection import GroupKFold
+
+    points, (basis, _) = campaign.case.points, np.linalg.qr(campaign.base)
+    left = (campaign.data - basis @ (basis.T @ campaign.data)).reshape(-1, 3)
+    seen = np.column_stack([rows.command(points), rows.direction(points), points[list(_NAMED)].to_numpy(dtype=float)])
+    seen = seen[:, np.ptp(seen, axis=0) > 0.0]
+    seen = (seen - seen.mean(axis=0)) / seen.std(axis=0)
+    few = slice(None, None, max(len(seen) // _LEARNED_FROM, 1))
+    kernel = ConstantKernel(1.0, (1e-3, 1e5)) * RBF(np.ones(seen.shape[1]), (1e-1, 1e3))
+    with warnings.catch_warnings():
+        # a size at its bound is an answer: what is seen does not matter
+        warnings.simplefilter("ignore")
+        kernel = GaussianProcessRegressor(kernel, alpha=1.0).fit(seen[few], left[few]).kernel_
+    after = np.empty_like(left)
+    runs = points["run"].to_numpy()
+    for learned, told in GroupKFold(min(_FOLDS, len(np.unique(runs)))).split(seen, groups=runs):
+        model = GaussianProcessRegressor(kernel, alpha=1.0, optimizer=None).fit(seen[learned], left[learned])
+        after[told] = left[told] - model.predict(seen[told])
+    gaps = [np.sqrt(max((one**2).sum(axis=1).mean() - 3.0, 0.0)) for one in (left, after)]
+    return float(1.0 - gaps[1] / gaps[0]) if gaps[0] > 0.0 else np.nan
+
+
+def _label(effects):
+    """Names of effects, each once, as a verdict has them."""
+    return in_order("+".join(set(effects))) or NONE

@@ -1,0 +1,300 @@
+"""Gross mistakes put into right files, what would be the right words for each, and whether they show. Lengths mm.
+
+A mistake shows where the nominal robot at the values that the file states, the instrument registered rigidly where its
+frame is not stated, misses by three times as much as without it: else the file is as good as a right one.
+"""
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.errors import RrruError
+from rrru.seeds import stream
+from rrru.studies.blind_validation.sentences import page
+from rrru.studies.blind_validation.sentences.draws import draw
+from rrru.studies.blind_validation.sentences.kinds import KINDS
+
+_SHOWS = 3.0
+_TOOL_MM, _TARGET_MM = 50.0, 40.0
+_MEASURED = ["measured_x_mm", "measured_y_mm", "measured_z_mm"]
+
+
+@dataclass(frozen=True)
+class Handed:
+    """What a user hands in: rows of a file, the campaign's section, the robot, and patterns that the right words fit.
+
+    nominal: the robot whose file is handed in; places: of the targets as they are stated.
+    """
+
+    rows: object
+    section: dict
+    nominal: object
+    words: tuple
+    places: dict
+
+
+def _right(own, section):
+    """The right file."""
+    exact = own.readings(own.poses())
+    rows = own.table(exact, True)[np.repeat(~own.stops.fresh, len(own.targets))]
+    return Handed(rows, section, own.nominal, (), own.targets)
+
+
+def _signs(handed, own, names):
+    """The columns of some drives counted the other way."""
+    rows = handed.rows.assign(**{name: -handed.rows[name] for name in names})
+    turned = ", ".join(f"{name}: -1" for name in own.nominal.columns if name in names)
+    return replace(handed, rows=rows, words=(re.escape(f"signs: {{{turned}}}"),))
+
+
+def _order(handed, own, order):
+    """Columns of the drives in another order: the k-th holds the values of drive order[k]."""
+    names = own.nominal.columns
+    values = {name: handed.rows[names[drive]] for name, drive in zip(names, order, strict=True)}
+    listed = ", ".join(names[drive] for drive in order)
+    return replace(handed, rows=handed.rows.assign(**values), words=(re.escape(f"order: [{listed}]"),))
+
+
+def _one_sign(handed, own, generator):
+    """One drive counts the other way."""
+    return _signs(handed, own, [str(generator.choice(own.nominal.columns))])
+
+
+def _all_signs(handed, own, _generator):
+    """All drives count the other way."""
+    return _signs(handed, own, list(own.nominal.columns))
+
+
+def _exchanged(handed, own, generator):
+    """Two drives of one unit are exchanged."""
+    units = np.array(own.nominal.units)
+    pairs = [(i, j) for i in range(len(units)) for j in range(i) if units[i] == units[j]]
+    if not pairs:
+        return None
+    order = list(range(len(units)))
+    i, j = pairs[generator.integers(len(pairs))]
+    order[i], order[j] = j, i
+    return _order(handed, own, order)
+
+
+def _reversed(handed, own, _generator):
+    """The drives stand in reverse order."""
+    units = own.nominal.units
+    return _order(handed, own, list(range(len(units)))[::-1]) if units == units[::-1] else None
+
+
+def _moved_on(handed, own, generator):
+    """The drives are numbered from another one on."""
+    count = len(own.nominal.units)
+    step = int(generator.integers(1, count))
+    order = [*range(step, count), *range(step)]
+    return _order(handed, own, order) if len(set(own.nominal.units)) == 1 else None
+
+
+def _late(handed, own, _generator, by=1):
+    """Measured columns stand some rows too low."""
+    if own.reading not in ("tool", "pose"):
+        return None
+    names = [name for name in handed.rows if name.startswith("measured_")]
+    moved = handed.rows[names].shift(by)
+    # values of a row stand so many rows below it
+    rows = handed.rows.assign(**{name: moved[name] for name in names}).iloc[by:]
+    return replace(handed, rows=rows, words=(rf"not {by} rows? late|rows may be shifted",))
+
+
+def _late_by_two(handed, own, generator):
+    """Measured columns stand two rows too low."""
+    return _late(handed, own, generator, 2)
+
+
+def _tool(handed, own, _generator):
+    """The tool is longer than the file of the robot, or the stated places, say."""
+    if own.reading == "stated":
+        places = {name: [x, y, z + _TOOL_MM] for name, (x, y, z) in own.targets.items()}
+        words = (r"targets: \{",)
+        return replace(handed, section=handed.section | {"targets": places}, words=words, places=places)
+    if own.reading != "tool" or not hasattr(own.nominal, "tip_mm"):
+        return None
+    x, y, z = own.nominal.tip_mm
+    return replace(handed, nominal=replace(own.nominal, tip_mm=(x, y, z - _TOOL_MM)), words=(r"tool|targets: \{",))
+
+
+def _one_target(handed, own, _generator):
+    """One reflector's stated place is wrong."""
+    if own.reading != "stated":
+        return None
+    places = {name: list(place) for name, place in own.targets.items()}
+    places["b"][0] += _TARGET_MM
+    words = (r"targets: \{.*b: \[",)
+    return replace(handed, section=handed.section | {"targets": places}, words=words, places=places)
+
+
+def _targets_exchanged(handed, own, _generator):
+    """Two reflectors were read under each other's names."""
+    if own.reading != "stated":
+        return None
+    names = handed.rows["target"].replace({"a": "b", "b": "a"})
+    return replace(handed, rows=handed.rows.assign(target=names), words=(r"targets: \{|exchanged",))
+
+
+def _left_handed(handed, _own, _generator):
+    """The instrument's y counts the other way."""
+    rows = handed.rows.assign(measured_y_mm=-handed.rows["measured_y_mm"])
+    return replace(handed, rows=rows, words=("right-handed|mirror|left-handed",))
+
+
+def _in_m(handed, _own, _generator):
+    """Positions are in m, and the section says mm."""
+    rows = handed.rows.assign(**{name: 1e-3 * handed.rows[name] for name in _MEASURED})
+    return replace(handed, rows=rows, words=(r"unit: m\b",))
+
+
+def _in_degrees(handed, own, _generator):
+    """Angles are in degrees, and the section says rad."""
+    turning = [name for name in own.nominal.columns if name.endswith("_rad")]
+    if not turning:
+        return None
+    rows = handed.rows.assign(**{name: np.degrees(handed.rows[name]) for name in turning})
+    return replace(handed, rows=rows, words=("angle_unit: deg|degrees",))
+
+
+def _other_robot(handed, own, generator):
+    """The robot's file is that of another robot of its kind, which lost zeros of the drives may do as well."""
+    other = KINDS[own.robot_kind](generator)
+    return replace(handed, nominal=other, words=("does not fit the robot|`robot` is another one|`robot` is right",))
+
+
+def _frame(handed, own, generator):
+    """The instrument stands somewhere, and the section does not say so."""
+    turn = Rotation.from_rotvec(generator.uniform(0.5, 1.5, 3)).as_matrix()
+    if own.registered or own.reading == "pose":
+        return None
+    moved = handed.rows[_MEASURED].to_numpy() @ turn.T + generator.uniform(500.0, 2000.0, 3)
+    rows = handed.rows.assign(**dict(zip(_MEASURED, moved.T, strict=True)))
+    return replace(handed, rows=rows, words=("frame: register",))
+
+
+MISTAKES = {
+    "sign of a drive": _one_sign,
+    "signs of all drives": _all_signs,
+    "two drives exchanged": _exchanged,
+    "drives in reverse": _reversed,
+    "drives moved on": _moved_on,
+    "rows late by one": _late,
+    "rows late by two": _late_by_two,
+    "tool": _tool,
+    "place of a target": _one_target,
+    "targets exchanged": _targets_exchanged,
+    "left-handed frame": _left_handed,
+    "metres": _in_m,
+    "degrees": _in_degrees,
+    "other robot": _other_robot,
+    "frame": _frame,
+}
+# no mistake, but for the frame, can be seen in what a rigid registration leaves
+_OF_FRAME = ("frame", "metres")
+
+
+def with_mistake(number, seed, most_stops):
+    """The name of a mistake, the Draw of a robot, and what is Handed in: the next robot that can have it."""
+    name, turn = [*MISTAKES][number % len(MISTAKES)], number // len(MISTAKES)
+    step = 0
+    while True:
+        own = right_draw(len(MISTAKES) * (turn * 97 + step) + number % len(MISTAKES), seed, most_stops, "mistakes")
+        generator = stream(seed, "sentences mistake", number, step)
+        handed = MISTAKES[name](_right(own, own.section(".", "stops.csv")), own, generator)
+        if handed is not None:
+            return name, own, handed
+        step += 1
+
+
+def right_draw(number, seed, most_stops, label):
+    """A Draw without a cause, of a stream of its own."""
+    return replace(draw(number, stream(seed, label).integers(2**31), most_stops, 0.0), cause=None)
+
+
+def right_file(number, seed, most_stops):
+    """The Draw of a right file, and what is Handed in."""
+    own = right_draw(number, seed, most_stops, "right files")
+    return own, _right(own, own.section(".", "stops.csv"))
+
+
+def shows(name, own, handed):
+    """Whether a mistake shows in the file at all."""
+    if name in _OF_FRAME:
+        return True
+    right = _right(own, own.section(".", "stops.csv"))
+    return _rms(handed, own) > _SHOWS * _rms(right, own)
+
+
+def _rms(handed, own):
+    """Rms in mm of what the nominal robot leaves, registered where the frame is not stated; endless without a pose."""
+    place, turn = handed.nominal.poses(handed.rows[list(own.nominal.columns)].to_numpy())
+    names = handed.rows["target"] if "target" in handed.rows else [""] * len(handed.rows)
+    if own.reading == "found":
+        return _rms_found(handed.rows, place, turn, np.array(names))
+    said = place + (turn @ np.array([handed.places[name] for name in names])[:, :, None])[:, :, 0]
+    return _left(handed.rows[_MEASURED].to_numpy(), said, own.registered)
+
+
+def _rms_found(rows, place, turn, names):
+    """The same with the targets' places free: rms after alternating fits of frame and places."""
+    measured, places = rows[_MEASURED].to_numpy(), {name: np.zeros(3) for name in set(names)}
+    for _ in range(30):
+        said = place + (turn @ np.array([places[name] for name in names])[:, :, None])[:, :, 0]
+        if not np.isfinite(said).all():
+            return np.inf
+        rotation, shift = _kabsch(measured, said)
+        moved = measured @ rotation.T + shift
+        back = (turn.transpose(0, 2, 1) @ (moved - place)[:, :, None])[:, :, 0]
+        places = {name: back[names == name].mean(axis=0) for name in places}
+    return float(np.sqrt(((moved - said) ** 2).sum(axis=1).mean()))
+
+
+def _left(measured, said, registered):
+    """Rms in mm, after a rigid registration where one is asked for."""
+    if not np.isfinite(said).all():
+        return np.inf
+    rotation, shift = _kabsch(measured, said) if registered else (np.eye(3), np.zeros(3))
+    return float(np.sqrt(((measured @ rotation.T + shift - said) ** 2).sum(axis=1).mean()))
+
+
+def _kabsch(measured, said):
+    """Rotation and translation that best map measured to said positions."""
+    a, b = measured.mean(axis=0), said.mean(axis=0)
+    left, _, right = np.linalg.svd((measured - a).T @ (said - b))
+    sign = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    rotation = (left @ sign @ right).T
+    return rotation, b - rotation @ a
+
+
+def read(own, handed, folder):
+    """What reading a file gives: accepted, refused or traceback, and the words."""
+    own = replace(own, nominal=handed.nominal)
+    own.write(folder, handed.rows, "stops.csv")
+    section = handed.section | {"ingest": str(folder / "stops.csv")}
+    try:
+        found = page.read(section, handed.nominal.section(str(folder / own.robot_file), own.kind))
+    except RrruError as error:
+        return "refused", str(error)
+    # anything else that ends a run is a defect, whatever it is
+    except Exception as error:
+        return "traceback", f"{type(error).__name__}: {error}"
+    return "accepted", "; ".join(found.notes)
+
+
+def is_mirrored(own, handed, words):
+    """Whether exchanged legs of a robot that is its own mirror image have been taken for a mirrored frame.
+
+    Of three like legs both explain the readings alike, and no file tells which it is.
+    """
+    legs = len(own.nominal.units) == 3 and own.nominal.formats == ("mjcf",)
+    exchanged = any(pattern.startswith("order:") for pattern in handed.words)
+    return legs and exchanged and bool(re.search("right-handed|would fit the robot's", words))
+
+
+def named(handed, words):
+    """Whether words name the mistake with the key to write."""
+    return all(re.search(pattern, words, re.DOTALL) for pattern in handed.words)

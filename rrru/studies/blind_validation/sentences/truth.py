@@ -1,0 +1,223 @@
+"""What is true of an own robot whose page has been made: the only code here that knows draw and diagnosis.
+
+Sizes are of exact positions: the robot's own, of its plant, against what the calibrated or corrected sim of the
+diagnosis says at the same stops, those of the file and fresh ones that no file has. Lengths mm, angles rad, masses kg.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.state import State
+from rrru.studies.blind_validation.sentences import page
+from rrru.studies.blind_validation.sentences.causes import Stops
+from rrru.studies.blind_validation.sentences.files import file_poses, has_play
+
+_ALL = "all.csv"
+# a drive arrives from so far, in mm and rad
+_APPROACH = {"rad": 0.05, "mm": 20.0}
+
+
+@dataclass(frozen=True)
+class Truth:
+    """effects: names that act and that the library holds; outside: something acts that it lacks; leg: the one drive, or
+    0; strength: what a calibration of exact readings leaves of the cause, over the noise's rms; chi2: the same as a
+    chi-square of the file's readings; numbers: true values by effect and parameter; geometry: values that exact
+    readings without a cause give the calibration's parameters; zeros: of the drives by site; before_mm, after_mm: rms
+    at fresh stops of the calibrated and of the corrected sim, seen_mm: of the calibrated one at the file's rows;
+    still_mm: what a calibration of exact readings leaves without a cause; rows, stops: how many the file has; again:
+    stops were measured twice; payloads: how many different ones; turned: orientations were read; error_mm, position_mm
+    (rows, 3): exact errors of the calibrated sim, and where; payload_kg (rows,); places: of the targets by name;
+    given_mm, file_mm: rms at fresh stops of the robot's file as it came and as corrected, NaN where that is not known,
+    given_read_mm, file_read_mm: at the file's readings; drives_mm: rms of the robot about where `corrected_drives`
+    sends it.
+    """
+
+    effects: frozenset
+    outside: bool
+    leg: int
+    strength: float
+    chi2: float
+    numbers: dict
+    geometry: dict
+    zeros: dict
+    before_mm: float
+    after_mm: float
+    seen_mm: float
+    still_mm: float
+    noise_rms_mm: float
+    noise_mm: float
+    rows: int
+    stops: int
+    again: bool
+    payloads: int
+    turned: bool
+    error_mm: np.ndarray
+    position_mm: np.ndarray
+    payload_kg: np.ndarray
+    places: dict = field(default_factory=dict)
+    given_mm: float = np.nan
+    file_mm: float = np.nan
+    given_read_mm: float = np.nan
+    file_read_mm: float = np.nan
+    drives_mm: float = np.nan
+
+    @property
+    def acts(self):
+        """Whether anything does."""
+        return bool(self.effects) or self.outside
+
+    @property
+    def share(self):
+        """The cause's share of the gap at points that were left out: all but what noise does to the calibration."""
+        if not self.acts or not self.before_mm:
+            return 0.0
+        uncertain = self.noise_rms_mm**2 * len(self.geometry) / (3.0 * self.rows)
+        return float(np.clip(1.0 - uncertain / self.before_mm**2, 0.0, 1.0))
+
+
+def truth_of(draw, run, folder, gap):
+    """The Truth of a Draw whose Run was made in a folder; gap: the GapSettings."""
+    attribution = run.diagnosis.attribution
+    case, fresh = attribution.case, np.repeat(draw.stops.fresh, len(draw.targets))
+    poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
+    exact = _as_read(draw, run, draw.readings(poses), folder)
+    library = gap.library(case.mechanism)
+    # with the laws as they were fitted: all readings together might have more orders of a drive error function
+    whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
+    whole = replace(whole, library=whole.library | case.library)
+    count = len(exact)
+    before = whole.left(State(attribution.calibrated.deviations, {}))[:count]
+    after = whole.standing(attribution.state).left(attribution.state)[:count]
+    free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
+    geometry, without = _calibrated(free[~fresh], run)
+    _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
+    seen, name = before[~fresh], draw.cause.effect if draw.cause else None
+    held = name in library
+    noise_rms, chosen = float(np.sqrt(3.0) * draw.noise_mm), np.repeat(~draw.stops.fresh, len(draw.targets))
+    truth = Truth(
+        effects=frozenset([name] if held else []),
+        outside=name is not None and not held,
+        leg=draw.cause.leg if draw.cause else 0,
+        strength=_rms(left) / noise_rms,
+        chi2=float((left**2).sum() / draw.noise_mm**2),
+        numbers={name: draw.cause.numbers(draw.nominal)} if held else {},
+        geometry=dict(zip(case.mechanism.parameters.names, geometry.tolist(), strict=True)),
+        zeros=dict(zip([one.site for one in case.mechanism.parts.drives], draw.zeros.tolist(), strict=True)),
+        before_mm=_rms(before[fresh]),
+        after_mm=_rms(after[fresh]),
+        seen_mm=_rms(seen),
+        still_mm=_rms(without),
+        noise_rms_mm=noise_rms,
+        noise_mm=draw.noise_mm,
+        rows=int((~fresh).sum()),
+        stops=int((~draw.stops.fresh).sum()),
+        again=_measured_again(draw.stops),
+        payloads=len(np.unique(draw.stops.payload_kg[~draw.stops.fresh])),
+        turned=draw.reading == "pose",
+        error_mm=seen,
+        position_mm=rows.command(exact)[chosen],
+        payload_kg=exact["payload_kg"].to_numpy()[chosen],
+        places=dict(draw.targets),
+    )
+    return replace(truth, **_of_files(draw, run, exact, fresh), drives_mm=_of_drives(draw, run))
+
+
+def _rms(values):
+    """Root of the mean square of distances (n, 3), NaN for none."""
+    return float(np.sqrt((np.asarray(values) ** 2).sum(axis=1).mean())) if len(values) else np.nan
+
+
+def _measured_again(stops):
+    """Whether a stop of the file was measured again under the same load."""
+    own = np.column_stack([stops.drive, stops.payload_kg])[~stops.fresh]
+    return len(np.unique(own, axis=0)) < len(own)
+
+
+def _as_read(draw, run, readings, folder):
+    """Exact readings of all stops as a measurement table in the frame, and with the places, of the file's own."""
+    table = draw.table(readings, False)
+    # fresh stops lie between the others in time, and behind them in the file
+    draw.write(folder, table.assign(time_s=np.arange(len(table), dtype=float)), _ALL)
+    section = draw.section(folder, _ALL)
+    exact = page.read(section, draw.nominal.section(str(folder / draw.robot_file), draw.kind)).measurements
+    own, given = run.ingested.measurements, run.ingested.registration
+    seen, vectors = readings
+    exact = exact.assign(**rows.vector_columns("measured", given.apply(seen) if given else seen), status="ok")
+    exact = exact.assign(time_s=table["time_s"])
+    if "measured_rx_rad" in exact:
+        rotation = given.rotation if given else np.eye(3)
+        exact = exact.assign(**rows.turn_columns("measured", rotation @ turned(vectors) @ _seat(draw, own, rotation)))
+    if "target" in own:
+        first = own.drop_duplicates("target").set_index("target")
+        columns = [f"target_{axis}_mm" for axis in "xyz"]
+        exact = exact.assign(**{name: first.loc[exact["target"], name].to_numpy() for name in columns})
+    return exact
+
+
+def turned(vectors_rad):
+    """Rotations (m, 3, 3) of rotation vectors (m, 3)."""
+    return Rotation.from_rotvec(np.array(vectors_rad)).as_matrix()
+
+
+def _seat(draw, own, rotation):
+    """Rotation (3, 3) by which the file's turns have been turned back, as the instrument's target sits on the platform.
+
+    own: the file's measurement table; rotation (3, 3): of the registration.
+    """
+    noisy = draw.table(draw.readings(draw.poses()), True)[[f"measured_r{axis}_rad" for axis in "xyz"]].to_numpy()
+    back = (rotation @ turned(noisy[: len(own)])).transpose(0, 2, 1) @ rows.turns(own, "measured")
+    return Rotation.from_matrix(back).mean().as_matrix()
+
+
+def _calibrated(exact, run):
+    """Deviations (p,) of a plain calibration of exact readings, and what it leaves (n, 3) of the positions."""
+    case = run.diagnosis.attribution.case
+    own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, run.noise_mm, {}, True, case.arm_mm)
+    state = calibrate(own)
+    return np.asarray(state.deviations), own.left(state)[: len(exact)]
+
+
+def _of_files(draw, run, exact, fresh):
+    """Sizes of the robot's file as it came and as corrected, as fields of a Truth."""
+    result, written = {}, run.page.corrected
+    # where no place of the tool or of a target is stated, a file's tool may stand anywhere
+    if draw.reading == "found" or (draw.reading == "pose" and draw.registered):
+        return result
+    files = {"given": written.with_name(draw.robot_file)}
+    if not any(text.startswith("not corrected") for text in run.page.not_in_model):
+        files["file"] = written
+    measured, read = rows.measured(exact), rows.measured(run.ingested.measurements)
+    right = (run.ingested.measurements["status"] == "ok").to_numpy()
+    for key, file in files.items():
+        loops = draw.kind == "mjcf" and draw.nominal.formats == ("mjcf",)
+        gives = {one["name"] for one in run.page.facts["effects"]} & {"drive_compliance", "backlash"}
+        if key == "file" and draw.kind == "mjcf" and gives and (loops or has_play(file)):
+            continue
+        place, turn, sites = file_poses(file, draw, draw.stops.drive, draw.stops.payload_kg)
+        points = [sites.get(name, np.array(at)) if key == "file" else np.array(at) for name, at in draw.targets.items()]
+        seen = np.stack([place + turn @ point for point in points], axis=1).reshape(-1, 3)
+        left = (read - seen[~fresh])[right]
+        result |= {f"{key}_mm": _rms((measured - seen)[fresh]), f"{key}_read_mm": _rms(left)}
+    return result
+
+
+def _of_drives(draw, run):
+    """Rms of the robot about where `corrected_drives` sends it, NaN where the frame is not the robot's."""
+    table = run.page.tables["corrected_drives"]
+    drifts = draw.cause is not None and draw.cause.name == "base_drift"
+    if drifts or draw.plant == "mujoco" or draw.registered or draw.reading == "found" or not len(table):
+        return np.nan
+    columns = [f"corrected_{name}" for name in draw.nominal.columns]
+    drive, side = table[columns].to_numpy(), table["approach"].to_numpy()
+    before = drive - side[:, None] * np.array([_APPROACH[unit] for unit in draw.nominal.units])
+    path = np.stack([before, drive], axis=1).reshape(-1, drive.shape[1])
+    twice = {key: np.repeat(table[key].to_numpy(), 2) for key in ("payload_kg", "time_s")}
+    stops = Stops(path, twice["payload_kg"], twice["time_s"], np.zeros(len(path), dtype=bool))
+    place, _ = draw.poses(stops=stops)
+    rotation, shift = draw.frame
+    return _rms((place @ rotation.T + shift)[1::2] - rows.command(table))

@@ -1,0 +1,202 @@
+"""What is in a file of measurements, what will be used, what is missing and costs, and the overlay to paste.
+
+python -m rrru.studies.data_check.check_data FILE --robot rrru3 [--commands FILE] [--configfile mine.yaml]
+"""
+
+import argparse
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import yaml
+
+from rrru.campaign.ingest.columns import REQUIRED, resolve
+from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.sheet import COMMAND, position_text
+from rrru.campaign.ingest.spec import IngestSpec
+from rrru.campaign.stated_motion import STOP_AND_GO
+from rrru.errors import ConfigError, IngestError, RrruError
+from rrru.studies.checks import check_keys
+from rrru.studies.data_check.costs import costs, without_times
+from rrru.studies.data_check.propose import fitting_robots, propose
+
+_SHOWN = 8
+# a line of the overlay that is longer becomes several
+_WIDE = 110
+_UNFINISHED = (
+    "NOT ACCEPTED YET: a run refuses the file for what is listed above. Mend that first; so far the overlay is:"
+)
+# what only the user knows, with an example
+_UNREADABLE = {
+    "noise_mm": "0.02  # of the instrument, 1 sigma per axis; as it stands, the file tells it or it is estimated",
+    "platform_mass_kg": "3.0  # what the robot carries beside payload_kg: the platform or tool",
+}
+# what only the user knows of a robot that stops
+_BETWEEN = (
+    "motion: {kind: stop_and_go, between: drives}  # it moves from stop to stop joint by joint (PTP); "
+    "tool: in straight lines (LIN)"
+)
+_OPTIONAL = ("time_s", "speed_mm_s", "payload_kg")
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found of a file.
+
+    section: the campaign's section that is proposed; lines: what is said of it; refused: the problems that stay with
+    it, empty where ingest takes the file.
+    """
+
+    section: dict
+    lines: tuple[str, ...]
+    refused: tuple[dict, ...] = ()
+
+    @property
+    def overlay(self):
+        """The overlay to paste."""
+        return {"campaigns": {self.name: self.section}}
+
+    @property
+    def name(self):
+        """A name for the campaign."""
+        return "".join(one if one.isalnum() or one in "_-" else "_" for one in Path(self.section["ingest"]).stem)
+
+
+def check_file(file, config, robot=None, commands=None):
+    """The Check of a file for a robot of the configuration.
+
+    A campaign of the configuration with this file is taken as it stands, and what it lacks is proposed. Raises
+    IngestError for a file that cannot be read and ConfigError for a robot that does not exist.
+    """
+    section = next((one for one in config["campaigns"].values() if one.get("ingest") == str(file)), {})
+    told = {key: value for key, value in (("robot", robot), ("commands", commands)) if value}
+    given = {"robot": None, "ingest": str(file)} | section | told
+    if given["robot"] not in config["robots"]:
+        named = f"robot is {given['robot']!r}" if given["robot"] else "say which robot: ROBOT=.. (--robot ..)"
+        known = f"allowed: {', '.join(config['robots'])}, or one of your own with CONFIG=.. (--configfile ..)"
+        fitting = " and ".join(fitting_robots(given, config))
+        raise ConfigError(f"{named}; {known}" + (f"; this file fits {fitting}" if fitting else ""))
+    found = propose(given, config)
+    section, cells, mechanism, result = found.section, found.cells, found.mechanism, found.result
+    lines = [_content(section, cells), *_used(section, cells, mechanism)]
+    if result is None:
+        if lines[-1].startswith("missing:") and "time_s" in lines[-1]:
+            lines += [f"cost: {one}" for one in without_times(config, mechanism)]
+        fitting = fitting_robots(given, config)
+        if fitting and given["robot"] not in fitting:
+            lines.append(f"wrong robot? {given['robot']} does not fit this file, {' and '.join(fitting)} would")
+    else:
+        lines += [f"note: {note}" for note in result.notes]
+        lines += [f"cost: {one}" for one in costs(result.measurements, config, section)]
+    return Check(section, tuple(lines), found.refused)
+
+
+def _content(section, cells):
+    """What the file is."""
+    kind = section.get("format") or "as its ending says"
+    more = f", commands from {section['commands']}" if "commands" in section else ""
+    return f"{section['ingest']}: {len(cells.rows)} rows, {len(cells.names)} columns, format {kind}{more}"
+
+
+def _used(section, cells, mechanism):
+    """Which columns are used as what, left out, missing."""
+    spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
+    found, extra = resolve(spec, cells, mechanism, Problems(spec.path))
+    same = [ours for ours, theirs in found.items() if ours == theirs]
+    if same:
+        yield f"used: {', '.join(same)}"
+    yield from (f"used: {theirs!r} as {ours}" for ours, theirs in found.items() if ours != theirs)
+    left = [*cells.unused, *extra]
+    if left:
+        yield f"left out: {', '.join(left)}"
+    drives = set(mechanism.parts.columns) <= set(found)
+    missing = [ours for ours in REQUIRED if ours not in found and not (drives and ours.startswith("command"))]
+    if missing:
+        yield f"missing, and needed: {', '.join(missing)}"
+    if any(name.startswith("command") for name in missing):
+        other = f"the drives' values ({', '.join(mechanism.parts.columns)})"
+        yield f"where the robot was sent stands in no column: give a second file with --commands, or {other}"
+    yield from _meant(found, mechanism)
+    optional = [ours for ours in _OPTIONAL if ours not in found]
+    if optional:
+        yield f"missing: {', '.join(optional)}"
+
+
+def _meant(found, mechanism):
+    """What commanded positions and payloads are of."""
+    tool = f"the tool, {position_text(mechanism.tool_mm)} on the platform"
+    if set(COMMAND) <= set(found):
+        others = ", whatever target a row is of" if "target" in found else ""
+        yield f"meant: commanded positions are of {tool}{others}"
+    if "payload_kg" in found:
+        yield f"meant: payload_kg hangs at {tool}"
+
+
+def read_config(overlays, base="config.yaml"):
+    """The configuration under overlays; raises ConfigError for what is no YAML mapping."""
+    config = {}
+    check_keys((base, *overlays))
+    for file in (base, *overlays):
+        try:
+            section = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+            raise ConfigError(f"{file}: {' '.join(str(error).split())}; allowed: a YAML file") from error
+        if not isinstance(section, dict):
+            raise ConfigError(f"{file} holds {type(section).__name__}; allowed: a mapping of sections")
+        config = _merged(config, section)
+    return config
+
+
+def _merged(below, above):
+    """A mapping under another one."""
+    both = {
+        key: _merged(below[key], value) if isinstance(value, dict) and isinstance(below.get(key), dict) else value
+        for key, value in above.items()
+    }
+    return below | both
+
+
+def main(arguments=None):
+    """Print the check of a file; the exit code is 1 where ingest would refuse it, 2 where there is nothing to say."""
+    parser = argparse.ArgumentParser(prog="check_data", description=__doc__.splitlines()[0])
+    parser.add_argument("file")
+    parser.add_argument("--robot", help="entry of robots: in the configuration")
+    parser.add_argument("--commands", help="second file with what was commanded")
+    parser.add_argument("--configfile", nargs="*", default=[], help="overlays of config.yaml")
+    given = parser.parse_args(arguments)
+    try:
+        config = read_config(given.configfile)
+        found = check_file(given.file, config, given.robot, given.commands)
+    except RrruError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print("\n".join(found.lines))
+    for problem in found.refused[:_SHOWN]:
+        print(f"refused: {IngestError([problem])}")
+    if len(found.refused) > _SHOWN:
+        print(f"refused: {len(found.refused) - _SHOWN} problems more")
+    print(f"\n{_UNFINISHED if found.refused else 'overlay to paste:'}\n")
+    print(_pasted(found))
+    if not found.refused:
+        page, overlays = f"{config['results_dir'].rstrip('/')}/campaigns/{found.name}/report.html", given.configfile
+        print(f"# saved as mine.yaml: snakemake --cores 2 {page} --configfile {' '.join([*overlays, 'mine.yaml'])}")
+    return 1 if found.refused else 0
+
+
+def _pasted(found):
+    """The overlay as text, with what nobody can read from a file as comments."""
+    lines = ["campaigns:", f"  {yaml.safe_dump(found.name).splitlines()[0]}:"]
+    for key, value in found.section.items():
+        short, long = (
+            yaml.safe_dump({key: value}, sort_keys=False, allow_unicode=True, default_flow_style=flow, width=1000)
+            for flow in (None if isinstance(value, dict | list) else False, False)
+        )
+        lines += [f"    {line}" for line in (short if len(short) < _WIDE else long).splitlines()]
+    lines += [f"    # {key}: {words}" for key, words in _UNREADABLE.items() if key not in found.section]
+    if found.section.get("motion") == STOP_AND_GO:
+        lines.append(f"    # {_BETWEEN}")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

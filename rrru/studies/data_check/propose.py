@@ -1,0 +1,194 @@
+"""What a campaign's section lacks for its file to be read: found by trying, for the user to accept."""
+
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.driven_path import passes_points, stops
+from rrru.campaign.ingest.campaign_file import Ingested, ingest
+from rrru.campaign.ingest.cells import Cells
+from rrru.campaign.ingest.columns import convert, known_columns, resolve
+from rrru.campaign.ingest.commands import with_commands
+from rrru.campaign.ingest.formats import read_cells
+from rrru.campaign.ingest.geometry import frame_limit
+from rrru.campaign.ingest.guess import guess_clock, guess_columns, guess_format, guess_units
+from rrru.campaign.ingest.problems import Problems
+from rrru.campaign.ingest.sheet import COMMAND
+from rrru.campaign.ingest.spec import MM, RAD, IngestSpec
+from rrru.campaign.stated_motion import STOP_AND_GO
+from rrru.errors import IngestError, RrruError
+from rrru.kinematics.robot import Robot
+from rrru.studies import config as parts
+from rrru.studies import setup
+
+# points that tell whether a file is of a robot
+_PROBES = 20
+# share of them that a robot has to reach
+_MOST = 0.9
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """section: the campaign's section with what was found; cells: of the file; mechanism: the robot; result: what
+    ingest makes of it, None where it is refused; refused: its problems.
+    """
+
+    section: dict
+    cells: Cells
+    mechanism: Robot
+    result: Ingested | None
+    refused: tuple[dict, ...]
+
+
+def propose(section, config):
+    """The Proposal for a section that names file and robot; raises IngestError for a file that cannot be read."""
+    mechanism = setup.mechanism(parts.robot(config, section))
+    cells, section = _with_columns(_with_formats(section), mechanism)
+    return _with_motion(Proposal(*_fitting(section, cells, mechanism)))
+
+
+def _with_motion(found):
+    """The Proposal with a `motion` that nobody states: stop and go where several targets were read at a stop, or the
+    points follow no path.
+    """
+    if found.result is None or "motion" in found.section:
+        return found
+    table = found.result.measurements
+    if not (np.bincount(stops(table)) > 1).any() and passes_points(table):
+        return found
+    section = found.section | {"motion": STOP_AND_GO}
+    return replace(found, section=section, result=ingest(IngestSpec.from_config(section), found.mechanism))
+
+
+def fitting_robots(section, config):
+    """Names of the robots of the configuration that the file of a section may be of, the named one alone if it is:
+    those whose drive values bring them where it says, or which reach its commanded positions where it has no drives.
+    """
+    section = _with_formats(section)
+    machines = {name: setup.mechanism(parts.robot(config, {"robot": name})) for name in config["robots"]}
+    drives = {column for machine in machines.values() for column in machine.parts.columns}
+    named = machines.get(section["robot"])
+    if named is not None and _belongs(section, named, drives):
+        return [section["robot"]]
+    return [name for name, machine in machines.items() if _belongs(section, machine, drives)]
+
+
+def _with_formats(section):
+    """The section with the formats of the measured file and that of the commands, where they need one."""
+    for key, name in (("format", "ingest"), ("commands", "commands")):
+        section = _with_format(section, key, name)
+    return section
+
+
+def _with_format(section, key, name):
+    """The section with the format of the measured file, or that of the commands, if it needs one."""
+    given = section.get(name)
+    if given is None or (key in section and key == "format") or isinstance(given, dict):
+        return section
+    path = Path(given)
+    try:
+        found = guess_format(path, Problems(path))
+    except OSError:
+        return section
+    if found is None:
+        return section
+    return section | ({"format": found} if key == "format" else {"commands": {"file": given, "format": found}})
+
+
+def _with_columns(section, mechanism):
+    """Cells of the file, and the section with the columns that look like ours."""
+    spec = IngestSpec.from_config(section)
+    problems = Problems(spec.path)
+    cells = read_cells(Path(spec.path), spec.format, problems)
+    files = [cells]
+    if spec.commands:
+        files.append(read_cells(Path(spec.commands), spec.commands_format, Problems(spec.commands)))
+    columns = dict(section.get("columns", {}))
+    for one in files:
+        columns |= guess_columns(one, mechanism, columns)
+    section = section | ({"columns": columns} if columns else {})
+    clock = columns.get("time_s", cells.means.get("time_s", "time_s"))
+    pattern = next(filter(None, (guess_clock(one, clock) for one in files)), None)
+    if pattern and "time_format" not in section:
+        section = section | {"time_format": pattern}
+    spec = IngestSpec.from_config(section)
+    cells = with_commands(spec, cells, Problems(spec.path))
+    _, extra = resolve(replace(spec, extra_columns="ignore"), cells, mechanism, Problems(spec.path))
+    return cells, section | ({"extra_columns": "ignore"} if extra else {})
+
+
+def _found(section, cells, mechanism):
+    """{our name: the file's} of the columns of a section's file, and the section's IngestSpec."""
+    spec = replace(IngestSpec.from_config(section), extra_columns="ignore")
+    return resolve(spec, cells, mechanism, Problems(spec.path))[0], spec
+
+
+def _fitting(section, cells, mechanism):
+    """The parts of a Proposal under the first units and frame under which ingest takes the file.
+
+    Units and frame that are stated stay; those in the file's header are tried first. Where none fits the section has
+    those of the first attempt with the fewest problems of the whole file; what only single rows have no unit mends.
+    """
+    choices = {"frame": ("robot", "register"), "unit": tuple(MM), "angle_unit": tuple(RAD)}
+    usual = {key: values[0] for key, values in choices.items()}
+    told = guess_units(cells, _found(section, cells, mechanism)[0], mechanism)
+    choices |= {key: tuple(dict.fromkeys((unit, *choices[key]))) for key, unit in told.items()}
+    open_choices = [((section[key],) if key in section else values) for key, values in choices.items()]
+    attempts = []
+    for values in product(*open_choices):
+        chosen = dict(zip(choices, values, strict=True))
+        stated = section | {key: value for key, value in chosen.items() if key in section or value != usual[key]}
+        try:
+            return stated, cells, mechanism, ingest(IngestSpec.from_config(stated), mechanism), ()
+        except IngestError as error:
+            attempts.append((stated, cells, mechanism, None, error.problems))
+        if all(one["row"] is not None for one in attempts[-1][-1]):
+            break
+    return min(attempts, key=lambda attempt: _of_all_rows(attempt[-1]))
+
+
+def _of_all_rows(problems):
+    """How many problems are of all rows of a column: another unit or frame, not single cells."""
+    return sum(one["row"] is None and one["column"] is not None for one in problems)
+
+
+def _belongs(section, mechanism, drives):
+    """Whether a file may be of a robot, from some of its rows; drives: names of the columns of all robots."""
+    try:
+        cells, section = _with_columns(_of_robot(section, mechanism), mechanism)
+        found, spec = _found(section, cells, mechanism)
+        every = max(len(cells.rows) // _PROBES, 1)
+        few = replace(cells, rows=cells.rows[::every], cells={n: own[::every] for n, own in cells.cells.items()})
+        frame = convert(spec, mechanism, found, few, Problems(spec.path))
+    except RrruError:
+        return False
+    if not set(COMMAND) <= set(frame):
+        return set(mechanism.parts.columns) <= set(frame)
+    stated = section.get("unit"), section.get("angle_unit")
+    units = [MM[one] / MM[spec.unit] for one in ((stated[0],) if stated[0] else MM)]
+    angles = [RAD[one] / RAD[spec.angle_unit] for one in ((stated[1],) if stated[1] else RAD)]
+    if set(mechanism.parts.columns) <= set(frame):
+        return any(_driven_there(frame, mechanism, unit, angle) for unit, angle in product(units, angles))
+    if mechanism.orients or drives & set(cells.names):
+        return False
+    reached = (np.isfinite(mechanism.inverse(unit * rows.command(frame))).all(axis=1).mean() for unit in units)
+    return any(share > _MOST for share in reached)
+
+
+def _driven_there(frame, mechanism, unit, angle):
+    """Whether drive values bring a robot to the commanded positions, angles and lengths times factors."""
+    factors = [angle if one == "rad" else unit for one in mechanism.parts.units]
+    command = unit * rows.command(frame)
+    driven = mechanism.forward(frame[[*mechanism.parts.columns]].to_numpy() * factors, guess_mm=command)
+    return bool((np.linalg.norm(driven - command, axis=1) <= frame_limit(mechanism)).mean() > 0.5)
+
+
+def _of_robot(section, mechanism):
+    """The section with those columns alone that a robot may have."""
+    if "columns" not in section:
+        return section
+    known = known_columns(mechanism)
+    return section | {"columns": {ours: theirs for ours, theirs in section["columns"].items() if ours in known}}

@@ -1,0 +1,80 @@
+"""A robot's file as it came, calibrated and corrected, on a campaign that none of them has seen. Lengths in mm."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.correction.corrected_model import simulated
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.shrink import gap_rms
+from rrru.errors import ConfigError
+from rrru.formats.mjcf_writer import measured_tool_mm
+from rrru.robots.catalogue import make_mechanism
+
+
+def check(config):
+    """Raise ConfigError where `circle` names no campaign, or not twice the same robot of an MJCF."""
+    section = config.get("circle")
+    if not section:
+        return
+    for key in ("diagnosed", "fresh"):
+        if section[key] not in config["campaigns"]:
+            known = ", ".join(config["campaigns"])
+            raise ConfigError(f"circle.{key}: campaigns has no {section[key]!r}; known: {known}")
+    names = [config["campaigns"][section[key]]["robot"] for key in ("diagnosed", "fresh")]
+    if names[0] != names[1] or "mjcf" not in config["robots"][names[0]]:
+        raise ConfigError(f"circle: robots {' and '.join(names)}; allowed: one robot with an mjcf")
+    if section["calibration"] not in config["calibration"]["sets"]:
+        known = ", ".join(config["calibration"]["sets"])
+        raise ConfigError(f"circle.calibration: {section['calibration']!r}; known sets: {known}")
+
+
+def errors(fresh, nominal, masses, calibrated, corrected):
+    """Frame `circle_points` of a measurement table: what each model leaves of every usable point.
+
+    nominal: the robot's part of the configuration, of an MJCF; calibrated: its Robot and deviations; corrected: path of
+    the corrected MJCF. Points of which a model says nothing are left out. Raises ConfigError where more than the tool's
+    position was read, SimulationError or UnreachableError where MuJoCo cannot drive a file.
+    """
+    if rows.readings(fresh) is not None:
+        raise ConfigError(f"circle: {nominal['name']}'s fresh campaign has more than positions; allowed: of the tool")
+    name, section, (robot, deviations) = nominal["name"], nominal["dimensions"], calibrated
+    own = section | {"mjcf": str(corrected)}
+    if (tool_mm := measured_tool_mm(corrected)) is not None:
+        own["tool_mm"] = tool_mm.tolist()
+    given, other = (make_mechanism(name, one, parameter_set="frame") for one in (section, own))
+    case = make_case(fresh, given, masses, 1.0, {})
+    models = {
+        "given": _driven(case.motion, given, section),
+        "calibrated": robot.forward(rows.actuators(fresh, robot), deviations, rows.command(fresh)),
+        "corrected": _driven(case.motion, other, own),
+    }
+    left = {model: rows.measured(fresh) - position for model, position in models.items()}
+    # the sense of arrival of a drive is unknown at a run's first point and next to a reversal
+    known = ~np.isfinite(case.motion.approach).any(axis=1)
+    used = case.used & known & np.isfinite(list(left.values())).all(axis=(0, 2))
+    named = fresh.loc[used, ["run", "trajectory", "point"]]
+    frames = []
+    for model, error in left.items():
+        columns = rows.vector_columns("error", error[used])
+        frames.append(named.assign(model=model, **columns, error_mm=np.linalg.norm(error[used], axis=1)))
+    return pd.concat(frames, ignore_index=True)
+
+
+def sizes(points, effects, noise_mm):
+    """Frame `circle` without its campaigns from `circle_points`; effects: what the diagnosis found; noise per axis."""
+    result, noise = [], float(np.sqrt(3.0) * noise_mm)
+    for model, own in points.groupby("model", sort=False):
+        squares = own["error_mm"] ** 2
+        told = {"model": model, "effects": effects if model == "corrected" else "none", "points": len(own)}
+        lengths = {"rms_mm": float(np.sqrt(squares.mean())), "max_mm": own["error_mm"].max()}
+        result.append(told | lengths | {"noise_rms_mm": noise, "gap_rms_mm": gap_rms(squares - noise**2)})
+    return pd.DataFrame(result)
+
+
+def _driven(motion, robot, section):
+    """Positions (n, 3) of the tool where MuJoCo drives a robot's file along a Motion."""
+    poses, twists = simulated(motion, robot, Path(section["mjcf"]), section["platform"])
+    return robot.measured(poses, twists)

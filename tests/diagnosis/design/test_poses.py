@@ -1,0 +1,259 @@
+"""Expected information against least squares and brute force, and poses that tell what no trajectory does."""
+
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+
+from rrru.campaign.ingest.campaign_file import ingest
+from rrru.campaign.ingest.spec import IngestSpec
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.design import poses
+from rrru.diagnosis.design.advise import advise
+from rrru.diagnosis.design.expected_information import Sums, greedy, reachable
+from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.diagnosis.inference import Attribution
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.model_space import explore
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.state import State
+from rrru.diagnosis.verdict import Verdict, decide
+from rrru.effects.library import find
+from rrru.effects.protocol import Coordinates
+from rrru.errors import FitError
+from rrru.parameters import ParameterSet
+from rrru.robots.hexapod import hexapod
+from rrru.studies.setup import as_measured
+from tests.diagnosis import arms, hexapod_stops
+from tests.diagnosis.campaigns import EFFECTS, LINES, MASSES, SIM, case_of, measure, plan_of, strong
+
+_NOISE_MM = 0.02
+
+
+def _candidates(seed, count=8, numbers=4):
+    """Designs (5, 3, k) and data (5, 3) of made-up candidates."""
+    generator = np.random.default_rng(seed)
+    return [
+        (generator.standard_normal((5, 3, numbers)), 0.03 * generator.standard_normal((5, 3))) for _ in range(count)
+    ]
+
+
+def _left(parts):
+    """Half the least squares that the designs of some candidates together leave of their data, in nats."""
+    design = np.concatenate([one.reshape(-1, one.shape[-1]) for one, _ in parts]) / _NOISE_MM
+    data = np.concatenate([one.ravel() for _, one in parts]) / _NOISE_MM
+    return 0.5 * ((data - design @ np.linalg.lstsq(design, data, rcond=None)[0]) ** 2).sum()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_each_pose_is_the_best_one_beside_those_before_it(seed):
+    first, *others = _candidates(seed)
+    chosen, gain = greedy(Sums.of(*first, _NOISE_MM), [Sums.of(*one, _NOISE_MM) for one in others], 3)
+    taken = [first]
+    for number in chosen:
+        gains = [-np.inf if any(one is t for t in taken) else _left([*taken, one]) for one in others]
+        assert number == np.argmax(gains)
+        taken.append(others[number])
+    assert gain == pytest.approx(_left(taken) - _left([first]), rel=1e-6)
+    best = max(_left([first, *three]) for three in combinations(others, 3)) - _left([first])
+    assert 0.8 * best < gain <= best * (1.0 + 1e-9)
+
+
+def test_further_points_never_take_information_away():
+    first, *others = _candidates(9, 200)
+    now = Sums.of(*first, _NOISE_MM)
+    assert min((now + Sums.of(*one, _NOISE_MM)).nats() for one in others) >= now.nats()
+    # what the design itself can make tells nothing
+    made = others[0][0], others[0][0] @ np.ones(4)
+    assert (Sums.of(*made, _NOISE_MM) + Sums.of(*made, _NOISE_MM)).nats() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_passes_lie_between_measured_points_within_reach():
+    frame = measure(plan=plan_of(trajectories=LINES[1:]))
+    passes = poses.passes(frame, SIM)
+    start, end = passes.start_mm, passes.end_mm
+    points = poses.points_of(start, end).reshape(-1, 3)
+    known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
+    assert len(start) > 20 and np.isfinite(SIM.inverse(points)).all()
+    assert (points >= known.min(axis=0) - 1e-9).all() and (points <= known.max(axis=0) + 1e-9).all()
+    np.testing.assert_allclose(np.linalg.norm(end - start, axis=1), OPTIONS.pass_length_mm)
+    near, *_ = SIM.singularities(points, SIM.inverse(points))
+    own, *_ = SIM.singularities(known, SIM.inverse(known))
+    assert near.min() > 0.75 * own.min()
+
+
+@dataclass(frozen=True)
+class LocalCompliance:
+    """A drive that gives way as `drive_compliance` does, but not in the middle between two lines."""
+
+    name: str = "local_compliance"
+    parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
+    coordinates: Coordinates = EFFECTS["drive_compliance"].coordinates
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Changes (n, 3) of the drive angles."""
+        outside = np.abs(motion.position_mm[:, 1:2]) > 60.0
+        return motion.at_drives(np.asarray(values) * motion.drive_load * outside)
+
+
+@pytest.fixture(scope="module")
+def rivals():
+    """Attribution and verdict of a campaign of two lines, at y = 110 mm and -110 mm, of effects that differ between
+    these alone.
+    """
+    library = {"drive_compliance": EFFECTS["drive_compliance"], "local_compliance": LocalCompliance()}
+    case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
+    calibrated = calibrate(case)
+    evidence = case.evidence(case.linearise(calibrated))
+    beliefs = explore(evidence, Prior())
+    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    verdict = decide(beliefs, library)
+    assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
+    return found, verdict
+
+
+@pytest.fixture(scope="module")
+def between(rivals):
+    """The Advice for it."""
+    return advise(*rivals, MASSES)
+
+
+def test_advised_poses_keep_the_limits(between, rivals):
+    few = advise(*rivals, MASSES, StatedLimits(payload_kg=2.0, speed_mm_s=150.0, minutes=0.2))
+    (row,) = few.runs.to_dict("records")
+    assert row["kind"] == "poses" and 1 <= len(few.poses) < len(between.poses)
+    assert row["points"] == OPTIONS.points_per_pass * len(few.poses) and row["gain_nats"] > 0.2
+    assert (few.poses["payload_kg"] <= 2.0).all() and (few.poses["speed_mm_s"] <= 150.0).all()
+    none = advise(*rivals, MASSES, StatedLimits(minutes=0.01))
+    assert not len(none.runs) and not len(none.poses) and "local_compliance" in none.undecided
+    assert none.limited == "runs are proposed within the limits minutes 0.01"
+
+
+def test_poses_tell_what_no_trajectory_does(between):
+    assert between.runs["kind"].tolist() == ["poses"]
+    assert between.runs["separates"].str.contains("local_compliance").all()
+    row, listed = between.runs.iloc[0], between.poses
+    assert row["gain_nats"] > 3.0 and row["points"] == OPTIONS.points_per_pass * len(listed) and 1 < len(listed) <= 10
+    assert listed["pose"].tolist() == list(range(1, len(listed) + 1))
+    middle = (listed["from_y_mm"] + listed["to_y_mm"]) / 2.0
+    # the first one crosses where they differ
+    assert abs(middle.iloc[0]) < 60.0 + OPTIONS.pass_length_mm / 2.0
+
+
+@dataclass(frozen=True)
+class ComplianceOutside:
+    """A drive of an arm that gives way as `drive_compliance` does, but not within 150 mm of the plane y = 0."""
+
+    name: str = "compliance_outside"
+    parameters: ParameterSet = find("drive_compliance", arms.ARM).parameters
+    coordinates: Coordinates = find("drive_compliance", arms.ARM).coordinates
+    needs: tuple = ()
+
+    def contribute(self, motion, values):
+        """Changes (n, 6) of the drive angles."""
+        outside = np.abs(motion.position_mm[:, 1:2]) > 150.0
+        return motion.at_drives(np.asarray(values) * motion.drive_load * outside)
+
+
+def _arm_stops(effects=()):
+    """Stops of an arm, read with orientations, none of them within 150 mm of the plane y = 0."""
+    frame = arms.measure(effects, 400).assign(payload_kg=0.0)
+    return frame[frame["command_y_mm"].abs() > 150.0].reset_index(drop=True)
+
+
+def test_a_platform_that_the_drives_orient_keeps_the_orientation_that_was_commanded_next_to_a_pass():
+    frame = _arm_stops()
+    robot = arms.reading(frame)
+    passes = poses.passes(frame, robot)
+    points = poses.points_of(passes.start_mm, passes.end_mm)
+    assert len(passes) > 20 and passes.reads_turns
+    drives = passes.drives.reshape(-1, arms.DRIVES)
+    np.testing.assert_allclose(robot.forward(drives), points.reshape(-1, 3), atol=1e-6)
+    turn = robot.solve(drives, points.reshape(-1, 3)).turn.reshape(*points.shape[:2], 3, 3)
+    np.testing.assert_allclose(turn, np.broadcast_to(passes.turn[:, None], turn.shape), atol=1e-9)
+    known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
+    nearest = np.linalg.norm(known - passes.start_mm[:, None], axis=2).argmin(axis=1)
+    commanded = robot.solve(frame[robot.parts.columns].to_numpy(), known).turn
+    np.testing.assert_allclose(passes.turn, commanded[nearest], atol=1e-9)
+    low, high = robot.drive_range.T
+    assert ((drives >= low - 1e-9) & (drives <= high + 1e-9)).all()
+    # no wrist turns over on the way
+    assert np.abs(np.diff(passes.drives, axis=1)).max() < OPTIONS.max_pass_step_rad
+
+
+def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
+    own = find("drive_compliance", arms.ARM)
+    frame = _arm_stops((arms.active("drive_compliance", 3.0 * own.coordinates.typical * np.ones(arms.DRIVES)),))
+    library = {"drive_compliance": own, "compliance_outside": ComplianceOutside()}
+    case = arms.case_of(frame, library=library)
+    calibrated = calibrate(case)
+    evidence = case.evidence(case.linearise(calibrated))
+    beliefs = explore(evidence, Prior())
+    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
+    verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
+    advice = advise(found, verdict, arms.MASSES)
+    best, listed = advice.runs.iloc[0], advice.poses
+    assert best["kind"] == "poses" and best["gain_nats"] > OPTIONS.decisive_gain_nats and advice.undecided == ""
+    turned = listed[[f"command_r{axis}_rad" for axis in "xyz"]]
+    assert turned.notna().all(axis=None) and len(turned.drop_duplicates()) > 1
+    # the first one crosses where they differ
+    assert abs(listed[["from_y_mm", "to_y_mm"]].iloc[0]).min() < 150.0
+
+
+def test_of_several_targets_the_one_that_was_read_most_is_read_at_a_pose(tmp_path):
+    file = tmp_path / "mine.csv"
+    hexapod_stops.file_of("random", "tool").drop(index=[0, 2]).to_csv(file, index=False)
+    robot = hexapod(
+        hexapod_stops.BASE, hexapod_stops.PLATFORM, hexapod_stops.HEIGHT_MM, stroke_mm=200.0, parameter_set="zero"
+    )
+    spec = IngestSpec.from_config({"ingest": str(file), "targets": hexapod_stops.PLACES})
+    frame = ingest(spec, robot).measurements
+    robot = as_measured(robot, frame, tuple(hexapod_stops.PLACES))
+    passes = poses.passes(frame, robot)
+    table = passes.commands(robot, 0.0, 80.0, 0.0)
+    assert len(passes) > 20 and set(table["target"]) == {"b"} and not passes.reads_turns
+    np.testing.assert_allclose(table[[f"target_{axis}_mm" for axis in "xyz"]].iloc[0], hexapod_stops.PLACES["b"])
+    case = make_case(table, robot, MASSES, hexapod_stops.NOISE_MM, {})
+    assert case.count == len(table) == OPTIONS.points_per_pass * len(passes)
+    on_world = frame.assign(target_on="world")
+    assert len(poses.passes(on_world, robot)) == 0
+
+
+def test_poses_are_as_many_as_the_time_allows():
+    passes = poses.passes(measure(plan=plan_of(trajectories=LINES[1:])), SIM)
+    order = [3, 0, 5, 1]
+    way = [np.linalg.norm(passes.start_mm[b] - passes.end_mm[a]) for a, b in pairwise(order)]
+    seconds = np.cumsum([200.0, *(200.0 + one for one in way)]) / 50.0
+    for count, limit in enumerate(seconds):
+        assert passes.within(order, 50.0, limit - 1e-6) == count
+    assert passes.within(order, 50.0, np.inf) == passes.within(order, np.nan, 1.0) == 4
+
+
+def test_points_at_which_the_corrected_model_has_no_pose_are_left_out_of_what_runs_are_worth():
+    """A leg that is much too short reaches some of the points only."""
+    case = case_of(measure(plan=plan_of(trajectories=LINES[1:])), {"leg_asymmetry": EFFECTS["leg_asymmetry"]})
+    plain = calibrate(case)
+    for shift_mm in np.linspace(-50.0, -700.0, 66):
+        state = State(plain.deviations, {("leg_asymmetry", 0): np.tile([0.0, 0.0, shift_mm], 3)})
+        posed = np.isfinite(case.residual(state)).all(axis=1)
+        if 0 < posed.sum() < len(posed):
+            break
+    assert 0 < posed.sum() < len(posed)
+    with pytest.raises(FitError, match="no pose"):
+        case.linearise(state, [])
+    reached = reachable(case, state)
+    assert reached.count == posed.sum()
+    assert np.isfinite(reached.linearise(state, []).data).all()
+    assert reachable(case, plain) is case
+
+
+def test_a_box_smaller_than_a_pass_has_none():
+    frame = measure(plan=plan_of(trajectories=LINES[1:]))
+    known = frame[[f"command_{axis}_mm" for axis in "xyz"]].to_numpy()
+    near = frame[np.abs(known - known[0]).max(axis=1) < 0.5 * OPTIONS.pass_length_mm / np.sqrt(3.0)]
+    assert len(near) > 1 and len(poses.passes(near, SIM)) == 0

@@ -1,0 +1,245 @@
+"""From which side drives come to readings: what the rows determine, what the readings do, and what is done without."""
+
+from dataclasses import replace
+from itertools import product
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.approach_direction import at_reversals, read_back_jitter, rest_widths
+from rrru.diagnosis.determined import require_determined
+from rrru.diagnosis.diagnose import sim
+from rrru.diagnosis.inference import attribute
+from rrru.diagnosis.make_problem import make_case
+from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.problem import GEOMETRY
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.state import State
+from rrru.effects.backlash import play
+from rrru.effects.library import find
+from rrru.effects.protocol import together
+from rrru.errors import FitError
+from rrru.kinematics.inverse import drives_at
+from rrru.studies.setup import as_measured
+from tests.diagnosis import arms
+from tests.diagnosis.campaigns import ROBOT, active, case_of, measure, plan_of, robot_of, strong
+
+ERRORS = np.array([2e-3, -1e-3, 1.5e-3, 0.4, -0.3, 0.5, 0.2])
+WIDTHS = np.full(3, 1e-8)
+
+
+@pytest.mark.parametrize("jitter", [1e-6, 1e-5, 1e-4])
+def test_the_jitter_of_a_drive_is_found_beside_its_motion(jitter):
+    """A swing of 40 points a period, a slow drive and one at rest, in runs of 30 points."""
+    steps, generator = np.arange(300), np.random.default_rng(1)
+    drive = np.stack([0.3 * np.sin(2.0 * np.pi * steps / 40.0), 1e-3 * steps, np.zeros(300)], axis=1)
+    found = read_back_jitter(drive + jitter * generator.standard_normal(drive.shape), steps // 30)
+    np.testing.assert_allclose(found, jitter, rtol=0.4)
+
+
+@pytest.mark.parametrize("period", [3.0, 5.0, 7.0, 12.0, 40.0])
+def test_a_motion_without_jitter_has_none(period):
+    """However few of its points are read; rounding is left of a smooth one."""
+    drive = 0.3 * np.sin(2.0 * np.pi * np.arange(300)[:, None] / period)
+    assert rest_widths(drive, np.arange(300) // 30, ("rad",)) == 1e-8
+
+
+def _swing(shift):
+    """Path (97, 3) on which one drive swings as a sine, its crest `shift` rows after a reading, and readings' rows."""
+    steps = np.arange(97)
+    path = np.stack([1e-3 * steps, 0.2 * np.cos(np.pi * (steps - 24.0 - shift) / 48.0), 1e-3 * steps], axis=1)
+    return path, np.arange(0, 97, 8)
+
+
+def test_a_drive_that_turns_back_at_a_reading_leaves_its_sense_open_and_one_between_two_does_not():
+    for shift, unknown in ((0.0, [3, 9]), (4.0, [])):
+        path, index = _swing(shift)
+        found = at_reversals(SimpleNamespace(path_drive=path, path_index=index, drive=path[index]), path, WIDTHS)
+        assert np.flatnonzero(found[:, 1]).tolist() == unknown and not found[:, [0, 2]].any()
+
+
+def test_where_two_interpolations_are_apart_none_tells_where_a_drive_turns_back():
+    """One crest lies half a step beside a reading, by another path a quarter: both readings beside it are open."""
+    path, index = _swing(4.0)
+    other, between = path.copy(), slice(25, 32)
+    course = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
+    assert not at_reversals(course, other, WIDTHS).any()
+    other[between] = _swing(2.0)[0][between]
+    assert np.flatnonzero(at_reversals(course, other, WIDTHS).any(axis=1)).tolist() == [3, 4]
+
+
+def test_what_jitters_does_not_turn_back():
+    """A slow drive read with a jitter of a fifth of its steps: each of its readings has one sense."""
+    path, index = _swing(4.0)
+    path[:, 0] = 1e-6 * np.arange(97) + 2e-5 * np.random.default_rng(2).standard_normal(97)
+    course = SimpleNamespace(path_drive=path, path_index=index, drive=path[index])
+    assert at_reversals(course, path, WIDTHS)[:, 0].sum() > 5
+    assert not at_reversals(course, path, np.array([1.2e-4, 1e-8, 1e-8])).any()
+
+
+def _driven(effects, widths):
+    """A campaign's case, and the sense (n, 3) in which the drives of the robot came to its points."""
+    case = case_of(measure(effects))
+    driven = robot_of().motion(plan_of(), ROBOT.inverse)
+    share = play(np.ascontiguousarray(driven.path_drive), 0.5 * widths)[driven.path_index] / (-0.5 * widths)
+    return case, share
+
+
+def test_known_senses_are_those_that_were_driven_and_open_ones_are_found_from_strong_play():
+    widths = np.array([2e-3, 2e-3, 2e-3])
+    case, share = _driven((active("backlash", widths),), widths)
+    state = State(ERRORS, {("backlash", 0): widths})
+    motion, known = case.motion, case.known["backlash"]
+    own = play(np.ascontiguousarray(motion.path_drive), 0.5 * widths)[motion.path_index] / (-0.5 * widths)
+    # the path between the points is an interpolation
+    np.testing.assert_allclose(own[known], share[known], atol=0.1)
+    found = case.with_approach(state).motion.approach
+    unknown = np.isfinite(found)
+    assert unknown.sum() > 30 and (np.abs(found[unknown] - share[unknown]) < 0.2).mean() > 0.9
+
+
+def test_expected_senses_are_those_of_all_combinations_one_by_one():
+    widths = np.array([1e-4, 3e-4, 2e-4])
+    case, _ = _driven((active("backlash", widths),), widths)
+    state = State(ERRORS, {("backlash", 0): widths})
+    found = case.with_approach(state).motion.approach
+    point = 0
+    weights, senses = [], []
+    for sense in product((-1.0, 1.0), repeat=3):
+        approach = case.motion.approach.copy()
+        approach[point] = sense
+        left = replace(case, motion=replace(case.motion, approach=approach)).residual(state)[point]
+        weights.append(np.exp(-0.5 * (left**2).sum() / case.noise_mm**2))
+        senses.append(sense)
+    expected = np.average(senses, axis=0, weights=weights)
+    np.testing.assert_allclose(found[point], expected, atol=0.02)
+
+
+def _open(case, share, seed=0):
+    """The case with the senses of a share of its points open, too, whatever its rows determine."""
+    approach, made = case.motion.approach.copy(), case.motion_at
+    approach[np.random.default_rng(seed).random(len(approach)) < share] = 0.0
+
+    def motion_at(*stands):
+        return replace(made(*stands), approach=approach)
+
+    known = {"backlash": np.isnan(approach).all(axis=1)}
+    return replace(case, motion=motion_at(), motion_at=motion_at, known=known)
+
+
+@pytest.mark.parametrize("acting", [(), ("backlash",), ("drive_compliance",), ("encoder_eccentricity", "backlash")])
+def test_open_senses_change_no_verdict_and_every_reading_counts(acting):
+    """At two thirds of the points nobody knows the senses; the robot's errors are found as if they were known."""
+    frame = measure(tuple(strong(name, 4.0) for name in acting))
+    found = attribute(_open(case_of(frame), 0.66), Prior())
+    assert found.case.count == len(frame) and found.case.known["backlash"].mean() < 0.35
+    assert found.hypothesis.effects == set(acting) and found.posterior.marginal("backlash") > 0.9 * (
+        "backlash" in acting
+    )
+    # the open senses are found where play acts: no more than the noise is left
+    assert np.sqrt((found.case.residual(found.state) ** 2).mean()) < 1.2 * found.case.noise_mm
+
+
+def test_a_set_that_imitates_play_does_not_win_by_the_readings_of_open_senses():
+    """A law of the drives' values may explain readings at which play says nothing: that is none of its merits."""
+    case = _open(case_of(measure((strong("backlash", 4.0),))), 0.66)
+    found = attribute(case, Prior()).posterior
+    assert found.sets()[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
+
+
+def _along_lines(effects, jitter_rad, seed=4):
+    """Table of a six-axis arm along lines in steps of 5 mm there and back, its joint values read back with jitter."""
+    generator, arm = np.random.default_rng(seed), arms.ARM
+    lines = []
+    for _ in range(5):
+        low, high = arm.drive_range.T
+        start = np.concatenate([0.6 * low[:3] + 0.4 * high[:3], [0.3, 0.8, -0.4]]) + 0.5 * generator.random(6)
+        at = arm.solve(start[None], arm.forward(start[None]))
+        way = generator.standard_normal(3)
+        line = arm.forward(start[None]) + 5.0 * np.arange(24)[:, None] * way / np.linalg.norm(way)
+        turn = np.broadcast_to(at.turn, (len(line), 3, 3))
+        near = np.repeat(start[None], len(line), axis=0), np.repeat(line[:1], len(line), axis=0)
+        drive = drives_at(arm, (line, turn), near, arm.twists(), False)
+        lines += [drive, drive[::-1]]
+    run = np.repeat(np.arange(1, len(lines) + 1), [len(line) for line in lines])
+    drive = np.concatenate(lines)
+    frame = arms.commands(drive).assign(run=run)
+    told = rows.vector_columns("measured", rows.command(frame))
+    motion = make_case(frame.assign(**told), arm, arms.MASSES, 1.0, {}).motion
+    # the robot itself knows how it came
+    motion = replace(motion, approach=np.full_like(motion.drive, np.nan))
+    twists = arm.twists_of(arms.ERRORS) + together(effects, motion).twists
+    poses = arm.solve(drive, rows.command(frame), twists)
+    measured = arm.measured(poses, twists) + arms.NOISE_MM * generator.standard_normal((len(drive), 3))
+    read = drive + jitter_rad * generator.standard_normal(drive.shape)
+    known = dict(zip(arm.parts.columns, read.T, strict=True)) | rows.vector_columns("command", arm.forward(read))
+    return frame.assign(**known, **rows.vector_columns("measured", measured))
+
+
+def _of_arm(frame, *names):
+    """The case of an arm's table, with all that its readings tell."""
+    library = {name: find(name, arms.ARM) for name in names}
+    robot = as_measured(replace(arms.ARM, parameter_set="full"), frame, (), False)
+    return require_determined(make_case(frame, sim(robot), arms.MASSES, arms.NOISE_MM, library))
+
+
+@pytest.fixture(scope="module")
+def along_lines():
+    """Attributions of one robot by its joint values as driven, and as read back with a jitter of 1e-5 rad."""
+    names, acting = ("backlash", "encoder_eccentricity"), (arms.active("backlash", np.full(6, 1.5e-3)),)
+    return [attribute(_of_arm(_along_lines(acting, jitter), *names), Prior()) for jitter in (0.0, 1e-5)]
+
+
+def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
+    plain, jittered = along_lines
+    # at the very first reading the simulated play is in its middle, which is no side
+    assert plain.case.used[1:].all() and jittered.case.used[1:].all()
+    assert jittered.case.known["backlash"].mean() > 0.8 * plain.case.known["backlash"].mean() > 0.5
+    assert plain.hypothesis.effects == jittered.hypothesis.effects == {"backlash"}
+    first, second = (np.nan_to_num(found.fit.estimate.block_errors(GEOMETRY)) for found in along_lines)
+    off = (plain.state.deviations - jittered.state.deviations) / np.hypot(first, second)
+    assert np.sqrt((off**2).mean()) < 1.5
+
+
+def test_where_hardly_a_sense_is_known_only_play_is_not_tested():
+    """At 5 of 250 stops: all readings find the compliance, and a sentence says why play was not looked for."""
+    stiff = np.array([0.0, 6e-9, 1.2e-8, 0.0, 2e-8, 0.0])
+    frame = arms.measure((arms.active("drive_compliance", stiff),), 250)
+    frame["run"] = np.maximum(np.arange(len(frame)) - 4, 1)
+    case = require_determined(arms.case_of(frame, "backlash", "drive_compliance", "read_before_rest"))
+    assert case.used.all() and set(case.effects) == {"drive_compliance", "read_before_rest"}
+    assert "is known at 5 of 250 points; allowed: at least 50% of them" in case.untestable["backlash"]
+    found = attribute(case, Prior())
+    assert found.hypothesis.effects == {"drive_compliance"} and found.case.count == 250
+
+
+def test_too_few_readings_are_refused_with_what_to_do():
+    frame = arms.measure((), 10)
+    case = arms.case_of(frame)
+    count = len(case.mechanism.parameters)
+    least = count + OPTIONS.min_spare_numbers
+    more = int(np.ceil((least - 30) / 3.0))
+    told = f"30 numbers read at 10 poses .* {count} parameters; .* least {least}: measure {more} more"
+    with pytest.raises(FitError, match=told):
+        require_determined(arms.case_of(frame.drop(columns=[f"measured_r{axis}_rad" for axis in "xyz"])))
+
+
+def test_poses_that_leave_a_number_open_are_diagnosed_as_far_as_they_determine_it():
+    case = arms.case_of(arms.measure((), 200))
+    same = {name: case.measurements[name].iloc[0] for name in arms.ARM.parts.columns[:2]}
+    still = case.measurements.assign(**same)
+    drive = rows.actuators(still, arms.ARM)
+    place, generator = arms.ARM.forward(drive), np.random.default_rng(1)
+    seen = place + arms.NOISE_MM * generator.standard_normal(place.shape)
+    still = still.assign(**rows.vector_columns("command", place), **rows.vector_columns("measured", seen))
+    still = still.drop(columns=[name for name in still if name.startswith("measured_r")])
+    open_case = require_determined(arms.case_of(still))
+    fit = fit_model(open_case, [State(np.zeros(len(open_case.mechanism.parameters)), {})])
+    errors = fit.estimate.standard_errors
+    assert fit.estimate.rank < len(errors) and np.isfinite(errors).all()
+    # what the poses do not determine has the error of its prior
+    unseen = np.abs(fit.estimate.null_space).sum(axis=0) > 0.0
+    assert (errors[unseen] > 0.1 * fit.estimate.parameters.sd[unseen]).any()

@@ -1,0 +1,142 @@
+"""The diagnosis of a six-axis arm at stops in no order: rough functions of the drives and sharp waves told apart."""
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
+from rrru.effects import drive_error_function
+from rrru.effects.library import find
+from tests.diagnosis import arms
+
+_LAWS = (
+    "drive_error_function",
+    "transmission_orders",
+    "transmission_error",
+    "drive_compliance",
+    "encoder_eccentricity",
+)
+_COUNT = 200
+
+
+@pytest.fixture(autouse=True)
+def few_orders(monkeypatch):
+    """Rough functions of sixteen waves per turn: 192 numbers, which 200 stops tell."""
+    monkeypatch.setattr(drive_error_function, "ORDERS", np.arange(1, 17))
+
+
+def _diagnosed(acting, seed):
+    frame = arms.measure(acting, _COUNT, seed)
+    robot = MeasuredRobot(arms.reading(frame), arms.MASSES, arms.NOISE_MM, "arm", arms.NOISE_RAD)
+    return diagnose(frame, robot, GapSettings(_LAWS, draws=10), details=False)
+
+
+def test_distances_are_those_of_positions_where_orientations_are_read_too():
+    """Turns of a precise instrument weigh 5 m: mixed with positions they would state eleven times the distance."""
+    law = find("encoder_eccentricity", arms.ARM)
+    acting = arms.active("", np.full(len(law.coordinates), 4e-4), {}, law)
+    noise = arms.NOISE_MM, 4e-6
+    frame = arms.measure((acting,), _COUNT, 1, noise)
+    robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
+    found = diagnose(frame, robot, GapSettings(("encoder_eccentricity",), draws=50))
+    case = found.attribution.case
+    assert case.arm_mm == pytest.approx(5000.0)
+    left = case.left(found.attribution.calibrated)[: len(frame)]
+    squares = (left**2).sum(axis=1) - 3.0 * noise[0] ** 2
+    true = np.sqrt(squares.mean())
+    assert found.verdict["gap_rms_mm"] == pytest.approx(true, rel=0.1)
+    assert found.verdict["gap_after_rms_mm"] < noise[0]
+    shrink, budget, places = (found.tables[name] for name in ("gap_shrink", "gap_budget", "gap_locate"))
+    assert (shrink["points"] == len(frame)).all()
+    assert shrink.query("kind == 'resimulated'")["rms_mm"].item() == pytest.approx(np.sqrt(3.0) * noise[0], rel=0.15)
+    effect = budget.query("part == 'encoder_eccentricity'").iloc[0]
+    assert effect["rms_mm"] == pytest.approx(true, rel=0.1) and effect["share"] == pytest.approx(1.0, abs=0.1)
+    assert budget["share"].sum() == pytest.approx(1.0)
+    axes = places.query("factor == 'direction'")
+    np.testing.assert_allclose(axes["rms_mm"], np.sqrt((left**2).mean(axis=0)))
+    assert axes["share"].sum() == pytest.approx(1.0) and (axes["points"] == len(frame)).all()
+    assert places.query("factor == 'trajectory'")["rms_mm"].item() == pytest.approx(
+        np.sqrt((left**2).sum(axis=1).mean())
+    )
+    drives = places.query("factor == 'drive'")
+    assert drives["share"].sum() == pytest.approx(1.0) and drives["share_of_noise"].sum() == pytest.approx(1.0)
+
+
+def _rough(spectrum, seed):
+    """A function of each drive drawn from the law's own prior, and its coefficients (c,)."""
+    effect = find("drive_error_function", arms.ARM)
+    size = effect.coordinates.spectra[spectrum]
+    values = size * np.random.default_rng(100 + seed).standard_normal(len(size))
+    return arms.active("", values, {}, effect), values
+
+
+@pytest.mark.parametrize(("spectrum", "seed"), [(0, 1), (0, 3), (1, 0), (2, 1), (4, 2)])
+def test_a_rough_function_of_all_drives_is_named(spectrum, seed):
+    acting, truth = _rough(spectrum, seed)
+    found = _diagnosed((acting,), seed)
+    assert found.verdict["effects"] == "drive_error_function" and found.verdict["share_closed"] > 0.8
+    assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * arms.NOISE_MM, rel=0.15)
+    (values,) = found.state.effects.values()
+    # functions along the drives' ranges, but for what the calibration's own numbers make
+    motion = found.attribution.case.motion
+    law = found.attribution.case.library["drive_error_function"]
+    for own, true, made in zip(np.split(values, 6), np.split(truth, 6), law.along_drives(motion), strict=True):
+        off, whole = made @ (own - true), made @ true
+        assert np.std(off) < 0.5 * np.std(whole)
+
+
+def _sharp(waves, size_rad, seed):
+    """Waves (drive, order) of phases and sizes about one, drawn."""
+    effect, generator = find("transmission_orders", arms.ARM).with_waves(waves), np.random.default_rng(seed)
+    size, phase = size_rad * generator.uniform(0.7, 1.3, len(waves)), generator.uniform(-np.pi, np.pi, len(waves))
+    values = np.stack([size * np.cos(phase), size * np.sin(phase)], axis=1).ravel()
+    return arms.active("", values, {}, effect), size
+
+
+@pytest.mark.parametrize(
+    ("waves", "size_rad"),
+    [
+        (((0, 17.0), (2, 31.0), (4, 9.0)), 2e-4),
+        (((0, 7.15), (3, 53.7), (4, 34.8)), 5e-5),
+        (((1, 39.2), (3, 19.9), (0, 28.2)), 1e-4),
+    ],
+)
+def test_three_sharp_orders_of_different_drives_are_named(waves, size_rad):
+    acting, size = _sharp(waves, size_rad, 4)
+    found = _diagnosed((acting,), 4)
+    assert found.verdict["effects"] == "transmission_orders" and found.verdict["share_closed"] > 0.7
+    case = found.attribution.case
+    law, (values,) = case.library["transmission_orders"], found.state.effects.values()
+    told = {}
+    for parameter, sine, cosine in zip(law.parameters.names[::2], values[::2], values[1::2], strict=True):
+        _, drive, order = parameter.split("_")
+        told[int(drive) - 1, float(order)] = np.hypot(sine, cosine)
+    step = 2.0 * np.pi / np.ptp(case.motion.drive, axis=0)
+    for (drive, order), amplitude in zip(waves, size, strict=True):
+        near = [a for (k, one), a in told.items() if k == drive and abs(one - order) < 0.3 * step[k]]
+        assert near and max(near) == pytest.approx(amplitude, rel=0.35)
+
+
+def test_sharp_orders_are_found_behind_a_law_that_hides_them():
+    """Drives that give way make a gap twenty times theirs, which looks like many waves at first."""
+    acting, _ = _sharp(((0, 17.0), (2, 31.0), (4, 9.0)), 6e-5, 1)
+    found = _diagnosed((acting, arms.active("drive_compliance", [5e-8] * 6)), 1)
+    named = set(found.verdict["effects"].split("+"))
+    # one drive's wave is a transmission error of that drive alone as well
+    assert {"drive_compliance", "transmission_orders"} <= named
+    assert named <= {"drive_compliance", "transmission_orders", "transmission_error"}
+    waves = list(found.attribution.case.library["transmission_orders"].waves)
+    if "transmission_error" in named:
+        own = found.tables["gap_parameters"].set_index(["effect", "parameter"])["value"]["transmission_error"]
+        waves.append((int(own.filter(like="amplitude").argmax()), own["ratio"]))
+    for drive, order in ((0, 17.0), (2, 31.0), (4, 9.0)):
+        assert any(one == drive and abs(other - order) < 0.1 for one, other in waves)
+    assert found.verdict["share_closed"] > 0.95
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_nothing_is_named_where_nothing_acts(seed):
+    found = _diagnosed((), seed)
+    assert found.verdict["effects"] == "none" and found.verdict["probability"] > 0.5
+    assert "transmission_orders" not in found.attribution.case.library
+    assert found.verdict["gap_rms_mm"] < 0.5 * found.verdict["noise_rms_mm"]

@@ -1,0 +1,99 @@
+"""The budget of a gap: parts that add up, against the parts that were simulated."""
+
+import numpy as np
+import pytest
+
+from rrru.calibration.calibrate import calibrate
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.settings import GapSettings
+from rrru.estimation.observations.target_positions import TargetPositions
+from tests.diagnosis.campaigns import FAST, FORWARD, NOISE_MM, REVERSE, SIM, active, diagnosed, measure, plan_of, strong
+
+
+def _budget(frame, noise_mm=NOISE_MM):
+    """The table of a diagnosis by part, and the diagnosis."""
+    found = diagnosed(frame, noise_mm, details=True)
+    return found.tables["gap_budget"].set_index("part"), found
+
+
+def _left(effects):
+    """What the calibration leaves (n, 3) of the effects' own, by the exact closure without noise."""
+    frame = measure(effects, noise_mm=0.0)
+    driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
+    return calibrate(TargetPositions(SIM, *driven)).residual_mm
+
+
+def _shaken(frame, size_mm, seed=3):
+    """The table with more noise on every measured position."""
+    more = size_mm * np.random.default_rng(seed).standard_normal((len(frame), 3))
+    return frame.assign(**rows.vector_columns("measured", rows.measured(frame) + more))
+
+
+@pytest.fixture(scope="module")
+def two():
+    """Budget of a robot with two effects, and these."""
+    effects = strong("backlash", 5.0), strong("link_flexure", 5.0)
+    return *_budget(measure(effects)), effects
+
+
+def test_parts_add_up_to_the_gap(two):
+    budget, found, _ = two
+    assert budget["share"].sum() == pytest.approx(1.0, abs=1e-9)
+    without = budget.drop("calibration")
+    squares = np.sign(without["rms_mm"]) * without["rms_mm"] ** 2
+    residual = found.attribution.case.residual(found.attribution.calibrated)
+    noise = 3.0 * (found.attribution.case.noise.axis_mm**2).mean()
+    assert squares.sum() == pytest.approx((residual**2).sum(axis=1).mean() - noise, rel=0.05)
+    assert (budget["share_low"] <= budget["share"]).all() and (budget["share"] <= budget["share_high"]).all()
+
+
+def test_each_effects_part_is_what_it_makes_alone(two):
+    budget, _, effects = two
+    for effect in effects:
+        true = np.sqrt((_left((effect,)) ** 2).sum(axis=1).mean())
+        assert budget.loc[effect.effect.name, "rms_mm"] == pytest.approx(true, rel=0.15)
+        assert budget.loc[effect.effect.name, "probability"] > 0.9
+    assert budget.loc["unexplained", "share"] < 0.05 and budget.loc["scatter", "share"] == 0.0
+
+
+def test_what_does_not_repeat_is_scatter():
+    """Half of the mean square is an effect's, the other is noise above what is stated."""
+    effect, size = strong("drive_compliance", 6.0), 3.0 * NOISE_MM
+    budget, found = _budget(_shaken(measure((effect,)), size))
+    assert found.verdict["effects"] == "drive_compliance"
+    assert budget.loc["scatter", "rms_mm"] == pytest.approx(np.sqrt(3.0) * size, rel=0.1)
+    assert budget.loc["scatter", "probability"] > 0.99
+    true = np.sqrt((_left((effect,)) ** 2).sum(axis=1).mean())
+    assert budget.loc["drive_compliance", "rms_mm"] == pytest.approx(true, rel=0.15)
+
+
+def test_nobody_knows_the_scatter_where_no_noise_is_stated():
+    budget, _ = _budget(measure(), None)
+    assert budget.loc["scatter", "share"] == 0.0 and np.isnan(budget.loc["scatter", "probability"])
+
+
+def test_what_nothing_predicts_is_unexplained():
+    """A bulge of the workspace that no effect makes."""
+    frame = measure()
+    x, y, _ = (rows.command(frame) / 300.0).T
+    bulge = 0.15 * np.stack([np.sin(4.0 * x) * np.cos(5.0 * y), 0.0 * x, np.sin(5.0 * x + 3.0 * y)], axis=1)
+    frame = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + bulge))
+    budget, found = _budget(frame)
+    assert "unexplained" in found.verdict["effects"] and budget.loc["unexplained", "probability"] > 0.9
+    driven = rows.actuators(frame, SIM), rows.measured(frame), rows.command(frame)
+    total = (calibrate(TargetPositions(SIM, *driven)).residual_mm ** 2).sum(axis=1).mean() - 3.0 * NOISE_MM**2
+    assert budget.loc["unexplained", "rms_mm"] ** 2 > 0.5 * total
+
+
+def test_whoever_does_not_know_the_weight_still_knows_what_gives_way_in_all():
+    """Of one load a compliance is told no better than the mass; what it makes of the gap is."""
+    frame = measure((active("drive_compliance", [8e-8, 6e-8, 9e-8]),), plan=plan_of((FORWARD, REVERSE, FAST)))
+    known = {"weight": {"extra_kg": 0.0, "lean_x": 0.0, "lean_y": 0.0}}
+    shares, errors = [], []
+    for settings in (GapSettings(draws=400), GapSettings(draws=400, known=known)):
+        tables = diagnosed(frame, details=True, settings=settings).tables
+        own = tables["gap_budget"].set_index("part").loc["drive_compliance"]
+        shares.append(own["share_high"] - own["share_low"])
+        errors.append(tables["gap_parameters"].query("effect == 'drive_compliance'")["standard_error"].mean())
+    assert errors[0] > 5.0 * errors[1]
+    assert shares[0] < 1.5 * shares[1]

@@ -1,0 +1,85 @@
+"""The smooth functions that compete with the library."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.discrepancy_basis import UNKNOWN, unknown_functions
+from rrru.diagnosis.make_problem import make_case
+from rrru.effects.protocol import Contribution
+from rrru.robots.delta import Delta
+from rrru.robots.ptt3 import Ptt3
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, SIM, case_of, diagnosed, measure, robot_of
+
+
+@pytest.fixture(scope="module")
+def case():
+    return case_of(measure())
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_a_function_is_linear_in_its_coefficients_and_about_as_large_as_they_are(case, name):
+    function, generator = UNKNOWN[name], np.random.default_rng(4)
+    first, second = (generator.standard_normal(len(function.coordinates)) for _ in range(2))
+
+    def made(values):
+        twists = function.contribute(case.motion, values).twists
+        acting = {SIM.legs.sites[k] for k in np.flatnonzero(twists.any(axis=(0, 2)))}
+        assert acting <= ({f"leg {leg} drive" for leg in (1, 2, 3)} if function.per_leg else {"world"})
+        return twists
+
+    np.testing.assert_allclose(made(2.0 * first - second), 2.0 * made(first) - made(second), atol=1e-12)
+    for k in range(len(first)):
+        one = np.abs(made(np.eye(len(first))[k]))
+        assert 0.5 <= one.max() <= 1.0 + 1e-12
+
+
+def test_a_constant_shift_moves_the_reading_by_it(case):
+    function = UNKNOWN["unknown_affine"]
+    values = np.zeros((3, 4))
+    values[:, 0] = [0.1, -0.2, 0.3]
+    twists = function.contribute(case.motion, values.ravel()).twists
+    np.testing.assert_allclose(twists[:, 0], np.tile([0.1, -0.2, 0.3, 0.0, 0.0, 0.0], (len(twists), 1)))
+    still = robot_of().positions(case.motion)[0]
+    moved = robot_of((_Constant(Contribution(twists)),)).positions(case.motion)[0]
+    np.testing.assert_allclose(moved - still, np.tile([0.1, -0.2, 0.3], (len(still), 1)), atol=1e-9)
+
+
+@dataclass(frozen=True)
+class _Constant:
+    """A contribution that is known."""
+
+    contribution: Contribution
+
+    def contribute(self, motion):
+        return self.contribution
+
+
+def test_functions_of_a_drive_are_as_large_as_its_unit_allows():
+    for robot, typical in ((SIM, 1e-4), (Delta(), 1e-4), (Ptt3(), 0.01)):
+        functions = unknown_functions(robot)
+        assert list(functions) == list(UNKNOWN)
+        of_drives = [function for function in functions.values() if function.per_leg]
+        assert of_drives and all((f.coordinates.typical == typical).all() for f in of_drives)
+        assert all(len(f.coordinates) == 3 * f.count for f in of_drives)
+        assert all(f is UNKNOWN[name] for name, f in functions.items() if not f.per_leg)
+
+
+def test_functions_of_what_does_not_vary_or_is_unknown_are_left_out():
+    frame = measure()
+    assert set(UNKNOWN) <= set(case_of(frame).library) and not set(UNKNOWN) & set(case_of(frame).effects)
+    bare = make_case(frame.assign(time_s=np.nan, payload_kg=2.0), SIM, MASSES, NOISE_MM, {})
+    assert set(bare.library) == {"unknown_drive", "unknown_affine", "unknown_place"}
+
+
+def test_a_tracker_that_drifts_to_and_fro_is_unexplained_and_said_to_follow_the_time():
+    frame = measure()
+    # from -1 to 1
+    passed = 2.0 * frame["time_s"] / frame["time_s"].max() - 1.0
+    frame["measured_z_mm"] += 0.15 * passed**2
+    frame["measured_x_mm"] -= 0.08 * (4.0 * passed**3 - 3.0 * passed)
+    found = diagnosed(frame, details=True)
+    assert found.verdict["effects"] == "unexplained"
+    best = found.tables["gap_remainder"].iloc[0]
+    assert best["follows"] == "the time" and best["explained"] > 0.9

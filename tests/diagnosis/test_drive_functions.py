@@ -1,0 +1,70 @@
+"""Errors of drives over their values: the true function lies in the band, and the worst place is the true one."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.drive_functions import drive_functions
+from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.terms import Term
+from tests.diagnosis import arms
+from tests.schemas import check
+
+NAMES = tuple(f"axis{k}" for k in range(1, 7))
+# sine and cosine of each drive's error once a turn, rad; the fourth has none
+WAVES = np.array([[4e-4, 0.0], [0.0, 5e-4], [2e-4, -3e-4], [0.0, 0.0], [-3e-4, 1e-4], [1e-4, 4e-4]])
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The table of a fit to an arm with eccentric encoders, and the case."""
+    name = "encoder_eccentricity"
+    case = arms.case_of(arms.measure((arms.active(name, WAVES.ravel()),), count=120), name)
+    scales = 3.0 * case.library[name].coordinates.typical
+    fit = fit_model(case, [calibrate(case)], [Term(name)], scales)
+    table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
+    return check("gap_drive_functions", table.assign(campaign="made up")), case
+
+
+def test_the_true_function_of_every_drive_lies_in_its_band(found):
+    table, _ = found
+    inside = []
+    for number, rows in table.groupby("drive"):
+        value = rows["drive_value"].to_numpy()
+        true = WAVES[number - 1] @ [np.sin(value), np.cos(value)]
+        off = (rows["error"] - (true - true.mean())) / (0.5 * (rows["high_95"] - rows["low_95"]))
+        assert np.abs(off).max() < 2.0, number
+        inside.append((np.abs(off) < 1.0).mean())
+        assert np.abs(rows["error"].mean()) < 1e-12
+    assert len(inside) == 6 and np.mean(inside) > 0.75
+
+
+def test_it_spans_the_measured_range_and_one_place_of_each_drive_is_the_worst(found):
+    table, case = found
+    for number, rows in table.groupby("drive"):
+        measured = case.motion.drive[case.used][:, number - 1]
+        assert rows["drive_value"].min() == measured.min() and rows["drive_value"].max() == measured.max()
+        worst = rows[rows["worst"]]
+        assert len(worst) == 1 and worst["error"].abs().iloc[0] == rows["error"].abs().max()
+        assert set(rows["name"]) == {f"axis{number}"} and set(rows["unit"]) == {"rad"}
+
+
+def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():
+    case = arms.case_of(arms.measure(count=60), "drive_compliance")
+    fit = SimpleNamespace(terms=[Term("drive_compliance")])
+    assert drive_functions(SimpleNamespace(case=case, fit=fit), NAMES).empty
+
+
+def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give():
+    name = "drive_error_function"
+    case = arms.case_of(arms.measure(count=60), name)
+    fit = fit_model(case, [calibrate(case)], [Term(name)], 3.0 * case.library[name].coordinates.typical)
+    table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
+    stepped = replace(case, library={name: replace(case.library[name], along_drives=None)})
+    again = drive_functions(SimpleNamespace(case=stepped, fit=fit), NAMES)
+    for column in ("error", "low_95", "high_95"):
+        np.testing.assert_allclose(table[column], again[column], rtol=0.0, atol=1e-9)
+    assert set(table["drive"]) == {1, 2, 3, 4, 5, 6} and (table["high_95"] > table["low_95"]).all()

@@ -1,0 +1,177 @@
+"""Waves and rough functions of the drives' angles in what a calibration leaves of a six-axis arm."""
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.drive_spectra import amplitudes, likeliest, pursue
+from rrru.effects.library import find
+from tests.diagnosis import arms
+from tests.diagnosis.arms import NOISE_MM
+
+_COUNT = 150
+
+
+@pytest.fixture(scope="module")
+def arm():
+    """Case, basis (m, b) of its calibration, effect of the drives (m, 3, K), their values (m, K), of a perfect arm."""
+    case = arms.case_of(arms.measure(count=_COUNT))
+    linear = case.linearise(calibrate(case))
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    return case, basis, linear.drive, case.motion.drive[case.at]
+
+
+def _made(arm, waves, generator, noise_mm=NOISE_MM):
+    """What the calibration leaves of waves (drive, order, size, phase) and noise, (m,)."""
+    _, basis, effect, drive = arm
+    change = np.zeros_like(drive)
+    for k, order, size, phase in waves:
+        change[:, k] += size * np.sin(order * drive[:, k] + phase)
+    data = np.einsum("nak,nk->na", effect, change).ravel()
+    data = data + noise_mm * generator.standard_normal(len(data))
+    return data - basis @ (basis.T @ data)
+
+
+def _resolution(arm):
+    """Difference of orders that each drive (K,) tells apart."""
+    return 2.0 * np.pi / np.ptp(arm[3], axis=0)
+
+
+@pytest.mark.parametrize("drive", range(6))
+def test_one_sharp_wave_is_found_on_its_drive_at_its_order(arm, drive):
+    generator = np.random.default_rng(drive)
+    for order in generator.uniform(2.0 * _resolution(arm)[drive], 60.0, 3):
+        data = _made(arm, [(drive, order, 3e-4, generator.uniform(-3.0, 3.0))], generator)
+        (first, *_), _ = pursue(data, arm[1], arm[2], arm[3])
+        assert first[0] == drive and abs(first[1] - order) < 0.5 * _resolution(arm)[drive]
+
+
+def test_three_sharp_waves_are_found_and_next_to_nothing_else(arm):
+    """None is taken for two of the orders that are tried."""
+    numbers = []
+    for seed in range(6):
+        generator = np.random.default_rng(seed)
+        waves = [(k, generator.uniform(6.0, 60.0), 2e-4, generator.uniform(-3.0, 3.0)) for k in (0, 2, 4)]
+        found, _ = pursue(_made(arm, waves, generator), arm[1], arm[2], arm[3])
+        step = _resolution(arm)
+        for k, order, *_ in waves:
+            assert any(drive == k and abs(one - order) < 0.25 * step[k] for drive, one in found)
+        numbers.append(len(found))
+    assert max(numbers) <= 4 and sum(numbers) <= 20
+
+
+def test_noise_alone_has_waves_as_rarely_as_their_price_says(arm):
+    """A wave costs as much as all resolved ones together, and the m numbers beside: one campaign of about m / 3."""
+    trials, found = 150, 0
+    for seed in range(trials):
+        waves, log_prior = pursue(_made(arm, [], np.random.default_rng(seed)), arm[1], arm[2], arm[3])
+        found += bool(waves)
+        assert bool(waves) == (log_prior < 0.0)
+    assert found <= 3
+
+
+def test_numbers_that_are_fitted_beside_them_make_waves_no_more_frequent(arm):
+    """Of 40 stops and 90 numbers that are fitted there is little left: chance takes a larger share of that."""
+    rows = np.isin(arm[0].at, np.arange(1, 41))
+    _, basis, effect, drive = arm
+    generator, found = np.random.default_rng(0), 0
+    calibration = basis.reshape(len(drive), 3, -1)[rows].reshape(3 * rows.sum(), -1)
+    beside, _ = np.linalg.qr(np.concatenate([calibration, generator.normal(size=(3 * rows.sum(), 63))], axis=1))
+    for _ in range(200):
+        data = generator.standard_normal(3 * rows.sum())
+        waves, _ = pursue(data - beside @ (beside.T @ data), beside, effect[rows], drive[rows])
+        found += bool(waves)
+    # three of 240 would be usual
+    assert found <= 9
+
+
+def test_waves_of_one_drive_keep_apart_whatever_is_looked_through(arm):
+    """Something slow that is no wave, far above the noise: many waves stand for it, none of them twice."""
+    _, basis, effect, drive = arm
+    slow = np.tanh(3.0 * drive) * np.abs(drive) * 1e-3
+    data = np.einsum("nak,nk->na", effect, slow).ravel() + NOISE_MM * np.random.default_rng(0).normal(size=len(basis))
+    found, _ = pursue(data - basis @ (basis.T @ data), basis, effect, drive)
+    assert len(found) > 3
+    for k, step in enumerate(_resolution(arm)):
+        orders = np.sort([order for number, order in found if number == k])
+        assert (np.diff(orders) > 0.1 * step).all() and (orders >= step).all() and (orders <= 64.0).all()
+    names = find("transmission_orders", arms.ARM).with_waves(found).parameters.names
+    assert len(set(names)) == 2 * len(found)
+
+
+def test_the_price_of_a_choice_is_that_of_one_among_all_resolved(arm):
+    """Minus the logarithm of how many sets of so many waves there are, 64 times the drives' turns each."""
+    generator = np.random.default_rng(3)
+    waves = [(k, 12.0 + 9.0 * k, 3e-4, 0.5) for k in range(3)]
+    found, log_prior = pursue(_made(arm, waves, generator), arm[1], arm[2], arm[3])
+    turns = np.ptp(arm[3], axis=0).sum() / (2.0 * np.pi)
+    sets = (64.0 * turns) ** len(found) / np.prod(np.arange(1, len(found) + 1))
+    assert log_prior == pytest.approx(-np.log(sets))
+
+
+def test_what_the_calibration_takes_up_and_drives_that_stand_still_have_no_waves(arm):
+    _, basis, effect, drive = arm
+    still = np.tile(drive[:1], (len(drive), 1))
+    data = _made(arm, [], np.random.default_rng(0))
+    assert pursue(data, basis, effect, still) == ((), 0.0)
+    barely = still + 1e-3 * np.random.default_rng(1).random(drive.shape)
+    assert pursue(data, basis, effect, barely) == ((), 0.0)
+    assert pursue(0.0 * data, basis, effect, drive) == ((), 0.0)
+
+
+def test_a_drive_that_stands_still_hides_no_wave_of_another(arm):
+    generator = np.random.default_rng(2)
+    data = _made(arm, [(4, 12.3, 3e-4, 1.0)], generator)
+    _, basis, effect, drive = arm
+    still = np.where(np.arange(6) == 1, 0.2, drive)
+    ((found, order), *_), _ = pursue(data, basis, effect, still)
+    assert found == 4 and abs(order - 12.3) < 0.5 * _resolution(arm)[4]
+
+
+def test_the_spectrum_that_made_the_data_is_the_likeliest():
+    """Coefficients drawn from each spectrum, unlike sizes, in noise: most draws name it and its size."""
+    law = find("drive_error_function", arms.ARM)
+    case = arms.case_of(arms.measure(count=300), "drive_error_function")
+    linear = case.linearise(calibrate(case))
+    basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
+    whole = linear.columns["drive_error_function", 0].reshape(linear.data.size, -1)
+    # low orders of two drives do, and are quick
+    keep = np.concatenate([np.arange(2 * 48), 128 + np.arange(2 * 48)])
+    columns = whole[:, keep] - basis @ (basis.T @ whole[:, keep])
+    spectra, hits, draws = [one[keep] for one in law.coordinates.spectra], 0, 0
+    for number, size in enumerate(spectra):
+        for seed in range(4):
+            generator = np.random.default_rng([number, seed])
+            strength = generator.uniform(0.7, 2.0)
+            data = columns @ (strength * size * generator.standard_normal(len(size)))
+            data = data + NOISE_MM * generator.standard_normal(len(data))
+            found, factor = likeliest(data - basis @ (basis.T @ data), columns, spectra, basis.shape[1])
+            assert abs(found - number) <= 1
+            assert found != number or factor == pytest.approx(strength, rel=0.3)
+            hits, draws = hits + (found == number), draws + 1
+    assert draws == 20 and hits >= 14
+
+
+def test_an_injected_wave_has_its_amplitude():
+    """In exact readings with noise, the arm calibrated: one wave on each of two drives, and nothing elsewhere."""
+    law = find("transmission_orders", arms.ARM).with_waves(((1, 11.0), (3, 30.0)))
+    sine, cosine = np.array([2.4e-4, -5e-4]), np.array([-1e-4, 3e-4])
+    acting = arms.active("", np.stack([sine, cosine], axis=1).ravel(), {}, law)
+    case = arms.case_of(arms.measure((acting,)))
+    state = calibrate(case)
+    for k, (drive, order) in enumerate(((1, 11.0), (3, 30.0))):
+        size = np.hypot(sine[k], cosine[k])
+        found = amplitudes(case, state, np.array([order, order + 9.0]))[drive]
+        assert found[0] == pytest.approx(size, rel=0.2) and found[1] < 0.4 * size
+    quiet = arms.case_of(arms.measure())
+    for drive in range(6):
+        assert (amplitudes(quiet, calibrate(quiet), np.arange(3.0, 60.0))[drive] < 4e-5).all()
+
+
+def test_amplitudes_are_exact_where_nothing_else_acts():
+    """Without noise, of a small wave: the calibration fitted beside it changes nothing of it."""
+    law = find("transmission_orders", arms.ARM).with_waves(((2, 4.5),))
+    acting = arms.active("", [3e-5, -4e-5], {}, law)
+    case = arms.case_of(arms.measure((acting,), noise=(0.0, 0.0)))
+    found = amplitudes(case, calibrate(case), np.array([4.5]))[2]
+    np.testing.assert_allclose(found, 5e-5, rtol=2e-3)

@@ -1,0 +1,64 @@
+"""The diagnosis of a gantry whose machine knows nothing of the package: drives that hold, and screws that grow."""
+
+import numpy as np
+import pytest
+
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.settings import GapSettings
+from rrru.kinematics.dynamics import Masses
+from tests.diagnosis.gantry import GANTRY, NOISE_MM, campaign
+
+
+def _diagnosed(frame, without=()):
+    """Verdict, and value and standard error by parameter."""
+    known = MeasuredRobot(GANTRY, Masses(0.0, 0.0, 0.0), NOISE_MM, "gantry")
+    settings = GapSettings(draws=10)
+    for name in without:
+        settings = settings.without(name)
+    found = diagnose(frame, known, settings, details=False)
+    numbers = found.tables["gap_parameters"].set_index("parameter")
+    return found, numbers["value"], numbers["standard_error"]
+
+
+def _off(numbers, errors, name, true):
+    """Standard errors by which a number is off the truth."""
+    return abs(numbers[name] - true) / errors[name]
+
+
+def test_play_of_a_drive_that_holds_along_two_sides_of_a_rectangle_is_found():
+    found, numbers, errors = _diagnosed(campaign(play_mm=(0.08, 0.0, 0.0)))
+    assert found.verdict["effects"] == "backlash" and found.verdict["leg"] == 1
+    assert _off(numbers, errors, "width1", 0.08) < 3.0 and errors["width1"] < 0.002
+
+
+def test_a_machine_on_which_nothing_acts_has_nothing():
+    found, *_ = _diagnosed(campaign(seed=2))
+    assert found.verdict["effects"] == "none"
+
+
+def test_a_screw_that_grows_from_its_middle_is_found_with_its_time_constant():
+    def grown(way, time):
+        return np.array([0.0, 2e-4 * (way[1] - 500.0), 0.0]) * (1.0 - np.exp(-time / 700.0))
+
+    found, numbers, errors = _diagnosed(campaign(grown=grown, seed=3))
+    assert found.verdict["effects"] == "screw_growth" and found.verdict["leg"] == 2
+    for end in ("low", "high"):
+        assert _off(numbers, errors, f"{end}_strain2", 1e-4) < 3.0
+    assert numbers["time_constant"] == pytest.approx(700.0, rel=0.15)
+
+
+def test_rivals_that_need_times_are_told_apart_by_poses_that_have_times():
+    """A campaign with times and without a column of speeds: poses are planned at the speed that the times tell."""
+
+    def grown(way, time):
+        return np.array([6e-6 * way[0], 0.0, 0.0]) * (1.0 - np.exp(-time / 1000.0))
+
+    frame = campaign(grown=grown, seed=6).iloc[::2].reset_index(drop=True)
+    # these are told apart by a run
+    found, *_ = _diagnosed(frame, without=("base_drift", "tracker_scale", "friction_windup"))
+    best, listed = found.tables["gap_next_runs"].iloc[0], found.tables["gap_next_poses"]
+    assert best["kind"] == "poses" and "screw_growth" in best["separates"] and len(listed) > 1
+    same = (frame["run"].diff() == 0).to_numpy()
+    way = np.linalg.norm(frame[[f"command_{axis}_mm" for axis in "xyz"]].diff(), axis=1)[same]
+    expected = np.median(way / frame["time_s"].diff().to_numpy()[same])
+    np.testing.assert_allclose(listed["speed_mm_s"], expected)

@@ -1,0 +1,243 @@
+"""Predictions of left-out points, how far the gap shrinks, and the measuring noise, against slow and obvious
+computations.
+"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.fft import dct
+from scipy.stats import multivariate_normal, norm
+
+from rrru.calibration.campaign_noise import campaign_noise
+from rrru.campaign.outliers import isolated
+from rrru.diagnosis import shrink
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.heldout import HeldOut, Prediction, resampled_rows
+from rrru.diagnosis.inference import with_noise
+from rrru.diagnosis.terms import Term
+from rrru.diagnosis.whitened import LEVELS
+from rrru.errors import ConfigError
+from tests.diagnosis.campaigns import (
+    EFFECTS,
+    FORWARD,
+    FULL,
+    LINES,
+    NOISE_MM,
+    SIM,
+    SPIRAL,
+    case_of,
+    diagnosed,
+    measure,
+    plan_of,
+    strong,
+)
+
+TERMS = (Term("servo_lag", 0, 2), Term("leg_asymmetry"))
+STRENGTHS = [1.0, 3.0]
+
+
+def _setting(passes, effects=()):
+    case = case_of(
+        measure(effects, plan=plan_of(passes)), {name: EFFECTS[name] for name in ("servo_lag", "leg_asymmetry")}
+    )
+    return HeldOut(case, case.evidence(case.linearise(calibrate(case))))
+
+
+@pytest.fixture(scope="module")
+def full():
+    return _setting(FULL, (strong("leg_asymmetry", 3.0),))
+
+
+def _refitted(held_out, level, smooth):
+    """Residuals and covariances of predictions of each fold by a dense fit of all others."""
+    case, evidence, fold = held_out.case, held_out.evidence, held_out.fold
+    linear, n = evidence.linear, len(case)
+    columns = np.concatenate(
+        [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1
+    )
+    prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, STRENGTHS) ** -2.0])
+    weight = np.eye(n) / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2))
+    if smooth:
+        transform, wave = np.zeros((n, n)), np.zeros(n)
+        for run in np.unique(case.run):
+            rows = np.flatnonzero(case.run == run)
+            transform[np.ix_(rows, rows)], wave[rows] = (
+                dct(np.eye(len(rows)), axis=0, norm="ortho"),
+                np.arange(len(rows)),
+            )
+        density = 1.0 / (1.0 + (wave / 3.0) ** 2) + 0.01
+        weight = (
+            transform.T
+            @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * density / density.mean())))
+            @ transform
+        )
+    residual, uncertain = np.empty((n, 3)), np.empty(n)
+    for number in np.unique(fold):
+        out, fitted = fold == number, fold != number
+        inner = weight[np.ix_(fitted, fitted)]
+        precision = np.diag(prior) + sum(columns[fitted, axis].T @ inner @ columns[fitted, axis] for axis in range(3))
+        moment = sum(columns[fitted, axis].T @ inner @ linear.data[fitted, axis] for axis in range(3))
+        covariance = np.linalg.inv(precision)
+        residual[out] = linear.data[out] - columns[out] @ covariance @ moment
+        uncertain[out] = np.einsum("nak,kl,nal->n", columns[out], covariance, columns[out])
+    return residual, uncertain
+
+
+@pytest.mark.parametrize("level", [0, 3])
+@pytest.mark.parametrize("passes", [(FORWARD,), FULL], ids=["stretches", "runs"])
+def test_predictions_equal_a_refit_without_the_fold(passes, level):
+    held_out = _setting(passes)
+    found = held_out.predict(TERMS, STRENGTHS, level)
+    residual, uncertain = _refitted(held_out, level, smooth=passes is FULL)
+    np.testing.assert_allclose(found.residual_mm, residual, atol=2e-6)
+    np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
+
+
+@pytest.mark.parametrize("level", [0, 3])
+def test_what_an_effect_gains_is_what_its_prediction_alone_loses(full, level):
+    whole = full.predict(TERMS, STRENGTHS, level).log_score.sum()
+    without = [full.predict(TERMS[1 - k : 2 - k], STRENGTHS[1 - k : 2 - k], level).log_score.sum() for k in range(2)]
+    np.testing.assert_allclose(full.gains(TERMS, STRENGTHS, level), whole - np.array(without), rtol=1e-5, atol=1e-5)
+    assert full.gains((), [], level) == []
+
+
+def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(full):
+    assert [len(np.unique(full.case.run[full.fold == k])) for k in np.unique(full.fold)] == [1] * 16
+    once = _setting((FORWARD, FORWARD | {"reverse": True, "trajectories": ["line_1"]}))
+    assert np.unique(once.fold).tolist() == [0, 1, 2, 3, 4]
+    for run in np.unique(once.case.run):
+        own = once.fold[once.case.run == run]
+        assert [len(piece) for piece in np.split(own, np.flatnonzero(np.diff(own)) + 1)][:-1] == [5] * (
+            (len(own) - 1) // 5
+        )
+
+
+def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
+    found = full.predict((Term("leg_asymmetry"),), [3.0], 0)
+    expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
+    ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
+    assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.case))))
+
+
+def _of_runs(run):
+    """What is asked of a case whose points were driven in runs (n,)."""
+    return SimpleNamespace(run=run, stop=np.arange(len(run)))
+
+
+def test_rows_are_resampled_by_runs_or_by_stretches():
+    generator = np.random.default_rng(0)
+    run = np.repeat(np.arange(12), 5)
+    drawn = resampled_rows(_of_runs(run), generator, 20)
+    assert drawn.shape == (20, 60) and set(drawn.ravel()) <= set(range(60))
+    assert (drawn.reshape(20, 12, 5) == drawn.reshape(20, 12, 5)[..., :1] + np.arange(5)).all() and (
+        drawn[:, ::5] % 5 == 0
+    ).all()
+    few = resampled_rows(_of_runs(np.repeat([3, 1], 10)), generator, 20).reshape(20, 4, 5)
+    assert (few == few[..., :1] + np.arange(5)).all() and set(few[..., 0].ravel()) == {0, 5, 10, 15}
+
+
+OTHER = (
+    replace(LINES[0], start_mm=(-500.0, -200.0, 600.0), end_mm=(50.0, 180.0, 720.0)),
+    replace(SPIRAL, start_deg=40.0, turns=3.0),
+)
+
+
+@pytest.mark.parametrize("name", ["leg_asymmetry", "servo_lag", "encoder_eccentricity"])
+def test_the_share_closed_holds_on_other_trajectories(name):
+    """Against the truth on runs that the diagnosis has never seen."""
+    effect = strong(name, 5.0)
+    found = diagnosed(measure((effect,)))
+    case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
+    before, after = case.residual(found.attribution.calibrated), case.residual(found.state)
+    true = 1.0 - np.sqrt((after**2).sum() / (before**2).sum())
+    assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
+    assert found.verdict["share_closed_low"] <= found.verdict["share_closed"] <= found.verdict["share_closed_high"]
+    assert found.verdict["gap_rms_mm"] == pytest.approx(5.0 * np.sqrt(3.0) * NOISE_MM, rel=0.25)
+
+
+def _step(residual_mm, draws=3):
+    squares = (residual_mm**2).sum(axis=1)
+    every = np.tile(np.arange(len(squares)), (draws, 1)), squares, np.zeros((draws, len(squares)))
+    return shrink.ShrinkStep("", (), residual_mm, squares, *every, np.ones(len(squares), dtype=bool))
+
+
+def test_shares_of_made_up_steps():
+    generator = np.random.default_rng(1)
+    residual = generator.normal(size=(50, 3))
+    for factor, share in ((0.25, 0.75), (0.0, 1.0), (1.0, 0.0), (1.5, -0.5), (5.0, -1.0)):
+        np.testing.assert_allclose(
+            shrink.share_closed(_step(residual), _step(factor * residual)), [share] * 3, atol=1e-12
+        )
+    assert shrink.share_closed(_step(0.0 * residual), _step(residual)) == (0.0, 0.0, 0.0)
+    assert shrink.gap_rms(np.array([4.0, -1.0, 0.0])) == 1.0 and shrink.gap_rms(np.array([-4.0])) == 0.0
+
+
+@pytest.mark.parametrize("name", [None, "thermal_growth", "leg_asymmetry", "servo_lag"])
+def test_the_noise_is_found_within_its_error_whatever_smooth_gap_there_is(name):
+    case = case_of(measure((strong(name, 6.0),) if name else ()))
+    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
+    upper = sum(np.count_nonzero(case.run == run) // 2 for run in np.unique(case.run))
+    assert source == "fitted"
+    assert np.sqrt((estimated.noise.axis_mm**2).mean()) == pytest.approx(NOISE_MM, rel=4.0 / np.sqrt(6.0 * upper))
+
+
+def test_a_campaigns_own_noise_is_told_by_the_same_rule():
+    frame = measure((strong("leg_asymmetry", 6.0),))
+    given = campaign_noise(SIM, frame, (0.5, None))
+    assert (given.mm, given.source) == (0.5, "given") and np.isnan(given.rad)
+    found = campaign_noise(SIM, frame, (None, None))
+    assert found.source == "high_frequency" and found.mm == pytest.approx(NOISE_MM, rel=0.15)
+    with pytest.raises(ConfigError, match="too few"):
+        campaign_noise(SIM, frame.head(2), (None, None))
+
+
+def test_repeats_give_the_noise_where_they_are_clearly_quieter():
+    """Many passes of one line with a jagged gap that repeats itself, which looks like noise along the run."""
+    frame = measure(plan=plan_of((FORWARD,) * 6, LINES[:1]))
+    jagged = np.random.default_rng(3).normal(0.0, 0.3, (16, 3))
+    for k, axis in enumerate("xyz"):
+        frame[f"measured_{axis}_mm"] += np.tile(jagged[:, k], 6)
+    case = case_of(frame, {"servo_lag": EFFECTS["servo_lag"]})
+    estimated, source = with_noise(case, case.linearise(calibrate(case)), None)
+    assert source == "repeats" and estimated.noise_mm == pytest.approx(NOISE_MM, rel=0.2)
+
+
+def test_single_spikes_are_isolated_and_smooth_gaps_and_noise_are_not(full):
+    case, generator = full.case, np.random.default_rng(2)
+    noise = NOISE_MM * generator.standard_normal((len(case), 3))
+    assert not isolated(noise, case.run, NOISE_MM).any()
+    smooth = 2.0 * np.sin(case.motion.time_s[case.used] / 3.0)[:, None] * [1.0, -0.5, 0.2]
+    wave = 0.3 * np.sin(np.arange(len(case)) / 4.0)[:, None] * [1.0, -0.5, 0.2]
+    assert not isolated(wave + noise, case.run, NOISE_MM).any()
+    assert not isolated(smooth * 0.05 + noise, case.run, NOISE_MM).any()
+    spiked = noise.copy()
+    at = [4, 40, 100, 200]
+    spiked[at, [0, 1, 2, 0]] += [1.0, -1.0, 0.5, 0.6]
+    assert np.flatnonzero(isolated(spiked, case.run, NOISE_MM)).tolist() == at
+    frequent = noise + 5.0 * (generator.random((len(case), 1)) < 0.3)
+    assert not isolated(frequent, case.run, NOISE_MM).any()
+
+
+def test_the_score_of_a_prediction_is_a_normal_density():
+    generator = np.random.default_rng(3)
+    residual, spread = generator.normal(size=(5, 3)), generator.normal(size=(5, 3, 2))
+    left = generator.uniform(0.1, 1.0, (5, 3))
+    width = np.sqrt(left + (spread**2).sum(axis=2))
+    expected = norm.logpdf(residual, scale=width).sum(axis=1) + 1.5 * np.log(2.0 * np.pi)
+    np.testing.assert_allclose(Prediction(residual, spread, left).log_score, expected, rtol=1e-12)
+
+
+def test_of_runs_it_is_the_density_of_what_is_correlated_along_them():
+    generator, series = np.random.default_rng(4), np.repeat([1, 2], [6, 9])
+    residual, left = generator.normal(size=(15, 3)), generator.uniform(0.1, 5.0, (15, 3))
+    score, expected = Prediction(residual, np.zeros((15, 3, 0)), left, series).log_score, []
+    for label, count in ((1, 6), (2, 9)):
+        here, cosines = series == label, dct(np.eye(count), axis=0, norm="ortho")
+        for axis in range(3):
+            covariance = cosines.T @ np.diag(left[here, axis]) @ cosines
+            density = multivariate_normal.logpdf(residual[here, axis], cov=covariance)
+            expected.append(density + 0.5 * count * np.log(2.0 * np.pi))
+    assert score[series == 1].sum() == pytest.approx(sum(expected[:3]), rel=1e-9)
+    assert score[series == 2].sum() == pytest.approx(sum(expected[3:]), rel=1e-9)

@@ -1,0 +1,139 @@
+"""The noise as a quantity: variances against simulated noise, numbers recovered, verdicts where it is not clean."""
+
+import numpy as np
+import pytest
+from scipy.fft import idct
+
+from rrru.campaign import measurements as rows
+from rrru.campaign.noise import along_runs
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.whitened import spectrum
+from rrru.estimation.noise_model import NoiseModel, fit_noise, half_waves, lengths
+from tests.diagnosis.campaigns import MASSES, NOISE_MM, ROBOT, diagnosed, measure, strong
+
+_RUNS, _POINTS = 12, 26
+_SERIES = np.repeat(np.arange(_RUNS), _POINTS)
+
+
+def _noise(generator, run, axis_mm, correlation=0.0, offset_mm=0.0):
+    """Noise (m, 3): an autoregression along each run (m,), and an offset of each."""
+    fresh, result = generator.standard_normal((len(run), 3)), np.empty((len(run), 3))
+    for i, now in enumerate(fresh):
+        begins = i == 0 or run[i] != run[i - 1]
+        result[i] = now if begins else correlation * result[i - 1] + np.sqrt(1.0 - correlation**2) * now
+    offsets = offset_mm * generator.standard_normal((run.max() + 1, 3))
+    return result * axis_mm + offsets[run]
+
+
+@pytest.mark.parametrize(("correlation", "offset"), [(0.0, 0.0), (0.5, 0.0), (0.8, 0.3)])
+def test_the_variances_are_those_of_the_noise(correlation, offset):
+    """Over many draws, wave by wave, summed over thirds of the frequencies: what leaks between waves is small."""
+    model, generator = NoiseModel(np.array([1.0, 2.0, 3.0]), correlation, offset), np.random.default_rng(0)
+    total, draws = 0.0, 300
+    for _ in range(draws):
+        # an offset's variance is rho times that of each axis
+        made = _noise(generator, _SERIES, 1.0, correlation, np.sqrt(offset)) * model.axis_mm
+        cosines, wave = along_runs(made, _SERIES)
+        total = total + cosines**2 / draws
+    expected = model.variance(wave, lengths(_SERIES))
+    for part in (wave == 0, (wave > 0) & (wave < 8), (wave >= 8) & (wave < 17), wave >= 17):
+        np.testing.assert_allclose(total[part].mean(axis=0), expected[part].mean(axis=0), rtol=0.12)
+
+
+def _columns(generator, count=60):
+    """Columns (m, 3, count) that are smooth along every run, as effects are."""
+    wave = np.cos(np.pi * np.arange(6)[:, None] * (np.arange(_POINTS) + 0.5) / _POINTS)
+    weights = generator.normal(size=(count, _RUNS, 3, 6))
+    return np.einsum("crak,kp->rpac", weights, wave).reshape(len(_SERIES), 3, count)
+
+
+@pytest.mark.parametrize("stated", [NOISE_MM, None])
+@pytest.mark.parametrize(
+    ("axis_mm", "correlation"),
+    [((0.02, 0.02, 0.02), 0.0), ((0.025, 0.025, 0.025), 0.0), ((0.01, 0.02, 0.05), 0.0), ((0.02, 0.02, 0.02), 0.5)],
+)
+def test_the_numbers_are_recovered_from_what_smooth_columns_leave(axis_mm, correlation, stated):
+    """With effects in the data that the columns hold: sizes within 4 standard errors, no bias from what was fitted."""
+    if stated is None and correlation:
+        pytest.skip("correlated noise that nobody has stated is limited to what its roughest part shows")
+    found = []
+    for seed in range(6):
+        generator = np.random.default_rng(seed)
+        columns = _columns(generator)
+        data = _noise(generator, _SERIES, np.array(axis_mm), correlation) + columns @ generator.normal(size=60)
+        found.append(fit_noise(data, columns, _SERIES, stated))
+    sizes = np.mean([one.axis_mm for one in found], axis=0)
+    error = 4.0 / np.sqrt(2.0 * 6 * (len(_SERIES) - 20) * (1.0 - correlation))
+    np.testing.assert_allclose(sizes, axis_mm, rtol=error + (0.2 if len(set(axis_mm)) > 1 else 0.02))
+    assert np.mean([one.correlation for one in found]) == pytest.approx(correlation, abs=0.08)
+
+
+def test_what_is_smooth_and_larger_than_the_stated_noise_is_none():
+    """A drift ten times the noise along every run stays for the discrepancy to explain."""
+    generator = np.random.default_rng(1)
+    drift = _noise(generator, _SERIES, np.full(3, 0.2), 0.95)
+    model = fit_noise(drift + 0.02 * generator.standard_normal(drift.shape), np.zeros((*drift.shape, 0)), _SERIES, 0.02)
+    smooth = model.axis_mm**2 * model.correlated
+    assert (smooth <= (1.31 * 0.02) ** 2).all()
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0, 3.0])
+def test_a_smooth_discrepancy_beside_the_noise_is_no_part_of_it(size):
+    """Where a model lacks something smooth the noise is found as it is, not as large as both together."""
+    wave = half_waves(_SERIES)
+    found = []
+    for seed in range(6):
+        generator = np.random.default_rng(seed)
+        cosines = generator.standard_normal((len(_SERIES), 3)) * np.sqrt(spectrum(wave))[:, None] * size * NOISE_MM
+        smooth = _from_cosines(cosines)
+        data = smooth + NOISE_MM * generator.standard_normal(smooth.shape)
+        found.append(fit_noise(data, np.zeros((*data.shape, 0)), _SERIES, NOISE_MM, discrepancy=spectrum))
+    assert np.mean([one.mean_mm for one in found]) == pytest.approx(NOISE_MM, rel=0.15)
+    assert np.mean([one.discrepancy for one in found]) == pytest.approx(size, rel=0.25)
+
+
+def test_no_discrepancy_is_found_in_noise_alone():
+    """White noise, correlated noise and offsets of runs of the stated size: nothing is left to be unexplained."""
+    for seed, settings in enumerate(({}, {"correlation": 0.7}, {"offset_mm": NOISE_MM}) * 3):
+        noise = _noise(np.random.default_rng(seed), _SERIES, np.full(3, NOISE_MM), **settings)
+        model = fit_noise(noise, np.zeros((*noise.shape, 0)), _SERIES, NOISE_MM, discrepancy=spectrum)
+        assert model.discrepancy == 0.0, settings
+
+
+def _from_cosines(cosines):
+    """Values (m, 3) whose cosines along each series are given (m, 3)."""
+    values = np.empty_like(cosines)
+    for label in np.unique(_SERIES):
+        values[label == _SERIES] = idct(cosines[label == _SERIES], axis=0, norm="ortho")
+    return values
+
+
+SCENARIOS = {
+    "larger": {"axis_mm": np.full(3, NOISE_MM / 0.8)},
+    "smaller": {"axis_mm": np.full(3, NOISE_MM * 0.8)},
+    "correlated": {"axis_mm": np.full(3, NOISE_MM), "correlation": 0.5},
+    "slow": {"axis_mm": np.full(3, NOISE_MM), "correlation": 0.8},
+    "axes": {"axis_mm": NOISE_MM * np.array([0.5, 1.0, 2.5])},
+    "scatter": {"axis_mm": np.full(3, 1.8 * NOISE_MM)},
+    "runs": {"axis_mm": np.full(3, NOISE_MM), "offset_mm": 0.5 * NOISE_MM},
+}
+
+
+@pytest.mark.parametrize("effect", [None, "drive_compliance"])
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_noise_that_is_not_as_stated_is_no_cause(name, effect):
+    """Nothing acts, or one effect: the verdict is that of clean noise."""
+    frame = measure((strong(effect, 4.0),) if effect else (), noise_mm=0.0)
+    noise = _noise(np.random.default_rng(11), frame["run"].to_numpy(), **SCENARIOS[name])
+    frame = frame.assign(**rows.vector_columns("measured", rows.measured(frame) + noise))
+    verdict = diagnosed(frame).verdict
+    assert verdict["effects"] == (effect or "none")
+    contradicted = name in ("axes", "scatter")
+    assert ("noise stated" in verdict["notes"]) == contradicted
+
+
+def test_a_noise_that_is_known_is_not_fitted():
+    known = MeasuredRobot(ROBOT, MASSES, NOISE_MM, noise_known=True)
+    verdict = diagnose(measure((strong("drive_compliance", 4.0),)), known).verdict
+    assert verdict["effects"] == "drive_compliance" and verdict["noise_from"] == "given"
+    assert verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * NOISE_MM) and verdict["noise_correlation"] == 0.0

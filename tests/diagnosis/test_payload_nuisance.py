@@ -1,0 +1,149 @@
+"""A load that nobody told of and a base that leans: what gives way is named, its numbers hold, and the user is told."""
+
+from dataclasses import replace
+from itertools import permutations
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+
+from rrru.diagnosis.design.expected_information import worth
+from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.payload_nuisance import doubts_of
+from rrru.diagnosis.settings import GapSettings, check
+from rrru.diagnosis.terms import Term
+from rrru.diagnosis.whitened import LEVELS
+from rrru.effects.protocol import bears_load, gives_way
+from rrru.errors import ConfigError
+from rrru.kinematics.dynamics import Masses
+from rrru.kinematics.point_masses import PLATFORM
+from rrru.seeds import stream
+from rrru.studies.blind_validation.box import draw_trajectories
+from rrru.studies.blind_validation.faults import Fault
+from rrru.studies.blind_validation.foreign import FileRobot
+from tests.diagnosis.campaigns import ROBOT, active, measure
+from tests.diagnosis.test_marginal_problem import GRIDS, asked, coefficients_of, the_same
+from tests.studies.blind_validation.files import conditions
+
+_FILE, _SOFT = "hexapod_file", (0.03, 0.012, 0.045, 0.02, 0.035, 0.025)
+_OFF = {"extra_kg": 1.2, "lean_x": 0.025, "lean_y": -0.02}
+
+
+def _found(more, settings=None):
+    """Verdict and `gap_parameters` by effect and parameter of a hexapod with soft legs."""
+    known = conditions(_FILE)
+    fault = Fault("soft_servo_under_a_load", _SOFT, more)
+    paths = draw_trajectories(stream(5, "paths"), known)
+    robot = FileRobot("a hexapod", _FILE, "own", paths, (0.2, -0.1, 0.3, 0.1, -0.4, 0.2), (fault,))
+    measurements = robot.measured(known)
+    told = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
+    result = diagnose(measurements, told, settings or GapSettings(), details=False)
+    return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"]), result.attribution
+
+
+@pytest.fixture(scope="module")
+def misled():
+    """Under a weight that is not as told."""
+    return _found({"load_kg": _OFF["extra_kg"], "tilt_x_rad": _OFF["lean_x"], "tilt_y_rad": _OFF["lean_y"]})
+
+
+@pytest.fixture(scope="module")
+def as_told():
+    """Under a weight that is as told."""
+    return _found({})
+
+
+def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
+    *_, attribution = misled
+    nothing = replace(attribution.hypothesis, terms=(), strengths=np.zeros((len(LEVELS), 0)))
+    answers = (attribution.hypothesis, attribution.level), (nothing, attribution.level)
+    now, runs = worth(attribution, *answers, attribution.case)
+    assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
+
+
+def test_beside_a_weight_the_order_of_the_terms_makes_no_difference(misled):
+    *_, attribution = misled
+    evidence = attribution.evidence
+    terms = Term("backlash"), Term("drive_compliance"), Term("joint_clearance", 1)
+    assert evidence.projected(terms, [0]).weights
+    the_same(asked(evidence, terms, GRIDS))
+    first, *others = (coefficients_of(evidence, terms, order) for order in permutations(range(3)))
+    for other in others:
+        for one, own in zip(first, other, strict=True):
+            np.testing.assert_allclose(own, one, rtol=1e-6, atol=1e-9)
+
+
+def test_the_springs_are_named_and_within_their_errors(misled):
+    verdict, numbers, _ = misled
+    assert verdict["effects"] == "drive_compliance"
+    own = numbers.loc["drive_compliance"]
+    off = (own["value"] - np.array(_SOFT)) / own["standard_error"]
+    # six numbers of chi-square 22.5 in a thousand draws once
+    assert (off**2).sum() < 22.5
+    assert (own["standard_error"] < 0.1 * np.array(_SOFT)).sum() >= 4
+
+
+def test_what_the_weight_is_off_by_is_found_and_told(misled):
+    verdict, numbers, _ = misled
+    weight = numbers.loc["weight"]
+    off = (weight["value"] - list(_OFF.values())) / weight["standard_error"]
+    assert list(weight.index) == list(_OFF) and (off**2).sum() < 16.3
+    sure = weight[weight["value"].abs() > 3.0 * weight["standard_error"]]
+    said = sum(verdict["notes"].count(words) for words in ("more than stated", "the base is tilted"))
+    assert len(sure) and said == len(sure)
+
+
+def test_a_weight_that_is_as_told_stays_so(as_told):
+    verdict, numbers, _ = as_told
+    weight = numbers.loc["weight"]
+    assert verdict["effects"] == "drive_compliance" and "weight not" not in verdict["notes"]
+    assert (weight["value"].abs() < 3.0 * weight["standard_error"]).all()
+
+
+def test_a_weight_that_is_known_is_not_fitted(as_told):
+    known = dict.fromkeys(_OFF, 0.0)
+    verdict, numbers, _ = _found({}, GapSettings(known={"weight": known}))
+    assert verdict["effects"] == "drive_compliance" and "weight" not in numbers.index.get_level_values("effect")
+    _, free, _ = as_told
+    sizes = [one.loc["drive_compliance", "standard_error"] for one in (numbers, free)]
+    assert (sizes[0] < sizes[1]).all()
+
+
+@pytest.mark.parametrize("wrong", [{"lean": 0.0}, {"extra_kg": 1.0}], ids=["no such number", "not as told"])
+def test_of_the_weight_only_that_it_is_as_told_can_be_known(wrong):
+    with pytest.raises(ConfigError, match=r"gap\.known: weight"):
+        GapSettings(known={"weight": wrong}).library(conditions(_FILE).mechanism)
+
+
+def test_leans_about_all_axes_may_be_known_for_robots_of_one_configuration_stand_or_hang():
+    known = {"weight": dict.fromkeys(("extra_kg", "lean_x", "lean_y", "lean_z"), 0.0)}
+    config = yaml.safe_load(Path("config.yaml").read_text())
+    check({"gap": config["gap"] | {"known": known}, "seed": 1})
+    GapSettings(known=known).library(conditions(_FILE).mechanism)
+
+
+def test_a_weight_may_lean_either_way_and_no_platform_is_lighter_than_nothing():
+    masses = Masses(platform_kg=3.0, arm_kg=1.0, forearm_kg=0.0)
+    doubts, bounds = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses)
+    assert doubts["extra_kg"] == pytest.approx(0.3 * 23.0) and -3.0 < bounds["extra_kg"][0] < -2.0
+    assert all(bounds[lean][0] == -bounds[lean][1] for lean in ("lean_x", "lean_y"))
+    nothing, _ = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    assert not any(nothing.values())
+
+
+def test_an_arm_that_was_told_no_tool_may_carry_one():
+    arm = conditions("arm6_file").mechanism
+    arm = replace(arm, lumps=tuple(lump for lump in arm.lumps if lump.joint != PLATFORM))
+    doubts, _ = doubts_of(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    assert doubts["extra_kg"] == pytest.approx(0.1 * sum(lump.mass_kg for lump in arm.lumps)) and doubts["lean_x"] > 0.0
+
+
+def test_where_a_joint_is_loose_the_weight_is_not_found():
+    loose = active("joint_clearance", [0.3, 0.25, 0.35])
+    assert bears_load(loose.effect) and not gives_way(loose.effect)
+    measurements = measure((loose,), seed=3)
+    result = diagnose(measurements, MeasuredRobot(ROBOT, Masses(3.0, 1.0, 0.5), 0.02), GapSettings(), details=False)
+    assert result.verdict["effects"] == "joint_clearance" and not result.attribution.state.weight
+    assert "weight not" not in result.verdict["notes"]

@@ -1,0 +1,286 @@
+"""The search against an enumeration of everything, the exact fit against known truth, and advice against brute
+force.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations, product
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.diagnosis.calibrate import calibrate
+from rrru.diagnosis.design.advise import NOTHING, advise
+from rrru.diagnosis.design.run_limits import StatedLimits
+from rrru.diagnosis.evidence import averaged
+from rrru.diagnosis.hypothesis import Hypothesis
+from rrru.diagnosis.inference import Attribution, attribute, fit_hypothesis
+from rrru.diagnosis.model_fit import fit_model
+from rrru.diagnosis.model_space import explore
+from rrru.diagnosis.settings import Prior
+from rrru.diagnosis.state import State
+from rrru.diagnosis.terms import Term, spread, variants
+from rrru.diagnosis.verdict import Group, decide
+from rrru.diagnosis.whitened import LEVELS
+from rrru.effects.protocol import Coordinates
+from rrru.kinematics.dynamics import Masses
+from rrru.parameters import ParameterSet
+from tests.diagnosis.campaigns import (
+    EFFECTS,
+    FORWARD,
+    FULL,
+    MASSES,
+    REVERSE,
+    active,
+    case_of,
+    drawn,
+    measure,
+    plan_of,
+    strong,
+)
+
+FEW = ("leg_asymmetry", "servo_lag", "backlash")
+
+
+def _library(*names):
+    return {name: EFFECTS[name] for name in names}
+
+
+def _score(evidence, terms):
+    """Log evidence (levels,) averaged over all combinations of strengths."""
+    return averaged(evidence.over_strengths(terms)[0], len(terms)) if terms else evidence.none
+
+
+@pytest.mark.parametrize("acting", [(), ("servo_lag",), ("leg_asymmetry", "backlash")])
+def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
+    case = case_of(measure(tuple(strong(name, 4.0) for name in acting)), _library(*FEW))
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    found = explore(evidence, Prior()).hypotheses
+    choices = {name: variants(EFFECTS[name]) for name in FEW}
+    for size in range(3):
+        every = [terms for names in combinations(FEW, size) for terms in product(*(choices[name] for name in names))]
+        best = max(_score(evidence, terms).max() for terms in every)
+        reached = max(h.evidence.max() for h in found if len(h.terms) == size)
+        assert reached == pytest.approx(best, abs=1e-6)
+    assert len({frozenset(h.terms) for h in found}) == len(found)
+    assert all(len(h.effects) == len(h.terms) for h in found)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
+    case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    terms = tuple(Term(name) for name in FEW[-count:])
+    for level in (0, 2, 4):
+        one_by_one, best = evidence.over_all_strengths(terms, level)
+        together, grid = evidence.over_strengths(terms, None, [level])
+        assert one_by_one == pytest.approx(averaged(together, count)[0], abs=0.7 if count > 2 else 1e-9)
+        assert (best == grid[together[0].argmax()]).mean() > 0.6
+
+
+def test_five_effects_at_once_are_all_found():
+    names = ("leg_asymmetry", "servo_lag", "backlash", "thermal_growth", "encoder_eccentricity")
+    case = case_of(measure(tuple(strong(name, 8.0) for name in names)), EFFECTS)
+    found = attribute(case, Prior())
+    assert found.hypothesis.effects == set(names)
+    assert min(found.posterior.marginal(name) for name in names) > 0.99
+    assert sum(p for (effects, flag), p in found.posterior.sets().items() if not flag and effects == set(names)) > 0.5
+
+
+def test_every_effect_alone_is_always_weighed():
+    case = case_of(measure())
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    single = {h.terms[0] for h in explore(evidence, Prior()).hypotheses if len(h.terms) == 1}
+    assert single >= {term for effect in EFFECTS.values() for term in variants(effect)}
+
+
+def _fitted(case, start, *terms):
+    """ModelFit of a hypothesis from a start."""
+    evidence = case.evidence(case.linearise(calibrate(case)))
+    return fit_hypothesis(case, evidence, (start,), (_hypothesis(*terms), 0))
+
+
+def _hypothesis(*terms):
+    """A hypothesis of strong terms."""
+    return Hypothesis(terms, np.zeros(len(LEVELS)), np.full((len(LEVELS), len(terms)), 30.0))
+
+
+@pytest.mark.parametrize("name", ["backlash", "servo_lag", "axis_tilt", "joint_clearance", "encoder_eccentricity"])
+def test_the_exact_fit_finds_the_truth_without_noise(name):
+    truth = 3.0 * drawn(name, 7)
+    case = case_of(measure((active(name, truth),), 0.0), _library(name))
+    start = calibrate(case)
+    fit = _fitted(case, start, Term(name))
+    state, (shapes, covariance) = fit.state, fit.effect_covariance(Term(name))
+    before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
+    # in the mean the few points matter at which a hard contact has just changed sides
+    assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth) + len(shapes),) * 2
+    # the motion read from the columns is not quite the one driven
+    np.testing.assert_allclose(state.effects[name, 0], truth, atol=0.03 * np.abs(truth).max())
+
+
+def test_the_exact_fit_finds_a_time_constant_between_those_tried():
+    effect = EFFECTS["thermal_growth"]
+    true = replace(active("thermal_growth", [8e-4]), values={"strain": 8e-4, "time_constant": 380.0})
+    case = case_of(measure((true,)), {"thermal_growth": effect})
+    shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
+    state = _fitted(case, calibrate(case), Term("thermal_growth", shape)).state
+    assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
+    assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
+
+
+def test_an_exact_fit_from_another_fit_keeps_what_both_share():
+    both = (strong("servo_lag", 4.0), strong("leg_asymmetry", 4.0))
+    case = case_of(measure(both), _library("servo_lag", "leg_asymmetry"))
+    one = _fitted(case, calibrate(case), Term("servo_lag")).state
+    fit = _fitted(case, one, Term("servo_lag"), Term("leg_asymmetry"))
+    two, covariance = fit.state, fit.effect_covariance(Term("servo_lag"))[1]
+    direct = _fitted(case, calibrate(case), Term("servo_lag"), Term("leg_asymmetry")).state
+    error = np.sqrt(np.diag(covariance)[:3])
+    assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
+    left = np.sqrt((case.residual(two) ** 2).mean())
+    assert left == pytest.approx(case.noise_mm, rel=0.1)
+
+
+TWINS = frozenset({"drive_compliance", "own_weight"})
+
+
+@dataclass(frozen=True)
+class FakeCompliance:
+    """A drive that gives way as `drive_compliance` does, but to the robot's own weight alone."""
+
+    name: str = "own_weight"
+    parameters: ParameterSet = EFFECTS["drive_compliance"].parameters
+    coordinates: Coordinates = EFFECTS["drive_compliance"].coordinates
+    needs: tuple = ("drive_load",)
+
+    def contribute(self, motion, values):
+        """Changes (n, 3) of the drive angles."""
+        share = 1.0 / (1.0 + np.nan_to_num(motion.payload_kg))[:, None]
+        return motion.at_drives(np.asarray(values) * motion.drive_load * share)
+
+
+@pytest.fixture(scope="module")
+def twins():
+    """Attribution, about the calibration alone, of a campaign without payloads between two effects that differ under
+    payload only.
+    """
+    case, calibrated = _twins()
+    evidence = case.evidence(case.linearise(calibrated))
+    beliefs = explore(evidence, Prior())
+    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    verdict = decide(beliefs, case.library)
+    return found, verdict, advise(found, verdict, MASSES).runs
+
+
+def _twins():
+    library = _library("drive_compliance", "servo_lag", "thermal_growth", "transmission_error") | {
+        "own_weight": FakeCompliance()
+    }
+    case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of((FORWARD, REVERSE))), library)
+    return case, calibrate(case)
+
+
+def test_what_no_run_tells_apart_shares_the_probability(twins):
+    found, verdict, _ = twins
+    assert found.posterior.marginal("own_weight") == pytest.approx(
+        found.posterior.marginal("drive_compliance"), rel=1e-2
+    )
+    assert verdict.probability < 0.6 and {*verdict.effects, *verdict.confusable_with} >= TWINS
+
+
+def test_it_still_does_once_one_of_them_has_been_fitted():
+    beliefs = attribute(_twins()[0], Prior()).posterior
+    assert beliefs.marginal("own_weight") == pytest.approx(beliefs.marginal("drive_compliance"), rel=0.1)
+
+
+def test_a_payload_is_advised_where_only_a_payload_tells(twins):
+    _, _, table = twins
+    assert (table["payload_kg"] > 0.0).all() and len(table) and table["gain_nats"].is_monotonic_decreasing
+    assert table["now_nats"].iloc[0] < 0.01 * table["gain_nats"].iloc[0]
+    assert table["run"].str.contains("5 kg payload").all()
+
+
+def test_without_the_payload_that_alone_tells_nothing_decides_and_the_limit_is_said(twins):
+    found, verdict, _ = twins
+    none = advise(found, verdict, MASSES, StatedLimits(payload_kg=0.0))
+    sides = [set(side.split("+")) for side in none.undecided.split(" / ")]
+    assert sides[0] ^ sides[1] == TWINS and not none.runs["separates"].eq(none.undecided).any()
+    assert none.limited == "runs are proposed within the limits payload_kg 0"
+    light = advise(found, verdict, Masses(0.5, 0.1, 0.1))
+    assert light.undecided == none.undecided and light.limited.startswith("no run with a payload is proposed, ")
+    sure = advise(found, replace(verdict, sure=0.95), MASSES, StatedLimits(payload_kg=0.0))
+    assert sure.undecided == ""
+
+
+def test_runs_that_split_a_group_come_before_those_that_tell_more_of_something_else(twins):
+    found, verdict, _ = twins
+    group = Group(tuple(sorted(TWINS)), 0.99)
+    told = advise(found, replace(verdict, effects=("drive_compliance",), groups=(group,)), MASSES).runs
+    first = told["separates"] == "drive_compliance / own_weight"
+    assert first.iloc[0] and told.loc[first, "gain_nats"].is_monotonic_decreasing
+
+
+def _columns(library, linear, hypothesis):
+    own = [linear.columns[t.effect, t.shape] @ spread(library[t.effect].coordinates, t.legs) for t in hypothesis.terms]
+    return np.concatenate([linear.base, *own], axis=-1)
+
+
+def test_the_best_runs_gain_is_what_appending_it_brings(twins):
+    """The run is driven once more at the end of the campaign's table and both sums of squares are made anew by least
+    squares.
+    """
+    found, verdict, table = twins
+    best, case = table.iloc[0], found.case
+    frame = case.measurements
+    first = frame[(frame["trajectory"] == best["trajectory"])]
+    first = first[first["run"] == first["run"].iloc[0]]
+    first = first.iloc[::-1].assign(time_s=lambda f: first["time_s"].max() - f["time_s"]) if best["reverse"] else first
+    extra = first.assign(run=99, payload_kg=best["payload_kg"], speed_mm_s=best["speed_mm_s"])
+    clock = (extra["time_s"] - extra["time_s"].iloc[0]) * first["speed_mm_s"].iloc[0] / best["speed_mm_s"]
+    extra = extra.assign(time_s=clock + frame["time_s"].max() + 60.0)
+    longer = case_of(pd.concat([frame, extra], ignore_index=True), case.library)
+    tail = longer.run == 99
+    favoured = found.posterior.best_of(frozenset(verdict.effects))
+    own, other = best["separates"].split(" / ")
+    names = frozenset(other.split("+"))
+    assert own == verdict.label and TWINS - frozenset(verdict.effects) <= names
+    rival = found.posterior.best_of(names)
+    if len(rival[0].terms) > len(favoured[0].terms):
+        # the answer with more effects makes the data
+        favoured, rival = rival, favoured
+    keys = [(term.effect, term.shape) for term in (*favoured[0].terms, *rival[0].terms)]
+    new = longer.linearise(found.calibrated, keys)
+    mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].strengths[favoured[1]], favoured[1])
+    size = _columns(case.library, new, favoured[0]).shape[-1] - 7
+    prior = found.evidence.scales(rival[0].terms, rival[0].strengths[rival[1]])
+    costs = []
+    for rows in (np.zeros(len(tail), dtype=bool), tail):
+        made = [
+            _columns(case.library, found.evidence.linear, favoured[0])[..., 7:],
+            _columns(case.library, new, favoured[0])[rows][..., 7:],
+        ]
+        design = [_columns(case.library, found.evidence.linear, rival[0]), _columns(case.library, new, rival[0])[rows]]
+        target = np.concatenate([m.reshape(-1, size) for m in made]) @ mean[:size] / case.noise_mm
+        matrix = np.concatenate([d.reshape(-1, d.shape[-1]) for d in design]) / case.noise_mm
+        penalty = np.concatenate([np.zeros((len(prior), 7)), np.diag(1.0 / prior)], axis=1)
+        matrix, target = np.concatenate([matrix, penalty]), np.concatenate([target, np.zeros(len(prior))])
+        unit = np.linalg.norm(matrix, axis=0)
+        costs.append(
+            0.5 * ((target - matrix @ (np.linalg.lstsq(matrix / unit, target, rcond=None)[0] / unit)) ** 2).sum()
+        )
+    assert best["now_nats"] == pytest.approx(costs[0], abs=1e-3)
+    assert best["gain_nats"] == pytest.approx(costs[1] - costs[0], rel=0.02)
+
+
+def test_nothing_is_advised_where_nothing_rivals():
+    found = attribute(
+        case_of(
+            measure((strong("frame_misregistration", 10.0),), plan=plan_of(FULL)), _library("frame_misregistration")
+        ),
+        Prior(),
+    )
+    verdict = decide(found.posterior, found.case.effects)
+    assert verdict.label == "frame_misregistration"
+    assert advise(found, replace(verdict, rivals=()), MASSES) is NOTHING
+    assert isinstance(found.state, State) and found.dropped == 0

@@ -1,0 +1,283 @@
+"""The answer in words and as facts: it says what the tables say, whatever they say, and its numbers keep their size."""
+
+import json
+import re
+
+import jsonschema
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rrru.diagnosis import verdict_text
+from rrru.diagnosis.result_notes import REPEATABILITY_UNKNOWN
+from rrru.effects.causes import cause_texts
+from rrru.robots.catalogue import make_mechanism
+from rrru.robots.drive_words import DriveWords, drive_words
+from rrru.store import json_files
+from rrru.studies.blind_validation.sentences import claims
+from tests.figures import synthetic_gap
+from tests.figures import synthetic_tables as synthetic
+from tests.places import ROOT
+
+CAMPAIGN = synthetic.CAMPAIGN
+SCHEMA = yaml.safe_load((ROOT / "workflow/schemas/verdict.schema.yaml").read_text())
+
+_LEGS = DriveWords()
+
+
+def answered(budget=None, runs=(), drives=_LEGS, places=(), follows=(), causes=None, **verdict):
+    """Facts of a made-up diagnosis as a file holds them; drives: the robot's DriveWords."""
+    tables = {
+        "gap_budget": synthetic_gap.gap_budget(CAMPAIGN) if budget is None else budget,
+        "gap_attribute": synthetic_gap.gap_attribute(CAMPAIGN) if causes is None else causes,
+        "gap_parameters": pd.DataFrame(
+            [
+                ("link_flexure", "flexure2", "mm/N", 0.00123, 0.00011, 0.00101, 0.00145, False),
+                ("backlash", "width1", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width2", "rad", 4.04e-4, 0.2e-4, 3.65e-4, 4.43e-4, False),
+                ("backlash", "width3", "rad", 0.0, np.nan, np.nan, np.nan, False),
+            ],
+            columns=("effect", "parameter", "unit", "value", "standard_error", "low_95", "high_95", "at_bound"),
+        ),
+        "gap_next_runs": pd.DataFrame(list(runs), columns=verdict_text._RUN),
+        "gap_drive_functions": pd.DataFrame(list(places), columns=("effect", "worst", *verdict_text._WORST)),
+        "gap_remainder": pd.DataFrame(list(follows), columns=verdict_text._FOLLOWS),
+        "gap_left_out": pd.DataFrame({"reason": ["outlier in the file"], "points": [2]}),
+    }
+    row = synthetic_gap.gap_verdicts(CAMPAIGN, **verdict).iloc[0].to_dict()
+    return verdict_text.answer(CAMPAIGN, row, tables, drives)
+
+
+RUN = ("line_1 in reverse", "run", "line_1", True, 80.0, np.nan, 26, "backlash / backlash+servo_lag", 14.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"effects": "none", "leg": 0, "where": "", "next_runs": "", "confusable_with": ""},
+        {"probability": 1.0 + 5e-14},
+        {"effects": "unexplained", "leg": 0, "confusable_with": "backlash, none"},
+        {"effects": "link_flexure+unexplained", "noise_stated_mm": np.nan, "notes": "a; b"},
+    ],
+)
+@pytest.mark.parametrize("runs", [(), (RUN,)])
+def test_the_facts_fit_their_schema_and_are_the_same_bytes_every_time(changes, runs, tmp_path):
+    for name in ("first", "again"):
+        json_files.write(answered(runs=runs, **changes), tmp_path / name)
+    jsonschema.validate(json_files.read(tmp_path / "first"), SCHEMA)
+    assert (tmp_path / "first").read_bytes() == (tmp_path / "again").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["again", "first"]
+
+
+def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
+    said = " ".join(answered(runs=(RUN,))["sentences"])
+    for words in (
+        "misses by 0.37 mm at points left out of it (noise taken out)",
+        "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
+        "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
+        "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): play ",
+        "play between motor and drive arm.",
+        "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
+        "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
+        "10 % (95 %: 8 % to 13 %) does not repeat",
+        "Add them to the simulator and 0.020 mm is left",
+        "the noise is 0.035 mm",
+        "cannot rule out: drive compliance, servo lag.",
+        "Next: drive line_1 in reverse. That decides whether servo lag acts.",
+    ):
+        assert words in said
+
+
+def test_confounded_causes_are_one_sentence_with_their_probabilities():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN)
+    grouped = causes["effect"].isin(["link_flexure", "servo_lag"])
+    causes.loc[grouped, ["decision", "group_probability"]] = "group", 0.97
+    facts_of = answered(effects="backlash+link_flexure", groups="link_flexure | servo_lag", causes=causes)
+    said = facts_of["sentences"]
+    assert "Causes by their share of the gap: link flexure or servo lag 60 %, backlash 20 %." in said
+    (group,) = [one for one in said if one.startswith("One of these acts")]
+    assert "link flexure 0.98, servo lag 0.02 (probability that one does: 0.97)" in group
+    assert "together they make 60 % of the gap" in group and "The corrected model has link flexure." in group
+    assert not any(" is link flexure" in one for one in said)
+    assert any(one.startswith("Probability that it acts: backlash 0.97.") for one in said)
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+@pytest.mark.parametrize(("share", "rms"), [(0.009, 0.3), (0.5, 0.009)])
+def test_a_small_cause_is_counted_and_has_no_sentence(share, rms):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    small = budget["part"] == "backlash"
+    budget = budget.assign(share=budget["share"].mask(small, share), rms_mm=budget["rms_mm"].mask(small, rms))
+    said = answered(budget)["sentences"]
+    assert "Causes by their share of the gap: link flexure 60 %, 1 small one." in said
+    assert not any(" is backlash" in one for one in said)
+
+
+def test_a_cause_that_is_small_and_alone_has_its_sentence():
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    budget = budget.assign(rms_mm=budget["rms_mm"].mask(budget["part"] == "backlash", 0.009))
+    said = answered(budget, effects="backlash", leg=0)["sentences"]
+    assert any(" is backlash" in one for one in said)
+
+
+def test_where_no_cause_is_named_the_most_probable_answer_says_so():
+    causes = synthetic_gap.gap_attribute(CAMPAIGN).replace({"decision": {"named": "possible"}})
+    said = answered(causes=causes)["sentences"]
+    assert said[1] == "No cause is probable enough to be named; the most probable answer follows."
+    assert said[1] not in answered()["sentences"]
+
+
+@pytest.mark.parametrize(("sure", "told"), [(0.49, False), (0.51, True)])
+def test_what_does_not_repeat_is_told_where_it_more_likely_acts_than_not(sure, told):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    unsure = budget.assign(probability=budget["probability"].mask(budget["kind"].isin(["scatter", "runs"]), sure))
+    assert ("does not repeat" in " ".join(answered(unsure)["sentences"])) == told
+
+
+def test_without_a_pose_measured_twice_repeatability_is_unknown():
+    said = " ".join(answered(notes=REPEATABILITY_UNKNOWN)["sentences"])
+    assert "does not repeat" not in said
+    assert (
+        "10 % (95 %: 8 % to 13 %) is random error above the stated noise. "
+        "Repeatability is unknown: no pose was measured twice." in said
+    )
+
+
+@pytest.mark.parametrize(("factor", "gap", "why"), [(12.0, 0.02, "small"), (1.0, 0.0, "small"), (12.0, 0.2, "alike")])
+def test_where_shares_cannot_be_told_sizes_are_and_why(factor, gap, why):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    shares = budget[["share", "share_low", "share_high"]] * (factor if gap else 0.0)
+    said = " ".join(answered(budget.assign(**shares), gap_rms_mm=gap)["sentences"])
+    size = budget.set_index("part").loc["link_flexure", "rms_mm"]
+    assert "%" not in re.sub(r"\(95 %: [^)]*\)", "", said)
+    assert ("too small relative to the noise" in said) == (why == "small")
+    assert ("are confounded with each other" in said) == (why == "alike")
+    assert f"{verdict_text.rounded(size)} mm is link flexure" in said
+
+
+@pytest.mark.parametrize(
+    ("separates", "left_open", "decided"),
+    [
+        ("link_flexure+backlash / backlash", "that link flexure does not act", "whether link flexure acts"),
+        ("none / servo_lag", "servo lag", "whether servo lag acts"),
+        ("backlash+tool_offset / backlash+servo_lag", "servo lag, tool offset", "between tool offset and servo lag"),
+    ],
+)
+def test_what_the_advised_run_decides_is_said_to_be_open(separates, left_open, decided):
+    """Also where no rival alone is probable enough to be named."""
+    said = answered(runs=[(*RUN[:-2], separates, 3.0)], confusable_with="")["sentences"]
+    assert f"These data cannot rule out: {left_open}." in said and said[-1].endswith(f"That decides {decided}.")
+
+
+def test_where_no_run_decides_the_inspection_that_would_is_said():
+    facts_of = answered(undecided="backlash+link_flexure / backlash+servo_lag", probability=0.5)
+    last = facts_of["sentences"][-1]
+    flexure, lag = (cause_texts(name).inspect for name in ("link_flexure", "servo_lag"))
+    assert last == (
+        "Next: nothing that can be simulated would decide between link flexure and servo lag; inspection would. "
+        f"Link flexure: {flexure} Servo lag: {lag}"
+    )
+    assert claims._of_text(last, claims._SENTENCES)[0].kind == "next, nothing would decide"
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+def test_a_run_that_decides_something_else_follows_what_nothing_decides():
+    note = "no run with a payload is proposed, the robot moves 2 kg itself: state limits.payload_kg"
+    facts_of = answered(runs=(RUN,), undecided="my_own / none", probability=0.5, notes=note)
+    first, last = facts_of["sentences"][-2:]
+    assert first == (
+        "Next: nothing that can be simulated within the limits would decide whether my own acts; inspection would. "
+        "My own: add a sensor at the part itself."
+    )
+    assert last.startswith("Next: drive line_1 in reverse.")
+    assert claims._of_text(note, claims._NOTES)[0].kind == "runs are limited"
+
+
+def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():
+    arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
+    said = " ".join(answered(drives=drive_words(arm))["sentences"])
+    assert "link flexure at axis2, " in said and " leg " not in said and "play between motor and link." in said
+
+
+def test_every_cause_tells_what_to_inspect_and_what_to_do_by_the_kind_of_the_drives():
+    texts = [
+        effect
+        for effect in answered(drives=DriveWords(kinds=("length",) * 6))["effects"]
+        if effect["name"] == "backlash"
+    ]
+    assert texts[0]["inspect"].startswith("Block the motor and pull and push the leg") and texts[0]["remedy"]
+    assert texts[0]["source"] == cause_texts("backlash").source and "drive arm" not in str(texts)
+
+
+def test_where_a_drive_errs_most_is_told_with_its_interval():
+    places = [
+        ("backlash", True, "axis1", "rad", 0.5, 2e-4, 1e-4, 3e-4),
+        ("backlash", True, "axis2", "rad", np.radians(-37.0), -5e-4, -5.5e-4, -4.5e-4),
+        ("backlash", False, "axis2", "rad", 0.1, 9e-4, 8e-4, 1e-3),
+    ]
+    facts_of = answered(places=places)
+    said = " ".join(facts_of["sentences"])
+    text = "largest for axis2 at -37.0 degrees: -0.000500 rad (95 %: -0.000550 to -0.000450) off its mean over "
+    assert text in said
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+
+
+def test_what_the_unexplained_follows_is_said_where_one_variable_predicts_most_of_it():
+    follows = [("the value of axis2", 0.71, np.radians(12.0), "rad", 0.21), ("the time", 0.2, 60.0, "s", 0.1)]
+    facts_of = answered(effects="unexplained", leg=0, follows=follows)
+    assert (
+        "The unexplained part follows the value of axis2: a smooth function of it, which changes over about 12 "
+        "degrees, predicts 71 % of it at left-out points (0.21 mm rms)." in facts_of["sentences"]
+    )
+    jsonschema.validate(json.loads(json.dumps(facts_of)), SCHEMA)
+    unclear = answered(effects="unexplained", leg=0, follows=[("the time", 0.3, 60.0, "s", 0.1)])
+    assert any("follows no single variable that was tried: the time comes next" in one for one in unclear["sentences"])
+    steps = answered(
+        effects="unexplained", leg=0, follows=[("the sense of motion of the drives", 0.9, np.nan, "1", 0.1)]
+    )
+    assert any("steps with it predict 90 % of it" in one for one in steps["sentences"])
+
+
+def test_where_nothing_acts_or_the_library_lacks_it_no_effect_is_blamed():
+    nothing = " ".join(answered(effects="none", leg=0, confusable_with="")["sentences"])
+    assert "nothing systematic is left" in nothing and " is backlash" not in nothing
+    unknown = " ".join(answered(effects="unexplained", leg=0)["sentences"])
+    assert (
+        "no effect of the library explains it: 5 % (95 %: 4 % to 6 %) of it" in unknown
+        and " is backlash" not in unknown
+    )
+    assert "Parts of it could be: drive compliance." in unknown
+
+
+@given(st.floats(1e-7, 1e6), st.integers(1, 5))
+def test_a_rounded_number_is_off_by_half_a_digit_at_most(value, digits):
+    text = verdict_text.rounded(-value, digits)
+    assert abs(float(text) + value) <= 0.5000001 * 10.0 ** (np.floor(np.log10(value)) - digits + 1)
+    assert "e" not in text
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-7, 1e2))
+def test_a_number_with_its_interval_is_told_to_two_digits_of_the_half_width(value, half):
+    text = verdict_text.with_interval(value, value - half, value + half, "mm")
+    told, low, high = (float(part) for part in re.fullmatch(r"(.+) mm \(95 %: (.+) to (.+)\)", text).groups())
+    rounding = 0.051 * half + 1e-12 * abs(value)
+    assert (
+        abs(told - value) <= rounding and abs(low - value + half) <= rounding and abs(high - value - half) <= rounding
+    )
+    assert "-0 " not in text and "e" not in text
+
+
+@pytest.mark.parametrize(("value", "text"), [(1.0, "more than 0.99"), (1e-9, "less than 0.01"), (0.5, "0.50")])
+def test_a_probability_claims_no_certainty(value, text):
+    assert verdict_text.probability(value) == text
+
+
+def test_numbers_of_numpy_and_what_is_not_finite_are_plain_in_a_file(tmp_path):
+    json_files.write(
+        {"a": np.float64(2.5), "b": np.nan, "c": (np.int64(3), np.bool_(True)), "d": {"e": -np.inf}}, tmp_path / "f"
+    )
+    assert json.loads((tmp_path / "f").read_text()) == {"a": 2.5, "b": None, "c": [3, True], "d": {"e": None}}

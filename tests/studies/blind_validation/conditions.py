@@ -1,0 +1,19 @@
+"""What the robots of these tests share, and robots on which nothing acts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from rrru.kinematics.dynamics import Masses
+from rrru.robots.catalogue import make_mechanism
+from rrru.studies.blind_validation import draw
+from rrru.studies.blind_validation.robots import Conditions
+
+_MECHANISM = make_mechanism("rrru3", {}, angle_limit_rad=0.5, length_limit_mm=400.0)
+_MOTION = {"speed_mm_s": 80.0, "acceleration_mm_s2": 40.0, "dwell_s": 60.0}
+CONDITIONS = Conditions(_MECHANISM, _MOTION, Masses(), 0.02, 2021)
+
+
+def bare(number, kind="paper", name="bare"):
+    """A robot that deviates from the nominal one, and nothing more."""
+    return replace(draw.bare(name, np.random.default_rng(number), CONDITIONS.mechanism), kind=kind)

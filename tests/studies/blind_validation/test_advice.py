@@ -1,0 +1,119 @@
+"""Following advice: what is driven is what was advised, by the same robot, and the count of what is settled."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from rrru.campaign import measurements as rows
+from rrru.diagnosis.design.advise import candidates
+from rrru.diagnosis.design.poses import passes, points_of
+from rrru.diagnosis.diagnose import Diagnosis, MeasuredRobot
+from rrru.diagnosis.options import OPTIONS
+from rrru.diagnosis.settings import GapSettings
+from rrru.robots.catalogue import make_mechanism
+from rrru.studies.blind_validation import advice, draw
+from rrru.studies.blind_validation.robots import noise_free
+from tests.schemas import check
+from tests.studies.blind_validation.conditions import CONDITIONS, bare
+
+
+@pytest.fixture(scope="module")
+def robot():
+    """A robot with compliant drives and a campaign without payload."""
+    plain = bare(5)
+    acting = draw.draw_acting(plain, "drive_compliance", False, (2.0, 2.001), np.random.default_rng(1), CONDITIONS)
+    return replace(plain, acting=(acting,))
+
+
+def _arm(measurements, probability=0.5, runs=(), poses=None):
+    """An Arm of a made-up diagnosis."""
+    tables = {"gap_next_runs": pd.DataFrame(runs), "gap_next_poses": pd.DataFrame(poses or {})}
+    return advice.Arm(measurements, (), Diagnosis({"probability": probability}, tables, None, None, None))
+
+
+def test_every_candidate_is_driven_as_it_was_planned(robot):
+    measurements = robot.measured(CONDITIONS)
+    arm = _arm(measurements)
+    choice, table = candidates(measurements)
+    for number, run in enumerate(choice, start=1):
+        longer, runs = advice.drive(robot, arm, run, CONDITIONS, np.random.default_rng(0))
+        pd.testing.assert_frame_equal(longer.iloc[: len(measurements)], measurements)
+        extra, planned = longer.iloc[len(measurements) :], table[table["run"] == number]
+        assert len(runs) == 1 and (extra["run"] == measurements["run"].max() + 1).all()
+        np.testing.assert_allclose(rows.command(extra), rows.command(planned), atol=1e-6)
+        assert (extra["payload_kg"] == run["payload_kg"]).all() and (extra["speed_mm_s"] == run["speed_mm_s"]).all()
+        clock, asked = (frame["time_s"].to_numpy() - frame["time_s"].iloc[0] for frame in (extra, planned))
+        np.testing.assert_allclose(clock, asked, atol=1e-6)
+
+
+def test_the_robot_that_drives_on_is_the_one_that_was_measured(robot):
+    """Its own first line once more, without noise, misses by what it missed by at first."""
+    free = noise_free(robot, CONDITIONS)
+    silent = replace(CONDITIONS, noise_mm=0.0)
+    again = next(run for run in candidates(free)[0] if run["run"] == "line_1 once more")
+    longer, runs = advice.drive(robot, _arm(free), again, silent, np.random.default_rng(0))
+    twice, both = advice.drive(robot, replace(_arm(longer), runs=runs), again, silent, np.random.default_rng(0))
+    first = rows.measured(free[free["trajectory"] == "line_1"])
+    for number in (1, 2):
+        last = twice[twice["run"] == free["run"].max() + number]
+        np.testing.assert_allclose(rows.measured(last), first, atol=1e-9)
+    assert len(both) == 2 and twice["time_s"].is_monotonic_increasing
+
+
+def test_poses_are_driven_one_by_one(robot):
+    measurements = robot.measured(CONDITIONS)
+    found = passes(measurements, CONDITIONS.mechanism)
+    start, end = found.start_mm[:3], found.end_mm[:3]
+    listed = {**rows.vector_columns("from", start), **rows.vector_columns("to", end)}
+    run = {"kind": "poses", "trajectory": "poses", "reverse": False, "speed_mm_s": 80.0, "payload_kg": 5.0}
+    longer, runs = advice.drive(robot, _arm(measurements, poses=listed), run, CONDITIONS, np.random.default_rng(0))
+    extra = longer.iloc[len(measurements) :]
+    assert len(runs) == 3 and extra.groupby("run").size().tolist() == [OPTIONS.points_per_pass] * 3
+    np.testing.assert_allclose(rows.command(extra), points_of(start, end).reshape(-1, 3), atol=1e-9)
+    # passes are no trajectories to be driven again
+    names = {run["trajectory"] for run in candidates(longer)[0]}
+    assert names == {run["trajectory"] for run in candidates(measurements)[0]}
+
+
+def test_a_random_run_is_as_long_as_the_advised_one(robot):
+    measurements = robot.measured(CONDITIONS)
+    arm, generator = _arm(measurements), np.random.default_rng(0)
+    assert {advice.random_run(arm, 40, generator)["trajectory"] for _ in range(9)} == {"spiral"}
+    lines = {advice.random_run(arm, 26, generator)["run"] for _ in range(60)}
+    assert len(lines) > 5 and "spiral" not in " ".join(lines)
+    assert {advice.random_run(arm, 50, generator)["points"] for _ in range(9)} == {40}
+    assert advice.random_run(_arm(measurements, 0.95), 26, generator) is None
+
+
+def test_what_is_unsure_beside_rivals_is_ambiguous():
+    told = [
+        ("label", "sure", 0.95, "backlash", "line_1"),
+        ("label", "no rival", 0.5, "", ""),
+        ("label", "rival", 0.5, "backlash", ""),
+        ("effect", "without its effect", 0.5, "backlash", ""),
+        ("label", "advised", 0.5, "", "line_1"),
+    ]
+    verdicts = pd.DataFrame(told, columns=["check", "robot", "probability", "confusable_with", "next_runs"])
+    assert advice.ambiguous(verdicts, 20) == ["rival", "advised"] and advice.ambiguous(verdicts, 1) == ["rival"]
+
+
+def test_advice_is_followed_and_counted(robot, monkeypatch):
+    monkeypatch.setattr(advice, "SURE", 1.1)
+    monkeypatch.setattr(advice, "ROUNDS", 2)
+    known = MeasuredRobot(make_mechanism("rrru3", {}), CONDITIONS.masses, CONDITIONS.noise_mm, robot.name)
+    library = GapSettings()
+    measurements = robot.measured(CONDITIONS)
+    told = [pd.DataFrame(advice.follow(robot, measurements, CONDITIONS, known, library)) for _ in range(2)]
+    pd.testing.assert_frame_equal(*told)
+    table = check("withheld_advice", told[0])
+    assert table["round"].tolist() == [1, 2] and (table["random_run"] != "").all() and not table["settled_random"].any()
+    assert table["truth"].unique().tolist() == ["drive_compliance"]
+    followed = pd.concat([table.assign(robot=f"{k}", settled_advised=k < 3, kind="run") for k in range(4)])
+    summary = check("withheld_advice_summary", advice.advice_summary(followed))
+    last = summary[summary["round"] == 2].set_index(["group", "run"])
+    assert last.loc[("all", "advised"), ["robots", "settled", "value"]].tolist() == [4, 3, 0.75]
+    assert last.loc[("a run is advised", "random"), ["robots", "settled"]].tolist() == [4, 0]
+    assert last.loc[("poses are advised", "random"), "robots"] == 0
+    assert last["value"].isna().sum() == 4 and last.loc[("all", "advised"), "low"] == pytest.approx(0.3006, abs=1e-3)
