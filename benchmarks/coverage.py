@@ -77,7 +77,7 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     known = MeasuredRobot(campaign.mechanism, campaign.masses, noise_mm)
     settings = GapSettings(effects=campaign.library.offered, draws=draws)
     found = diagnose(frame, known, settings, details=False)
-    one, estimate = found.attribution, found.attribution.fit.estimate
+    one, estimate = found.inference, found.inference.fit.estimate
     terms, geometry = one.hypothesis.terms, estimate.parameters.places[GEOMETRY]
     prediction = one.held_out.predict(terms, one.hypothesis.strengths_of(terms, one.level), one.level)
     expected = np.sum(prediction.left_mm2, axis=1) + prediction.uncertainty_mm2
@@ -95,11 +95,11 @@ def state_of(campaign, frame, noise_mm, draws=_RESAMPLES):
     )
 
 
-def _residual(campaign, frame, attribution):
+def _residual(campaign, frame, inference):
     """What the corrected model leaves (n, 3) of another table of readings, where a diagnosis would use them."""
     case = make_case(frame, sim(campaign.mechanism), campaign.masses, 1.0, {})
-    case = replace(case, library=attribution.case.library).standing(attribution.state)
-    return np.where(case.used[:, None], case.left(attribution.state), np.nan)
+    case = replace(case, library=inference.case.library).standing(inference.state)
+    return np.where(case.used[:, None], case.left(inference.state), np.nan)
 
 
 # --- one draw

@@ -13,7 +13,7 @@ import pandas as pd
 
 from rrru.diagnosis.evidence import ModelEvidence
 from rrru.diagnosis.heldout import HeldOut
-from rrru.diagnosis.state import Linear
+from rrru.diagnosis.state import LinearizedProblem
 from rrru.estimation.noise_model import NoiseModel
 
 _SHARED, _PLACE = 4, 3
@@ -30,7 +30,7 @@ def held_out_of_targets(generator, noise_mm=0.02, poses=120):
         columns[own, :, _SHARED + target * _PLACE : _SHARED + (target + 1) * _PLACE] = turns
     run = np.repeat([1, 2], poses)
     data = noise_mm * generator.standard_normal((count, 3))
-    linear = Linear(data, columns, {}, {}, {}, np.zeros((count, 3, 0)))
+    linear = LinearizedProblem(data, columns, {}, {}, {}, np.zeros((count, 3, 0)))
     points = pd.DataFrame({"trajectory": "poses", "run": run})
     case = SimpleNamespace(points=points, run=run, stop=np.arange(count), series=run, noise_mm=noise_mm)
     return HeldOut(case, ModelEvidence({}, linear, run, NoiseModel.white(noise_mm), False)), columns

@@ -24,7 +24,7 @@ from rrru.diagnosis.make_problem import make_case
 from rrru.effects.library import find
 from rrru.effects.motion import standing
 from rrru.effects.protocol import ActiveEffect, gives_way
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.dynamics import Masses, carried_kg, level_axes
 from rrru.kinematics.point_masses import PLATFORM
 from rrru.robots.from_dh import from_dh
@@ -276,7 +276,7 @@ def _with_parameters(robot, scene, commands):
     nominal, reads = nominal_robot(robot), rows.reads(commands)
     if scene.open and robot == "rrru3":
         # places of a target and of the frame: a platform that never turns has no use for both
-        reads = Reads(("reflector a",), ("reflector a",), frame=True)
+        reads = MeasurementConfig(("reflector a",), ("reflector a",), frame=True)
     if reads.reflectors:
         nominal = nominal.reading(reads)
     if scene.open:
@@ -435,7 +435,9 @@ def _draw_payload(campaign, generator):
     """Extra mass at the platform and tilt of the base by name, from their prior."""
     robot = campaign.mechanism
     stated = carried_kg(robot, campaign.masses, campaign.commands["payload_kg"].to_numpy())
-    stated += sum(lump.mass_kg for lump in getattr(robot, "lumps", ()) if lump.joint == PLATFORM)
+    stated += sum(
+        point_mass.mass_kg for point_mass in getattr(robot, "point_masses", ()) if point_mass.joint == PLATFORM
+    )
     wide = np.array([PAYLOAD_SHARE * stated.max(), TILT_SD_RAD])
     mass_sd, tilt_sd = np.where(generator.random(2) < NARROW_ODDS, NARROW, 1.0) * wide
     # nothing weighs less than a tenth of what is stated

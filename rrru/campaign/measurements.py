@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
@@ -83,12 +83,12 @@ def on_the_world(measurements: pd.DataFrame) -> np.ndarray | None:
     return result if result.any() else None
 
 
-def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> Reads:
+def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> MeasurementConfig:
     """What a campaign's readings leave open; known: reflectors whose places are stated; registered: its frame was."""
     names = tuple(pd.unique(sites(measurements["target"]))) if "target" in measurements else ()
     stated = set(sites(pd.Series([*known], dtype=object)))
     fitted = tuple(name for name in names if name not in stated)
-    return Reads(names, fitted, has_turns(measurements), registered)
+    return MeasurementConfig(names, fitted, has_turns(measurements), registered)
 
 
 def sites(targets: pd.Series) -> pd.Series:

@@ -21,14 +21,14 @@ COLUMNS = ("part", "kind", "rms_mm", "share", "share_low", "share_high", "probab
 _UNEXPLAINED = "unexplained"
 
 
-def budget(attribution, stated_mm, generator, draws):
+def budget(inference, stated_mm, generator, draws):
     """Rows of `gap_budget` without the campaign; stated_mm: the instrument's noise per axis, None where unknown."""
-    squares, products, fitted = _drawn(attribution, generator, draws)
-    noise = _noise_parts(attribution, stated_mm, generator, draws)
-    residual = attribution.case.residual(attribution.calibrated)
+    squares, products, fitted = _drawn(inference, generator, draws)
+    noise = _noise_parts(inference, stated_mm, generator, draws)
+    residual = inference.case.residual(inference.calibrated)
     instrument = float(noise.pop("instrument").mean())
-    gap = float((residual[attribution.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
-    beliefs = attribution.posterior
+    gap = float((residual[inference.case.on_robot] ** 2).sum(axis=1).mean()) - instrument
+    beliefs = inference.posterior
     unexplained = squares.pop(_UNEXPLAINED)
     rows = [(name, "effect", drawn, beliefs.marginal(name)) for name, drawn in squares.items()]
     rows += [(name, name, *drawn) for name, drawn in noise.items()]
@@ -52,11 +52,11 @@ def _row(part, kind, squares, probability, total):
     return part, kind, float(np.sign(mean) * np.sqrt(abs(mean))), *map(float, share), float(probability)
 
 
-def _drawn(attribution, generator, draws):
+def _drawn(inference, generator, draws):
     """Draws (b,) of mean squares, of effects and of what is unexplained, by name, and of products of two of them; the
     share of the noise that the calibration absorbs.
     """
-    case, evidence, beliefs = attribution.case, attribution.evidence, attribution.posterior
+    case, evidence, beliefs = inference.case, inference.evidence, inference.posterior
     linear = evidence.linear
     left = _LeftByCalibration(linear.base, case.on_robot)
     data, count = left.of(linear.data.reshape(-1, 1)), int(case.on_robot.sum())
@@ -107,7 +107,7 @@ def _parts(evidence, hypothesis, level, left, generator, count):
     """
     if not hypothesis.terms:
         return {}
-    mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+    mean, covariance = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
     # numbers of very different sizes
     unit = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     size, turned = np.linalg.eigh(covariance / np.outer(unit, unit))
@@ -133,11 +133,11 @@ def _parts(evidence, hypothesis, level, left, generator, count):
     return result
 
 
-def _noise_parts(attribution, stated_mm, generator, draws):
+def _noise_parts(inference, stated_mm, generator, draws):
     """Draws (b,) of the instrument's mean square, and draws and probability of scatter and runs."""
-    case = attribution.case
+    case = inference.case
     model = case.noise or NoiseModel.white(case.noise_mm)
-    freedom = max(len(case) - attribution.evidence.linear.base.shape[-1], 1)
+    freedom = max(len(case) - inference.evidence.linear.base.shape[-1], 1)
     axes = model.axis_mm**2 * (1.0 + np.sqrt(2.0 / freedom) * generator.standard_normal((draws, 3)))
     scatter, probability = np.zeros((draws, 3)), np.nan
     if stated_mm:

@@ -1,4 +1,4 @@
-"""What every single term would add to a set of terms: log evidence at all its strengths, those of the set unchanged.
+"""What every single term would add to a set of terms: log evidence at all its prior scales, those of the set unchanged.
 
 Once the coefficients of a set have been averaged over, the Gram matrix and the moments of all other columns are
 
@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from rrru.diagnosis.evidence import STRENGTHS
+from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.evidence_kernels import log_evidence_of_blocks
 from rrru.diagnosis.marginal_problem import posterior_mean
 
@@ -41,30 +41,30 @@ class Candidates:
             return (
                 np.zeros(0, dtype=int),
                 np.zeros(1, dtype=int),
-                np.zeros((len(STRENGTHS), 0)),
+                np.zeros((len(PRIOR_SCALES), 0)),
                 np.zeros(0, dtype=bool),
             )
         scale = [
-            np.concatenate([own[0].at(strength), *(prior.size for prior in own[1:])])
+            np.concatenate([own[0].at(prior_scale), *(prior.size for prior in own[1:])])
             for own in priors
-            for strength in STRENGTHS
+            for prior_scale in PRIOR_SCALES
         ]
-        rows = [np.concatenate(scale[k :: len(STRENGTHS)]) for k in range(len(STRENGTHS))]
+        rows = [np.concatenate(scale[k :: len(PRIOR_SCALES)]) for k in range(len(PRIOR_SCALES))]
         numbers, positive = (
             np.concatenate([getattr(prior, name) for own in priors for prior in own]) for name in ("index", "positive")
         )
         return numbers, np.cumsum([0, *sizes]), np.array(rows), positive
 
-    def gains(self, terms, strengths, level):
-        """Log evidence (c, s) that each of `self.terms` adds at STRENGTHS to a set at its strengths and a level.
+    def gains(self, terms, prior_scales, level):
+        """Log evidence (c, s) that each of `self.terms` adds at PRIOR_SCALES to a set at its prior scales and a level.
 
         -inf for terms of effects that the set has.
         """
         evidence = self._evidence
         taken = {term.effect for term in terms}
-        result = np.full((len(self.terms), len(STRENGTHS)), -np.inf)
+        result = np.full((len(self.terms), len(PRIOR_SCALES)), -np.inf)
         numbers, ends, scale, positive = self._blocks
-        gram, moment, across = self._left(terms, strengths, level)
+        gram, moment, across = self._left(terms, prior_scales, level)
         few = log_evidence_of_blocks(gram, moment, across, numbers, ends, scale, positive)
         result[: len(few)] = few
         own = None
@@ -73,15 +73,15 @@ class Candidates:
             if term.effect in taken:
                 result[row] = -np.inf
             elif row >= len(few):
-                grids = [[strength] for strength in strengths]
+                grids = [[prior_scale] for prior_scale in prior_scales]
                 if own is None:
                     own = evidence.over_strengths(terms, grids, [level])[0][0, 0] if terms else evidence.none[level]
-                result[row] = evidence.over_strengths((*terms, term), (*grids, STRENGTHS), [level])[0][0] - own
+                result[row] = evidence.over_strengths((*terms, term), (*grids, PRIOR_SCALES), [level])[0][0] - own
         return result
 
-    def _left(self, terms, strengths, level):
+    def _left(self, terms, prior_scales, level):
         """Gram matrix (K, K), moments (K,) and across (K, x): what a set leaves is the first less across across^T."""
-        gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, strengths, level)
+        gram, across, moment, problem, scale = self._evidence.remaining_columns(terms, prior_scales, level)
         if problem is None:
             return gram, moment, across
         own = gram[problem.index] - across[problem.index] @ across.T

@@ -15,7 +15,7 @@ _HIDDEN = "the calibration takes it up entirely on these points"
 _UNKNOWN = {"visible_share": np.nan, "detectable_mm": np.nan, "imitated_by": "", "imitated_share": np.nan}
 
 
-def identify(case, linear):
+def detectability(case, linear):
     """Rows of `gap_identifiability` without the campaign, from the linearised sim without effects."""
     base, _ = np.linalg.qr(linear.base.reshape(3 * len(case), -1))
     visible = {name: _visible(case, linear, base, name) for name in case.effects}

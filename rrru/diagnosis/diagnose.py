@@ -17,8 +17,8 @@ from rrru.diagnosis.inference import (
     KNOWN,
     STATED,
     UNKNOWN_NOISE,
-    Attribution,
-    attribute,
+    InferenceResult,
+    infer,
     with_arm,
     with_beside,
     with_effects,
@@ -69,13 +69,13 @@ class MeasuredRobot:
 @dataclass(frozen=True)
 class Diagnosis:
     """verdict: mapping of `gap_verdicts` without the campaign; tables: frames by name, without the campaign; state: the
-    corrected sim; attribution: everything that the search found; decided: the Verdict itself.
+    corrected sim; inference: everything that the search found; decided: the Verdict itself.
     """
 
     verdict: dict[str, Any]
     tables: dict[str, pd.DataFrame]
     state: State
-    attribution: Attribution
+    inference: InferenceResult
     decided: Verdict
 
 
@@ -97,54 +97,54 @@ def diagnose(
     nominal, near = sim(robot.mechanism), settings.use_near_singularity
     arm_mm = nominal.angle_arm_mm if rows.has_turns(measurements) else np.nan
     case = make_case(measurements, nominal, robot.masses, robot.noise_mm or 1.0, library, near, arm_mm)
-    case = replace(case, doubts=settings.doubts(case.doubts))
+    case = replace(case, nuisance_sd=settings.nuisance_sd(case.nuisance_sd))
     case = require_determined(case, f"campaign {robot.campaign}: " if robot.campaign else "")
     if rows.has_turns(measurements):
         case = with_arm(case, robot.noise_mm, robot.noise_rad)
     case = with_beside(case)
     generator = stream(settings.seed, "gap", robot.campaign)
-    verdict, attribution, ordered = _decide(attribute(case, settings.prior, stated), settings.prior)
-    if why := why_no_answer(attribution, robot.noise_mm):
-        verdict, attribution, ordered = without_answer(why), _without_effects(attribution, settings.prior), ()
-    steps = shrink_steps(attribution, [term for term, _ in ordered], generator, settings.draws)
-    case = attribution.case
-    residual = case.residual(attribution.calibrated)
+    verdict, inference, ordered = _decide(infer(case, settings.prior, stated), settings.prior)
+    if why := why_no_answer(inference, robot.noise_mm):
+        verdict, inference, ordered = without_answer(why), _without_effects(inference, settings.prior), ()
+    steps = shrink_steps(inference, [term for term, _ in ordered], generator, settings.draws)
+    case = inference.case
+    residual = case.residual(inference.calibrated)
     own = stream(settings.seed, "gap budget", robot.campaign)
-    parts = budget(attribution, robot.noise_mm or None, own, settings.draws)
+    parts = budget(inference, robot.noise_mm or None, own, settings.draws)
     sizes = parts[parts["kind"] == "effect"].set_index("part")["rms_mm"].to_dict()
-    further = advise(attribution, verdict, robot.masses, robot.limits, sizes)
+    further = advise(inference, verdict, robot.masses, robot.limits, sizes)
     worst = worst_spot(case.motion.position_mm[case.at][case.on_robot], residual[case.on_robot])
     excluded = left_out(case, near)
-    row = _row(attribution, verdict, steps, worst, further, (robot.noise_mm, excluded))
+    row = _row(inference, verdict, steps, worst, further, (robot.noise_mm, excluded))
     ranked = further.runs.assign(rank=np.arange(1, len(further.runs) + 1))
     tables = {"gap_budget": parts, "gap_next_runs": ranked, "gap_next_poses": further.poses, "gap_left_out": excluded}
-    tables["gap_parameters"] = parameter_rows(attribution)
-    tables["gap_drive_functions"] = drive_functions(attribution, drive_words(robot.mechanism).all_names)
+    tables["gap_parameters"] = parameter_rows(inference)
+    tables["gap_drive_functions"] = drive_functions(inference, drive_words(robot.mechanism).all_names)
     unexplained = verdict.unexplained and not verdict.no_answer
-    tables["gap_remainder"] = remainder_rows(attribution) if unexplained else NO_REMAINDER
+    tables["gap_remainder"] = remainder_rows(inference) if unexplained else NO_REMAINDER
     if details:
-        tables |= details_of(attribution, verdict, steps, residual, generator, settings.draws)
-    return Diagnosis(row, tables, attribution.state, attribution, verdict)
+        tables |= details_of(inference, verdict, steps, residual, generator, settings.draws)
+    return Diagnosis(row, tables, inference.state, inference, verdict)
 
 
-def _found(attribution: Attribution) -> Iterator[str]:
+def _found(inference: InferenceResult) -> Iterator[str]:
     """What a user has to know of the robot beside its effects."""
-    yield from zero_notes(attribution.fit.estimate, attribution.case.mechanism)
-    yield from bias_notes(attribution)
-    yield from weight_notes(attribution)
-    yield from weight_doubts(attribution)
+    yield from zero_notes(inference.fit.estimate, inference.case.mechanism)
+    yield from bias_notes(inference)
+    yield from weight_notes(inference)
+    yield from weight_doubts(inference)
 
 
-def _notes(attribution: Attribution, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
+def _notes(inference: InferenceResult, stated_mm: float | None, excluded: pd.DataFrame) -> Iterator[str]:
     """What the data lack for a better answer, and what they contradict; excluded: the rows of `gap_left_out`."""
-    case = attribution.case
-    yield from fit_notes(attribution)
-    yield from posterior_notes(attribution.posterior)
+    case = inference.case
+    yield from fit_notes(inference)
+    yield from posterior_notes(inference.posterior)
     if case.count < OPTIONS.min_used_share * len(case.used):
         yield left_out_note(excluded, case.count, len(case.used))
     if few := few_readings(case):
         yield few
-    acting = {name for name, _ in attribution.state.effects} & case.known.keys()
+    acting = {name for name, _ in inference.state.effects} & case.known.keys()
     if lacking := case.count - len(np.unique(case.at[case.complete(acting)])):
         where_not = f"{lacking} of {case.count} points, where the rows do not determine all that is needed"
         yield f"{', '.join(sorted(acting))} fitted without {where_not}"
@@ -159,7 +159,7 @@ def _joined(notes: Sequence[str]) -> str:
 
 
 def _row(
-    attribution: Attribution,
+    inference: InferenceResult,
     verdict: Verdict,
     steps: Sequence,
     worst_mm: np.ndarray,
@@ -168,16 +168,16 @@ def _row(
 ) -> dict:
     """The row of `gap_verdicts` without the campaign; told: the stated noise in mm and the rows of `gap_left_out`."""
     stated_mm, excluded = told
-    found = [] if verdict.no_answer else _found(attribution)
-    case, noise = attribution.case, attribution.case.noise or NoiseModel.white(attribution.case.noise_mm)
+    found = [] if verdict.no_answer else _found(inference)
+    case, noise = inference.case, inference.case.noise or NoiseModel.white(inference.case.noise_mm)
     return {
         "effects": verdict.label,
         "probability": verdict.probability,
         "leg": verdict.leg,
-        "where": where(attribution, verdict.effects),
+        "where": where(inference, verdict.effects),
         "confusable_with": ", ".join(verdict.confusable_with),
         "groups": "; ".join(" | ".join(group.names) for group in verdict.groups),
-        "searches_apart": attribution.posterior.apart,
+        "searches_apart": inference.posterior.apart,
         "noise_rms_mm": float(np.sqrt(3.0) * case.noise_mm),
         "gap_rms_mm": steps[0].gap_rms_mm,
         "gap_after_rms_mm": steps[-1].gap_rms_mm,
@@ -188,10 +188,10 @@ def _row(
         "noise_stated_mm": stated_mm or np.nan,
         "noise_correlation": noise.correlation,
         "noise_runs_mm": float(np.sqrt(noise.offset * (noise.axis_mm**2).mean())),
-        "noise_from": attribution.noise_from,
+        "noise_from": inference.noise_from,
         "points": case.count,
-        "dropped_points": attribution.dropped,
-        "notes": _joined([*found, *_notes(attribution, stated_mm, excluded), *filter(None, [further.limited])]),
+        "dropped_points": inference.dropped,
+        "notes": _joined([*found, *_notes(inference, stated_mm, excluded), *filter(None, [further.limited])]),
         "not_in_model": "",
         "no_answer": verdict.no_answer,
         "file_error_mm": np.nan,
@@ -201,8 +201,8 @@ def _row(
     }
 
 
-def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attribution, tuple]:
-    """Verdict, the attribution fitted to it, and its terms with their shares in order.
+def _decide(inference: InferenceResult, prior: Prior) -> tuple[Verdict, InferenceResult, tuple]:
+    """Verdict, the inference fitted to it, and its terms with their shares in order.
 
     The probabilities come from the evidence; prediction has a veto: an effect that makes left-out points worse than the
     verdict without it does, by more than chance, is ruled out and the rest decides again. Beside something unexplained,
@@ -211,8 +211,8 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
     ruled_out: set[str] = set()
     small: frozenset[str] = frozenset()
     while True:
-        verdict = decide(attribution.posterior, attribution.case.effects, small)
-        fitted = with_effects(attribution, verdict.effects)
+        verdict = decide(inference.posterior, inference.case.effects, small)
+        fitted = with_effects(inference, verdict.effects)
         least = OPTIONS.max_heldout_loss_nats if verdict.unexplained else -OPTIONS.max_heldout_loss_nats
         worse = {name for name, gain in _gains(fitted).items() if gain < least}
         if not worse:
@@ -222,45 +222,45 @@ def _decide(attribution: Attribution, prior: Prior) -> tuple[Verdict, Attributio
                 continue
             return replace(verdict, effects=tuple(term.effect for term, _ in ordered)), fitted, ordered
         ruled_out |= worse
-        attribution = attribution.believing(_without(attribution, ruled_out, worse, prior))
+        inference = inference.with_posterior(_without(inference, ruled_out, worse, prior))
 
 
-def _small(attribution: Attribution, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
+def _small(inference: InferenceResult, shares: dict[str, float], verdict: Verdict) -> frozenset[str]:
     """Effects of a verdict that may be a part of the remainder; shares: of the gap, of each effect."""
     # shares are of positions on the robot: reflectors elsewhere may show what hardly moves these
-    if not verdict.unexplained or attribution.case.beside.any():
+    if not verdict.unexplained or inference.case.beside.any():
         return frozenset()
     found = {name for name, share in shares.items() if share < OPTIONS.min_share_with_unexplained}
-    residual = attribution.case.residual(attribution.calibrated)[attribution.case.on_robot]
+    residual = inference.case.residual(inference.calibrated)[inference.case.on_robot]
     gap_mm = float(np.sqrt((residual**2).sum(axis=1).mean()))
-    alike, left_mm = followed_alike(attribution, remainder_rows(attribution), tuple(shares))
+    alike, left_mm = followed_alike(inference, remainder_rows(inference), tuple(shares))
     least = OPTIONS.min_size_per_remainder * left_mm
     return frozenset(found | {name for name in alike if np.sqrt(max(shares[name], 0.0)) * gap_mm < least})
 
 
-def _without(attribution: Attribution, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:
+def _without(inference: InferenceResult, ruled_out: set[str], worse: set[str], prior: Prior) -> Posterior:
     """The posterior without effects that have just been found worse, and all that have been ruled out.
 
     Where every likely set holds one of them, others are looked for.
     """
-    beliefs = attribution.posterior
+    beliefs = inference.posterior
     rest = beliefs
     for name in worse:
         rest = rest.without(name)
     if rest.height > beliefs.height - OPTIONS.negligible_nats:
         return rest
-    evidence = attribution.evidence.on_library()
+    evidence = inference.evidence.on_library()
     return explore(evidence, prior, ruled_out)
 
 
-def _without_effects(attribution: Attribution, prior: Prior) -> Attribution:
-    """The attribution of the calibration alone, with a posterior that has no effect of the library."""
-    names = set(attribution.case.effects)
-    return with_effects(attribution.believing(_without(attribution, names, names, prior)), ())
+def _without_effects(inference: InferenceResult, prior: Prior) -> InferenceResult:
+    """The inference of the calibration alone, with a posterior that has no effect of the library."""
+    names = set(inference.case.effects)
+    return with_effects(inference.with_posterior(_without(inference, names, names, prior)), ())
 
 
-def _gains(attribution: Attribution) -> dict[str, float]:
+def _gains(inference: InferenceResult) -> dict[str, float]:
     """Log predictive score that each effect of the hypothesis gains on left-out points over the others."""
-    terms, level = attribution.hypothesis.terms, attribution.level
-    gains = attribution.held_out.gains(terms, attribution.hypothesis.strengths[level], level)
+    terms, level = inference.hypothesis.terms, inference.level
+    gains = inference.held_out.gains(terms, inference.hypothesis.prior_scales[level], level)
     return {term.effect: gain for term, gain in zip(terms, gains, strict=True)}

@@ -19,12 +19,12 @@ _PLACES = 721
 _COLUMNS = ("effect", "drive", "name", "unit", "drive_value", "error", "low_95", "high_95", "worst")
 
 
-def drive_functions(attribution, names):
+def drive_functions(inference, names):
     """Rows of `gap_drive_functions` without the campaign; names: of the drives.
 
     Drives that the campaign does not move, and those that an effect does not change, have none.
     """
-    case, fit = attribution.case, attribution.fit
+    case, fit = inference.case, inference.fit
     frames = [
         _of_drive(case, fit, term, k).assign(effect=term.effect, drive=k + 1, name=names[k], unit=unit)
         for term in fit.terms

@@ -46,8 +46,8 @@ def with_spectra(case, linear, terms):
                 library.pop(effect.name)
             continue
         columns = _without(linear.columns[effect.name, 0].reshape(len(data), -1), basis)
-        best, strength = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
-        typical = strength * effect.coordinates.spectra[best]
+        best, prior_scale = likeliest(data, columns, effect.coordinates.spectra, basis.shape[1])
+        typical = prior_scale * effect.coordinates.spectra[best]
         # one of several, chosen by the data
         paid = effect.coordinates.log_prior - np.log(len(effect.coordinates.spectra))
         chosen = replace(effect.coordinates, typical=typical, spectra=(), sized=True, log_prior=paid)

@@ -2,14 +2,14 @@
 
 Along each run the data d (one axis, k points) are
 
-    d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (strength sigma)^2 S)
+    d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (prior_scale sigma)^2 S)
 
 with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior), the
 effects' coefficients c, and a discrepancy w for whatever the library does not hold: K is diagonal in the cosine basis
 of the run and falls with the frequency, so that w is smooth along the path, plus a small part that is not (Kennedy and
-O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `strength` is the rms of the effect's part
-of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of it.
-Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
+O'Hagan, Bayesian calibration of computer models, 2001). S is scaled so that `prior_scale` is the rms of the effect's
+part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive half of
+it. Strengths are averaged over a grid, even in their logarithm; none makes a prior wider than its law's largest size.
 
 A law's shape parameters may be off the grid on which they were tried: each has a coefficient N(0, 1) on
 `Linear.shape_columns`, and so has the weight wherever a law bears loads (`rrru.diagnosis.payload_nuisance`).
@@ -28,14 +28,14 @@ import numpy as np
 from rrru.cache import Latest
 from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.marginal import Average, averaged_mean
-from rrru.diagnosis.marginal_problem import Prior, Projected
+from rrru.diagnosis.marginal_problem import MarginalProblem, Prior
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT, as_found, borne, gained_over_cases, mean_over_cases, over_cases
 from rrru.diagnosis.terms import EACH, SAME, spread
-from rrru.diagnosis.whitened import LEVELS, Whitened
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES, Whitened
 from rrru.estimation.noise_model import NoiseModel
 
-STRENGTHS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+PRIOR_SCALES = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 
 
 def _on_complete(method):
@@ -52,10 +52,10 @@ def _on_complete(method):
 class ModelEvidence:
     """Evidence of sets of terms on one linearisation.
 
-    library: effects by name; linear: `rrru.diagnosis.state.Linear`; run (n,): the series of each row; noise: a
-    NoiseModel; smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is; known: effect
-    to the rows (n,) at which it has all that it needs, of effects that lack something somewhere. Numbers of sets with
-    such effects are those of the rows at which all of them do.
+    library: effects by name; linear: `rrru.diagnosis.state.LinearizedProblem`; run (n,): the series of each row; noise:
+    a NoiseModel; smooth: whether a discrepancy can be smooth along the runs: of poses in no order none is; known:
+    effect to the rows (n,) at which it has all that it needs, of effects that lack something somewhere. Numbers of sets
+    with such effects are those of the rows at which all of them do.
     """
 
     library: dict
@@ -101,12 +101,14 @@ class ModelEvidence:
     @property
     def levels(self):
         """Levels (l,), as indices, that there may be."""
-        return np.arange(len(LEVELS)) if self.smooth else np.zeros(1, dtype=int)
+        return np.arange(len(DISCREPANCY_SCALES)) if self.smooth else np.zeros(1, dtype=int)
 
     @cached_property
     def none(self):
         """Log evidence (levels,) of no effect at all, -inf at levels that there cannot be."""
-        return np.array([self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(LEVELS))])
+        return np.array(
+            [self._whitened.gram(k)[2] if k in self.levels else -np.inf for k in range(len(DISCREPANCY_SCALES))]
+        )
 
     @cached_property
     def _priors(self):
@@ -127,8 +129,8 @@ class ModelEvidence:
             # of what the calibration takes up, rounding is left: it must not be blown up to the size of an effect
             unit = np.sqrt(max(power, OPTIONS.min_visible_share * total, 1e-30))
             if coordinates.sized:
-                # of many coefficients the data tell the size far better than the strengths lie apart: one is just it
-                unit = STRENGTHS[np.abs(np.log(STRENGTHS / unit)).argmin()]
+                # of many coefficients the data tell the size far better than the prior scales lie apart: one is just it
+                unit = PRIOR_SCALES[np.abs(np.log(PRIOR_SCALES / unit)).argmin()]
             size /= unit
             most = np.broadcast_to(coordinates.most, len(coordinates))
             largest = np.array([most[column > 0.0].max() for column in matrix.T])
@@ -153,9 +155,9 @@ class ModelEvidence:
         return found if made == terms else found[self._order(made, terms)]
 
     def _weakly(self, terms):
-        """The Projected problem of terms alone at one level, and weak strengths (1, terms)."""
+        """The MarginalProblem of terms alone at one level, and weak prior_scales (1, terms)."""
         # whatever levels are asked for, it is one weight
-        return self._bare(terms, partial(self._grams, self.levels[:1])), np.full((1, len(terms)), STRENGTHS[-1])
+        return self._bare(terms, partial(self._grams, self.levels[:1])), np.full((1, len(terms)), PRIOR_SCALES[-1])
 
     def _order(self, made, terms):
         """Numbers (k,) that coefficients of terms, and after them of their shapes, have in a set in another order."""
@@ -179,13 +181,13 @@ class ModelEvidence:
         return self._borne(terms, levels, self.found(terms))
 
     def _borne(self, terms, levels, found):
-        """The Projected problem of terms and of the weight, whose columns are made with coefficients found (k,)."""
+        """The MarginalProblem of terms and of the weight, whose columns are made with coefficients found (k,)."""
         grams, blocks = partial(self._grams, levels), self._blocks(terms)
         return borne(self._bare(terms, grams), len(terms), blocks, self.linear.weight_steps, found, grams)
 
     def _bare(self, terms, grams):
-        """The Projected problem of terms without the weight."""
-        return Projected.of(self.priors_of(terms), len(terms), grams)
+        """The MarginalProblem of terms without the weight."""
+        return MarginalProblem.of(self.priors_of(terms), len(terms), grams)
 
     def _blocks(self, terms):
         """`_by_weight` of the terms that give way, by their number."""
@@ -203,12 +205,13 @@ class ModelEvidence:
         return matrix, numbers.reshape(-1, len(matrix))
 
     @_on_complete
-    def over_strengths(self, terms, strengths=None, levels=None):
-        """Log evidence (levels, m) over every combination of the terms' strengths, and the combinations (m, terms).
+    def over_strengths(self, terms, prior_scales=None, levels=None):
+        """Log evidence (levels, m) over every combination of the terms' prior scales, and the combinations (m, terms).
 
-        strengths: grids, one per term, by default STRENGTHS for each; levels (l,): indices, by default all that may be.
+        prior_scales: grids, one per term, by default PRIOR_SCALES for each; levels (l,): indices, by default all that
+        may be.
         """
-        grids = tuple(strengths or (STRENGTHS,) * len(terms))
+        grids = tuple(prior_scales or (PRIOR_SCALES,) * len(terms))
         combinations = np.array(list(product(*grids)))
         levels = self.levels if levels is None else levels
         broad = self._broadest(terms)
@@ -219,32 +222,32 @@ class ModelEvidence:
         rest, others = (*terms[:broad], *terms[broad + 1 :]), (*grids[:broad], *grids[broad + 1 :])
         rows = np.array(list(product(*others)))
         problem = self.projected(rest, levels) if rest else None
-        values = [self._beside(terms[broad], strength, problem, rows, levels) for strength in grids[broad]]
+        values = [self._beside(terms[broad], prior_scale, problem, rows, levels) for prior_scale in grids[broad]]
         values = [value.reshape(len(levels), *map(len, others)) for value in values]
         return np.stack(values, axis=broad + 1).reshape(len(levels), -1), combinations
 
     @_on_complete
-    def remaining_columns(self, terms, strengths, level):
+    def remaining_columns(self, terms, prior_scales, level):
         """All columns other than the broad term of a set, and the problem of the set's others.
 
         Gram matrix (K, K) of all columns; across (K, z): what the broad term takes of it, its product with its
-        transpose; moments (K,) after that; the Projected problem at the level (an index), and the prior deviations of
-        its coefficients at the strengths, both None where there is nothing else.
+        transpose; moments (K,) after that; the MarginalProblem at the level (an index), and the prior
+        deviations of its coefficients at the prior scales, both None where there is nothing else.
         """
         broad = self._broadest(terms)
         gram, moment, _ = self._whitened.gram(level)
-        rest, strengths = tuple(terms), np.asarray(strengths, dtype=float)
+        rest, prior_scales = tuple(terms), np.asarray(prior_scales, dtype=float)
         across, average = np.zeros((len(moment), 0)), None
         if broad is not None:
-            average = self._average(terms[broad], strengths[broad], level)
+            average = self._average(terms[broad], prior_scales[broad], level)
             across, moment = average.across, average.moment
-            rest, strengths = (*terms[:broad], *terms[broad + 1 :]), np.delete(strengths, broad)
+            rest, prior_scales = (*terms[:broad], *terms[broad + 1 :]), np.delete(prior_scales, broad)
         if not rest:
             return gram, across, moment, None, None
         problem = self.projected(rest, [level])
         if average is not None:
             problem = problem.on(*(part[None] for part in average.rest(problem.index)))
-        return gram, across, moment, problem, problem.scale(strengths[None])[0]
+        return gram, across, moment, problem, problem.scale(prior_scales[None])[0]
 
     def _broadest(self, terms):
         """Number of the term of the most coefficients if these are many, None where no term has."""
@@ -253,31 +256,31 @@ class ModelEvidence:
         wide = [count if many else 0 for count, many in zip(counts, broad, strict=True)]
         return int(np.argmax(wide)) if any(wide) else None
 
-    def _beside(self, broad, strength, problem, strengths, levels):
-        """Log evidence (levels, m) of a broad term at a strength beside other terms.
+    def _beside(self, broad, prior_scale, problem, prior_scales, levels):
+        """Log evidence (levels, m) of a broad term at a prior scale beside other terms.
 
-        problem: the others' Projected at the levels, None where there are none; strengths (m, terms): theirs.
+        problem: the others' MarginalProblem at the levels, None where there are none; prior_scales (m, terms): theirs.
         """
-        averages = [self._average(broad, strength, level) for level in levels]
+        averages = [self._average(broad, prior_scale, level) for level in levels]
         value = np.array([self._whitened.gram(k)[2] + a.evidence for k, a in zip(levels, averages, strict=True)])[
             :, None
         ]
         if problem is None:
             return value
         gram, moment = (np.array(part) for part in zip(*(a.rest(problem.index) for a in averages), strict=True))
-        return value + gained_over_cases(problem.on(gram, moment), strengths)
+        return value + gained_over_cases(problem.on(gram, moment), prior_scales)
 
-    def _average(self, term, strength, level):
-        """The Average over the coefficients of a broad term at a strength and a level (an index)."""
+    def _average(self, term, prior_scale, level):
+        """The Average over the coefficients of a broad term at a prior scale and a level (an index)."""
 
         def make():
             gram, moment, _ = self._whitened.gram(level)
             prior = self._prior(term)
             # drives on which the law does not act by this term: no set has a law twice
             apart = self._whitened.layout[0][term.effect, term.shape, EACH]
-            return Average(gram, moment, prior.index, prior.at(strength), apart)
+            return Average(gram, moment, prior.index, prior.at(prior_scale), apart)
 
-        return self._averages.of((term, float(strength), int(level)), make)
+        return self._averages.of((term, float(prior_scale), int(level)), make)
 
     @cached_property
     def _problems(self):
@@ -293,10 +296,10 @@ class ModelEvidence:
 
     @_on_complete
     def over_all_strengths(self, terms, level, start=None):
-        """Log evidence of a set of terms at a level (an index) averaged over their strengths, and the best (terms,).
+        """Log evidence of a set of terms at a level (an index) averaged over their prior scales, and the best (terms,).
 
-        Of one term or two over all combinations; of more over each strength about the others' best, as if they were
-        independent of each other. start (terms,): strengths to begin from.
+        Of one term or two over all combinations; of more over each prior scale about the others' best, as if they were
+        independent of each other. start (terms,): prior scales to begin from.
         """
         if len(terms) <= OPTIONS.max_jointly_averaged_effects:
             value, grid = self.over_strengths(terms, levels=[level])
@@ -308,61 +311,63 @@ class ModelEvidence:
             for k, term in enumerate(terms):
                 # what is tried comes last: the others' part stands
                 others = *terms[:k], *terms[k + 1 :]
-                grids = *([strength] for strength in np.delete(best, k)), STRENGTHS
+                grids = *([prior_scale] for prior_scale in np.delete(best, k)), PRIOR_SCALES
                 value, _ = self.over_strengths((*others, term), grids, [level])
-                best[k], highest = STRENGTHS[value[0].argmax()], value.max()
+                best[k], highest = PRIOR_SCALES[value[0].argmax()], value.max()
                 losses[k] = averaged(value, 1)[0] - highest
             if (best == before).all():
                 break
         return highest + losses.sum(), best
 
     @_on_complete
-    def scales(self, terms, strengths):
-        """Prior standard deviations (k,) of the terms' coefficients at given strengths."""
+    def scales(self, terms, prior_scales):
+        """Prior standard deviations (k,) of the terms' coefficients at given prior scales."""
         if not terms:
             return np.zeros(0)
         problem = self.projected(terms, [0])
-        return problem.scale(np.asarray(strengths)[None])[0, problem.owner < len(terms)]
+        return problem.scale(np.asarray(prior_scales)[None])[0, problem.owner < len(terms)]
 
     def explained(self, hypothesis, effects):
         """Rms per axis, over sigma, of what some effects of a hypothesis explain at its best, calibration taken out."""
         if hypothesis.effects.isdisjoint(effects):
             return 0.0
         level = int(hypothesis.evidence.argmax())
-        mean = self._mean(hypothesis.terms, hypothesis.strengths[level], level)
+        mean = self._mean(hypothesis.terms, hypothesis.prior_scales[level], level)
         problem = self.projected(hypothesis.terms, [0])
         chosen = np.array([*(term.effect in effects for term in hypothesis.terms), True])
         mean = np.where(chosen[problem.owner], mean, 0.0)
         return float(np.sqrt(max(mean @ problem.gram[0] @ mean, 0.0) / (3.0 * len(self.on_complete(hypothesis.terms)))))
 
     @_on_complete
-    def _mean(self, terms, strengths, level):
+    def _mean(self, terms, prior_scales, level):
         """Mean (k,) of the coefficients as `coefficients` gives it, without what their covariance costs."""
         broad = self._broadest(terms)
         if broad is None:
-            return mean_over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
+            return mean_over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
         rest, prior = (*terms[:broad], *terms[broad + 1 :]), self._prior(terms[broad])
         index, found, problem = np.zeros(0, dtype=int), np.zeros(0), None
         if rest:
             problem = self.projected(rest, [level])
             index = problem.index
-            problem = problem.on(*(p[None] for p in self._average(terms[broad], strengths[broad], level).rest(index)))
-            found = mean_over_cases(problem, np.delete(strengths, broad)[None])
+            problem = problem.on(
+                *(p[None] for p in self._average(terms[broad], prior_scales[broad], level).rest(index))
+            )
+            found = mean_over_cases(problem, np.delete(prior_scales, broad)[None])
         gram, moment, _ = self._whitened.gram(level)
         others = found if problem is None or problem.mix is None else problem.mix @ found
-        own = averaged_mean(gram, moment, prior.index, prior.at(strengths[broad]), index, others)
+        own = averaged_mean(gram, moment, prior.index, prior.at(prior_scales[broad]), index, others)
         before = sum(len(self._prior(term).index) for term in terms[:broad])
         return np.concatenate([found[:before], own, found[before:]])
 
     @_on_complete
-    def coefficients(self, terms, strengths, level):
-        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at strengths and a level (an index).
+    def coefficients(self, terms, prior_scales, level):
+        """Mean (k,) and covariance (k, k) of the coefficients of a set of terms at prior scales and a level (an index).
 
         The mean obeys the positive coefficients; the covariance does not know of them.
         """
-        return over_cases(self.projected(terms, [level]), np.asarray(strengths)[None])
+        return over_cases(self.projected(terms, [level]), np.asarray(prior_scales)[None])
 
 
 def averaged(value, terms):
-    """Log evidence (levels,) over some terms' strengths from (levels, m); a grid cut short counts as the whole one."""
-    return log_sum_exp(value) - terms * np.log(len(STRENGTHS))
+    """Log evidence (levels,) over some terms' prior scales from (levels, m); a grid cut short counts as a whole one."""
+    return log_sum_exp(value) - terms * np.log(len(PRIOR_SCALES))

@@ -302,7 +302,7 @@ def log_evidence(gram, moment, scale, positive):
     """
     if np.count_nonzero(positive) < 2:
         return log_evidence_and_correction(gram, moment, scale, positive)[0]
-    # strengths that a law's largest size caps have the same deviations, and moments take long
+    # prior scales that a law's largest size caps have the same deviations, and moments take long
     distinct, which = _distinct(scale)
     return log_evidence_and_correction(gram, moment, scale[distinct], positive)[0][:, which]
 

@@ -13,7 +13,7 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.terms import signatures
 from rrru.diagnosis.terms import spread as spread_of
-from rrru.diagnosis.whitened import levels_of, spectrum
+from rrru.diagnosis.whitened import discrepancy_scales, spectrum
 from rrru.estimation.cross_validation import CrossValidation, choose_folds
 from rrru.estimation.noise_model import half_waves, lengths
 
@@ -88,24 +88,24 @@ class HeldOut:
         for length in (OPTIONS.points_per_stretch, 1):
             yield np.unique((place // length + run) % OPTIONS.stretch_folds, return_inverse=True)[1]
 
-    def predict(self, terms, strengths, level, uncertain=True):
+    def predict(self, terms, prior_scales, level, uncertain=True):
         """Prediction by the calibration together with a set of terms.
 
-        The fit is that of `ModelEvidence.coefficients` at given strengths and discrepancy level (an index), with the
+        The fit is that of `ModelEvidence.coefficients` at given prior scales and discrepancy level (an index), with the
         effect models as they are. uncertain: state the prediction's spread, too.
         """
         linear = self.evidence.linear
         together = np.concatenate(self._blocks(terms), axis=-1)
         residual, spread = np.empty_like(linear.data), np.empty_like(together if uncertain else linear.base[..., :0])
-        for number, fit in self._fits(terms, strengths, level).items():
+        for number, fit in self._fits(terms, prior_scales, level).items():
             out = self.fold == number
             residual[out] = linear.data[out] - together[out] @ fit.mean
             if uncertain:
                 spread[out] = fit.half(together[out].reshape(-1, len(fit.mean))).T.reshape(-1, 3, len(fit.mean))
         return Prediction(residual, spread, self._left(level), self.case.series if self._whole_runs else None)
 
-    def gains(self, terms, strengths, level):
-        """Log predictive score that each of the terms adds to that of the others, at these strengths.
+    def gains(self, terms, prior_scales, level):
+        """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
         Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
         then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
@@ -114,8 +114,8 @@ class HeldOut:
         """
         part = self.on_complete(terms)
         if part is not self:
-            return part.gains(terms, strengths, level)
-        whole, fits = self.predict(terms, strengths, level), self._fits(terms, strengths, level)
+            return part.gains(terms, prior_scales, level)
+        whole, fits = self.predict(terms, prior_scales, level), self._fits(terms, prior_scales, level)
         residuals, spread = whole.coordinates
         variances = whole.left_mm2 + (spread**2).sum(axis=-1)
         result, score = [], _log_score(residuals, variances).sum()
@@ -143,7 +143,7 @@ class HeldOut:
         linear = self.evidence.linear
         return [linear.base, *signatures(self.evidence.library, linear, terms)]
 
-    def _fits(self, terms, strengths, level):
+    def _fits(self, terms, prior_scales, level):
         """ComplementFit of calibration and terms by the number of the fold that is left out."""
         linear, count = self.evidence.linear, self.evidence.linear.base.shape[-1]
         sd, mean = linear.base_prior or (np.full(count, np.inf), np.zeros(count))
@@ -151,7 +151,7 @@ class HeldOut:
         for term in terms:
             places.append(self._places[term.effect, term.shape])
             mixing.append(spread_of(self.evidence.library[term.effect].coordinates, term.legs))
-        precision = np.concatenate([sd, self.evidence.scales(terms, strengths)]) ** -2.0
+        precision = np.concatenate([sd, self.evidence.scales(terms, prior_scales)]) ** -2.0
         moment = np.zeros(len(precision))
         moment[:count] = np.where(np.isfinite(sd), mean, 0.0) * precision[:count]
         return self._at(level).fits(np.concatenate(places), block_diag(*mixing), precision, moment)
@@ -188,7 +188,7 @@ class HeldOut:
     def _left(self, level):
         """Variance (n, 3) of noise and discrepancy, along the runs' cosines where folds are whole runs."""
         noise, series = self.evidence.noise, self.case.series
-        misfit = (noise.mean_mm * levels_of(noise)[level]) ** 2
+        misfit = (noise.mean_mm * discrepancy_scales(noise)[level]) ** 2
         if not self._whole_runs:
             size = noise.axis_mm**2 * (1.0 + noise.offset) + misfit
             return np.broadcast_to(size, self.evidence.linear.data.shape)

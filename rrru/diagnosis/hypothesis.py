@@ -8,14 +8,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """A set of terms with its log evidence (levels,) and the best strengths (levels, terms).
+    """A set of terms with its log evidence (levels,) and the best prior_scales (levels, terms).
 
     Levels at which it has not been computed have -inf.
     """
 
     terms: tuple
     evidence: np.ndarray
-    strengths: np.ndarray
+    prior_scales: np.ndarray
 
     @cached_property
     def effects(self):
@@ -29,4 +29,4 @@ class Hypothesis:
 
     def strengths_of(self, terms, level):
         """Strengths of some of its terms at a level (an index)."""
-        return [float(self.strengths[level][self.terms.index(term)]) for term in terms]
+        return [float(self.prior_scales[level][self.terms.index(term)]) for term in terms]

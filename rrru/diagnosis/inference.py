@@ -22,7 +22,7 @@ from rrru.diagnosis.posterior import Posterior
 from rrru.diagnosis.problem import Case
 from rrru.diagnosis.state import State
 from rrru.diagnosis.terms import each_leg
-from rrru.diagnosis.whitened import LEVELS, spectrum
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.errors import FitError
 from rrru.estimation.noise_model import MIN_FREE_NUMBERS, alike, fit_noise, high_frequency_noise
 
@@ -31,7 +31,7 @@ KNOWN, STATED, UNKNOWN_NOISE = "known", "stated", "unknown"
 
 
 @dataclass(frozen=True)
-class Attribution:
+class InferenceResult:
     """What the search has found.
 
     origin: State that calibrations start from; calibrated: of the calibration alone, under the noise that was found;
@@ -61,8 +61,8 @@ class Attribution:
         """Predictions of left-out points."""
         return HeldOut(self.case, self.evidence)
 
-    def believing(self, beliefs):
-        """The attribution with another posterior and its best hypothesis; the fit stays."""
+    def with_posterior(self, beliefs):
+        """The inference with another posterior and its best hypothesis; the fit stays."""
         hypothesis, level = beliefs.best()
         return replace(self, posterior=beliefs, hypothesis=hypothesis, level=level)
 
@@ -161,8 +161,8 @@ def _few(case, calibrated):
     return linear, (columns if columns.shape[-1] <= len(case) else linear.base)
 
 
-def attribute(case, prior, stated=KNOWN):
-    """Attribution of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
+def infer(case, prior, stated=KNOWN):
+    """InferenceResult of a case; stated: whether its noise is KNOWN, STATED within limits, or UNKNOWN_NOISE."""
     total = case.count
     for cleaning in range(OPTIONS.max_outlier_rounds + 1):
         calibrated = calibrate(case)
@@ -175,31 +175,31 @@ def attribute(case, prior, stated=KNOWN):
                 case = case.without(outliers)
                 calibrated = calibrate(case)
         case = case.standing(calibrated)
-        attribution = _rounds(case, calibrated, prior, stated)
-        found = attribution.case
-        outliers = isolated(found.residual(attribution.state), found.series, found.noise_mm, found.kind)
+        inference = _rounds(case, calibrated, prior, stated)
+        found = inference.case
+        outliers = isolated(found.residual(inference.state), found.series, found.noise_mm, found.kind)
         if cleaning == OPTIONS.max_outlier_rounds or not outliers.any():
             break
         case = case.without(outliers)
-    return replace(attribution, dropped=total - case.count)
+    return replace(inference, dropped=total - case.count)
 
 
-def with_effects(attribution, effects):
-    """The attribution with hypothesis and fit of exactly the named effects; the posterior stays."""
-    same = attribution.hypothesis.effects == frozenset(effects)
-    known = (attribution.hypothesis, attribution.level) if same else attribution.posterior.best_of(frozenset(effects))
+def with_effects(inference, effects):
+    """The inference with hypothesis and fit of exactly the named effects; the posterior stays."""
+    same = inference.hypothesis.effects == frozenset(effects)
+    known = (inference.hypothesis, inference.level) if same else inference.posterior.best_of(frozenset(effects))
     if known is None:
-        terms = tuple(term for term in attribution.hypothesis.terms if term.effect in effects)
-        found, strengths = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
-        for each in attribution.evidence.levels:
-            found[each], strengths[each] = attribution.evidence.over_all_strengths(terms, each)
+        terms = tuple(term for term in inference.hypothesis.terms if term.effect in effects)
+        found, prior_scales = np.full(len(DISCREPANCY_SCALES), -np.inf), np.ones((len(DISCREPANCY_SCALES), len(terms)))
+        for each in inference.evidence.levels:
+            found[each], prior_scales[each] = inference.evidence.over_all_strengths(terms, each)
         # what an unknown function explains with them is a discrepancy without it
-        known = Hypothesis(terms, found, strengths), int(found.argmax())
+        known = Hypothesis(terms, found, prior_scales), int(found.argmax())
     hypothesis, level = known
-    starts = (attribution.fit.state, attribution.origin) if hypothesis.terms else (attribution.calibrated,)
-    fit = fit_hypothesis(attribution.case, attribution.evidence, starts, (hypothesis, level), attribution.fit)
-    case = attribution.case.with_approach(fit.state)
-    return replace(attribution, case=case, hypothesis=hypothesis, level=level, fit=fit)
+    starts = (inference.fit.state, inference.origin) if hypothesis.terms else (inference.calibrated,)
+    fit = fit_hypothesis(inference.case, inference.evidence, starts, (hypothesis, level), inference.fit)
+    case = inference.case.with_approach(fit.state)
+    return replace(inference, case=case, hypothesis=hypothesis, level=level, fit=fit)
 
 
 def fit_hypothesis(case, evidence, starts, chosen, known=None):
@@ -211,7 +211,7 @@ def fit_hypothesis(case, evidence, starts, chosen, known=None):
     """
     hypothesis, level = chosen
     case, terms = case.at_complete(hypothesis.effects), tuple(map(each_leg, hypothesis.terms))
-    scales = evidence.scales(terms, hypothesis.strengths[level])
+    scales = evidence.scales(terms, hypothesis.prior_scales[level])
     if known and known.level == level and known.model.same_as(EffectModel(case, terms, scales)):
         return known
     return fit_model(case, starts, terms, scales, level)
@@ -301,6 +301,6 @@ def _rounds(case, calibrated, prior, stated):
     if not confirmed:
         beliefs = space.confirmed(first)
     hypothesis, level = beliefs.best()
-    result = Attribution(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
+    result = InferenceResult(case, start, calibrated, fit, evidence, beliefs, hypothesis, level, source)
     # estimate and hypothesis are of one set, whether the rounds have ended or gone round
     return with_effects(result, hypothesis.effects)

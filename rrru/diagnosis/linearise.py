@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rrru.diagnosis.state import Linear, State
+from rrru.diagnosis.state import LinearizedProblem, State
 from rrru.effects.protocol import gives_way
 from rrru.errors import FitError
 
@@ -25,7 +25,7 @@ def linearised(case, state, keys=None):
     geometry = case.geometry
     for key, coordinates in state.effects.items():
         data = data + columns[key] @ coordinates
-    return Linear(
+    return LinearizedProblem(
         data,
         case.of_rows(at.columns(case.mechanism.directions)),
         columns,
@@ -73,8 +73,8 @@ def _by_shape(case, at, key, state):
 def _by_weight(case, at, state, columns):
     """`Linear.by_weight` of columns, and `Linear.weight_steps`."""
     weight, made = case.weight(state), {key: [] for key in columns if gives_way(case.library[key[0]])}
-    doubts = {name: doubt for name, doubt in case.doubts.items() if doubt}
-    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in doubts.items()]
+    nuisance_sd = {name: doubt for name, doubt in case.nuisance_sd.items() if doubt}
+    steps = [(name, weight[name], weight[name] + doubt, -weight[name] / doubt) for name, doubt in nuisance_sd.items()]
     for name, _, stepped, _ in steps:
         other = state.under(weight | {name: stepped})
         for key, one in made.items():

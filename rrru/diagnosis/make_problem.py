@@ -56,8 +56,8 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     rows_of = {name: complete_rows(effect, motion) for name, effect in testable.items()}
     known = {name: rows for name, rows in rows_of.items() if not rows[used].all()}
     sizes = float(noise_mm), float(arm_mm)
-    doubts, bounds = doubts_of(motion, masses)
-    of_weight = {"doubts": doubts, "bounds": bounds}
+    nuisance_sd, bounds = doubts_of(motion, masses)
+    of_weight = {"nuisance_sd": nuisance_sd, "bounds": bounds}
     more = {"motion_at": motion_at, "known": known, **of_weight}
     return Case(mechanism, measurements, motion, used, testable, untestable, *sizes, **more)
 

@@ -11,7 +11,7 @@ from rrru.diagnosis import evidence_kernels as kernels
 
 
 class Prior(NamedTuple):
-    """Prior of k coefficients: columns' numbers, sizes at strength 1, largest sizes, and which are positive."""
+    """Prior of k coefficients: columns' numbers, sizes at prior scale 1, largest sizes, and which are positive."""
 
     index: np.ndarray
     size: np.ndarray
@@ -20,24 +20,24 @@ class Prior(NamedTuple):
 
     @classmethod
     def normal(cls, index):
-        """Of columns of unit deviation, which no strength scales."""
+        """Of columns of unit deviation, which no prior scale scales."""
         nothing = np.zeros(len(index))
         return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
 
-    def at(self, strength):
-        """Sizes at a strength."""
-        return np.minimum(strength * self.size, self.largest)
+    def at(self, prior_scale):
+        """Sizes at a prior scale."""
+        return np.minimum(prior_scale * self.size, self.largest)
 
 
 @dataclass(frozen=True)
-class Projected:
+class MarginalProblem:
     """Least squares of k coefficients with their priors, the calibration taken out.
 
     Those of the terms come first, then those of their shapes, last those of the weight, both owned by nobody. gram
     (levels, k, k), moment (levels, k); size, largest, positive, about (k,): of the prior; owner (k,): number of the
     term, the terms' count for nobody; index (r,): of the columns; mix (r, k): what makes the coefficients' columns of
     these, None where they are the same; weights: of the weight's coefficients whether each is a lean, no mass,
-    and at_least (terms,): strengths under which the terms are as large as found.
+    and at_least (terms,): prior scales under which the terms are as large as found.
     """
 
     gram: np.ndarray
@@ -78,14 +78,14 @@ class Projected:
         gram, moment, owner = self.gram[:, k[:, None], k], self.moment[:, k], rank[self.owner[k]]
         return replace(self, gram=gram, moment=moment, owner=owner, at_least=at_least, **each, **columns)
 
-    def scale(self, strengths):
-        """Prior standard deviations (m, k) at strengths (m, terms)."""
-        each = np.concatenate([strengths, np.ones((len(strengths), 1))], axis=1)
+    def scale(self, prior_scales):
+        """Prior standard deviations (m, k) at prior_scales (m, terms)."""
+        each = np.concatenate([prior_scales, np.ones((len(prior_scales), 1))], axis=1)
         return np.minimum(each[:, self.owner] * self.size, self.largest)
 
 
 def gained(problem, scale):
-    """Log evidence (levels, m) of a Projected problem at prior deviations (m, k) over that of none of its terms."""
+    """Log evidence (levels, m) of a MarginalProblem at prior deviations (m, k) over that of none of its terms."""
     scale = np.ascontiguousarray(scale)
     gram, moment = np.ascontiguousarray(problem.gram), np.ascontiguousarray(problem.moment)
     if not problem.about.any():
@@ -106,7 +106,7 @@ def evidence_error(problem, scale):
 
 
 def posterior_mean(problem, scale):
-    """The mean (k,) of a Projected problem of one level at prior deviations (k,).
+    """The mean (k,) of a MarginalProblem of one level at prior deviations (k,).
 
     Where that has negative positive coefficients their most probable point.
     """
@@ -120,7 +120,7 @@ def posterior_mean(problem, scale):
 
 
 def posterior_covariance(problem, scale):
-    """The covariance (k, k) of a Projected problem of one level at prior deviations (k,)."""
+    """The covariance (k, k) of a MarginalProblem of one level at prior deviations (k,)."""
     return scale[:, None] * np.linalg.inv(_precision(problem.gram[0], scale)) * scale
 
 

@@ -18,8 +18,8 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import Term, spread
-from rrru.diagnosis.whitened import levels_of, spectrum
+from rrru.diagnosis.terms import EffectTerm, spread
+from rrru.diagnosis.whitened import discrepancy_scales, spectrum
 from rrru.effects.protocol import Contribution, gives_way
 from rrru.errors import FitError
 from rrru.estimation.estimate import Estimate
@@ -43,7 +43,7 @@ class EffectModel:
     """
 
     case: object
-    terms: tuple[Term, ...]
+    terms: tuple[EffectTerm, ...]
     scales: np.ndarray
     signed: bool = True
 
@@ -65,18 +65,18 @@ class EffectModel:
     @cached_property
     def _shape_names(self):
         """(effect, parameter, standard deviation) of every shape parameter that is fitted."""
-        doubts = [
+        nuisance_sd = [
             (name, key, abs(self.case.library[name].doubted(key, value) - value))
             for name, shape in self.shapes.items()
             for key, value in shape.items()
         ]
-        return [one for one in doubts if one[2] > 0.0] if self.signed else []
+        return [one for one in nuisance_sd if one[2] > 0.0] if self.signed else []
 
     @cached_property
     def _weight_names(self):
         """Names of what the weight may be off by, none where no term bears loads."""
         bears = any(gives_way(self.case.library[term.effect]) for term in self.terms)
-        return [name for name, doubt in self.case.doubts.items() if doubt] if bears and self.signed else []
+        return [name for name, doubt in self.case.nuisance_sd.items() if doubt] if bears and self.signed else []
 
     @cached_property
     def parameters(self):
@@ -96,11 +96,11 @@ class EffectModel:
             bounds = [one.low for one in limits], [one.high for one in limits]
             blocks.append(Block.of("shape", names, units, [sd for *_, sd in self._shape_names], mean, bounds))
         if self._weight_names:
-            doubts = np.array([self.case.doubts[name] for name in self._weight_names])
+            nuisance_sd = np.array([self.case.nuisance_sd[name] for name in self._weight_names])
             low, high = np.transpose([self.case.bounds[name] for name in self._weight_names])
             units = ["kg" if name.endswith("kg") else "rad" for name in self._weight_names]
-            narrow_sd = OPTIONS.stated_nuisance_sd_ratio * doubts
-            blocks.append(Block.of(WEIGHT, self._weight_names, units, narrow_sd, 0.0, (low, high), wide_sd=doubts))
+            narrow_sd = OPTIONS.stated_nuisance_sd_ratio * nuisance_sd
+            blocks.append(Block.of(WEIGHT, self._weight_names, units, narrow_sd, 0.0, (low, high), wide_sd=nuisance_sd))
         return Parameters(tuple(blocks))
 
     def vector(self, state):
@@ -129,7 +129,7 @@ class EffectModel:
             shapes[name][key] = float(values[places["shape"]][k])
         if self._weight_names:
             found = zip(self._weight_names, values[places[WEIGHT]].tolist(), strict=True)
-            shapes[WEIGHT] = dict.fromkeys(self.case.doubts, 0.0) | dict(found)
+            shapes[WEIGHT] = dict.fromkeys(self.case.nuisance_sd, 0.0) | dict(found)
         return State(values[places[GEOMETRY]], effects, shapes)
 
     def residual(self, values):
@@ -184,7 +184,7 @@ class EffectModel:
 
     def _by_weight(self, at, state, name):
         """Derivative (m, 3, 1) of the model by a number of the weight."""
-        case, step = self.case, 1e-3 * self.case.doubts[name]
+        case, step = self.case, 1e-3 * self.case.nuisance_sd[name]
         other = state.under(state.weight | {name: state.weight[name] + step})
         moved = {
             key: other.contribution(case.library, key, case.motion) if gives_way(case.library[key[0]]) else own
@@ -261,12 +261,12 @@ class ModelFit:
 def whitening_of(case, level):
     """The Whitening of a case's readings under its noise and the discrepancy of a level (an index)."""
     noise = (case.noise or NoiseModel.white(case.noise_mm)).counted
-    size = levels_of(noise)[level] * noise.mean_mm
+    size = discrepancy_scales(noise)[level] * noise.mean_mm
     discrepancy = (lambda waves: size**2 * spectrum(waves)) if size else None
     return noise.whitening(case.series, discrepancy)
 
 
-def fit_model(case, starts: Iterable[State], terms: Sequence[Term] = (), scales=(), level=0, signed=True):
+def fit_model(case, starts: Iterable[State], terms: Sequence[EffectTerm] = (), scales=(), level=0, signed=True):
     """ModelFit of a Case's used readings with effect terms, whose coefficients have prior deviations scales (k,).
 
     starts: States, tried in turn until a search from one goes straight to its end; where none does, the first that is
@@ -300,7 +300,7 @@ def fit_named_effects(case, names, calibrated, times_typical=OPTIONS.prior_sd_pe
     """
     sizes = [times_typical * np.asarray(case.library[name].coordinates.typical) for name in names]
     scales = np.concatenate([np.zeros(0), *sizes])
-    fit = fit_model(case, [calibrated], [Term(name) for name in names], scales, signed=False)
+    fit = fit_model(case, [calibrated], [EffectTerm(name) for name in names], scales, signed=False)
     if not fit.estimate.end.converged:
         raise FitError(explain_end(fit.estimate, f"the fit of {', '.join(names) or 'the geometry'}"), fit.estimate)
     return fit

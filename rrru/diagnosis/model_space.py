@@ -8,7 +8,7 @@ C. Hans, A. Dobra and M. West, "Shotgun stochastic search for large p regression
 the order of their weight in place of a random one; the sets retained are those of Occam's window (D. Madigan and A.
 Raftery, JASA 89, 1994).
 
-A neighbour is evaluated where it may matter by what its term adds at the strengths of the others, which stay. Two
+A neighbour is evaluated where it may matter by what its term adds at the prior scales of the others, which stay. Two
 searches start from opposite ends, from nothing and from as many effects as the data bear. How far the probabilities of
 causes differ between what each of them has visited says whether the answer depends on where one starts.
 """
@@ -20,13 +20,13 @@ import numpy as np
 
 from rrru.diagnosis.candidates import Candidates
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.evidence import STRENGTHS, averaged
+from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
 from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weighed, Weigher
 from rrru.diagnosis.terms import variants
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 
 
 def explore(evidence, prior, without=(), most=OPTIONS.max_effects):
@@ -119,45 +119,45 @@ class ModelSpace:
 
     def fullest(self):
         """The set that grows by the term that adds most, however improbable many terms are, as long as one adds."""
-        terms, level, strengths = (), int(self._evidence.none.argmax()), []
+        terms, level, prior_scales = (), int(self._evidence.none.argmax()), []
         while len(terms) < self._most:
-            total, best = self._gains(terms, strengths, level)
+            total, best = self._gains(terms, prior_scales, level)
             row = int(total.argmax())
             if total[row] <= 0.0:
                 break
-            terms, strengths = (*terms, self._candidates.terms[row]), [*strengths, best[row]]
-            at = [self._at(terms, strengths, one) for one in self._evidence.levels]
+            terms, prior_scales = (*terms, self._candidates.terms[row]), [*prior_scales, best[row]]
+            at = [self._at(terms, prior_scales, one) for one in self._evidence.levels]
             level = int(self._evidence.levels[int(np.argmax(at))])
         return terms
 
-    def _at(self, terms, strengths, level):
-        """Log evidence of a set of terms at its strengths and a level."""
-        return self._evidence.over_strengths(terms, [[one] for one in strengths], [level])[0][0, 0]
+    def _at(self, terms, prior_scales, level):
+        """Log evidence of a set of terms at its prior scales and a level."""
+        return self._evidence.over_strengths(terms, [[one] for one in prior_scales], [level])[0][0, 0]
 
-    def _gains(self, terms, strengths, level):
-        """Log evidence (c,) that each candidate adds to a set, averaged over its strength, and its best strength."""
-        gains = self._candidates.gains(terms, strengths, level)
+    def _gains(self, terms, prior_scales, level):
+        """Log evidence (c,) that each candidate adds to a set, averaged over its prior scale, and the best scale."""
+        gains = self._candidates.gains(terms, prior_scales, level)
         total = np.full(len(gains), -np.inf)
         may_act = gains[:, 0] > -np.inf
         total[may_act] = averaged(gains[may_act], 1)
-        return total, STRENGTHS[gains.argmax(axis=1)]
+        return total, PRIOR_SCALES[gains.argmax(axis=1)]
 
     def _expand(self, centre, found):
         """Evaluate what may matter of a set's neighbours."""
         terms, level = centre.hypothesis.terms, centre.hypothesis.level
-        strengths, own = centre.hypothesis.strengths[level], centre.hypothesis.evidence.max()
+        prior_scales, own = centre.hypothesis.prior_scales[level], centre.hypothesis.evidence.max()
         chosen = []
         for out in (None, *range(len(terms))):
             base, start = centre.hypothesis, own
             if out is not None:
                 rest = [k for k in range(len(terms)) if k != out]
                 smaller = tuple(terms[k] for k in rest)
-                self._evaluate(smaller, level, strengths[rest], climb=True)
+                self._evaluate(smaller, level, prior_scales[rest], climb=True)
                 found.reach(smaller)
                 base = self._known[frozenset(smaller)].hypothesis
             if len(base.terms) == self._most:
                 continue
-            scales = base.strengths[base.level]
+            scales = base.prior_scales[base.level]
             gains, best = self._gains(base.terms, scales, base.level)
             if out is not None:
                 # what takes a term's place adds more or less than that did
@@ -184,7 +184,7 @@ class ModelSpace:
                     self._evaluate(smaller, level, scales[rest])
                     found.reach(smaller)
 
-    def _evaluate(self, terms, level, strengths, climb=False):
+    def _evaluate(self, terms, level, prior_scales, climb=False):
         """Evaluate a set of terms unless it is known: at a level, and at those next to it as long as they matter.
 
         climb: whether the best level is looked for even where the set is hopeless.
@@ -192,13 +192,13 @@ class ModelSpace:
         key = frozenset(terms)
         if key in self._known and (key in self._climbed or not climb):
             return
-        evidence, best = np.full(len(LEVELS), -np.inf), np.ones((len(LEVELS), len(terms)))
+        evidence, best = np.full(len(DISCREPANCY_SCALES), -np.inf), np.ones((len(DISCREPANCY_SCALES), len(terms)))
         allowed, prior = set(self._evidence.levels.tolist()), self._weigher.terms(terms)
         waiting = [int(self._evidence.none.argmax()) if level is None else level]
         while waiting:
             level = waiting.pop(0)
-            evidence[level], best[level] = self._evidence.over_all_strengths(terms, level, strengths)
-            strengths = best[int(evidence.argmax())]
+            evidence[level], best[level] = self._evidence.over_all_strengths(terms, level, prior_scales)
+            prior_scales = best[int(evidence.argmax())]
             hopeless = evidence.max() + prior < self._highest - OPTIONS.hopeless_nats
             if hopeless and not climb:
                 break
@@ -211,7 +211,7 @@ class ModelSpace:
 
     def _single(self, terms):
         """Evaluate no term or one at all levels."""
-        evidence, best = self._evidence.none.copy(), np.ones((len(LEVELS), len(terms)))
+        evidence, best = self._evidence.none.copy(), np.ones((len(DISCREPANCY_SCALES), len(terms)))
         if terms:
             value, grid = self._evidence.over_strengths(terms)
             levels = self._evidence.levels

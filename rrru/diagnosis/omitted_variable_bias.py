@@ -5,20 +5,20 @@ import numpy as np
 from rrru.kinematics.legs import WORLD
 
 
-def bias_notes(attribution):
+def bias_notes(inference):
     """Sentences on the laws in the corrected sim that say what they spoil, such as "without read_before_rest joint_1_x
     would be off by 7.1 standard errors: ..".
 
     The numbers that take up a law that is left out are those that come nearest to it, each in units of the standard
     error that a calibration without the law would state. Numbers of the frame do not count.
     """
-    case, linear = attribution.case, attribution.evidence.linear
+    case, linear = inference.case, inference.evidence.linear
     flat = linear.base.reshape(linear.data.size, -1)
     size = np.linalg.norm(flat, axis=0)
     inverse = np.linalg.pinv(flat / size, rcond=1e-9)
     robot = case.mechanism
     frame = np.abs(robot.directions[robot.legs.site_numbers[WORLD]]).any(axis=0)
-    acting = {key: linear.columns[key] @ numbers for key, numbers in attribution.state.effects.items()}
+    acting = {key: linear.columns[key] @ numbers for key, numbers in inference.state.effects.items()}
     rest = (linear.data - sum(acting.values(), np.zeros(linear.data.shape))).ravel()
     notes = []
     for (name, _), change in acting.items():

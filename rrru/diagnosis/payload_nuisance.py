@@ -10,7 +10,7 @@ It is one weight for all effects, and no effect itself: where nothing gives way 
 over four cases: the mass is as it was told or it is not, and the robot stands level or it does not.
 
 The columns of the weight are a linearisation about the coefficients found under weak priors. `nuisance_evidence` has
-the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over strengths, is 0.25 nats off at most
+the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over prior scales, is 0.25 nats off at most
 where the effect acts that bears the loads, and 1.2 nats where another one acts or none.
 
 ASSUME even odds of each: masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % (of what hangs
@@ -49,29 +49,29 @@ def doubts_of(motion, masses):
 
     All zero where nothing has weight.
     """
-    robot, lumps = motion.robot, getattr(motion.robot, "lumps", ())
-    own = sum(lump.mass_kg for lump in lumps if lump.joint == PLATFORM)
+    robot, point_masses = motion.robot, getattr(motion.robot, "point_masses", ())
+    own = sum(point_mass.mass_kg for point_mass in point_masses if point_mass.joint == PLATFORM)
     told = own + carried_kg(robot, masses, np.nan_to_num(motion.payload_kg))
     extra = OPTIONS.payload_sd_per_stated_mass * float(told.max(initial=0.0))
-    extra = extra or OPTIONS.payload_sd_per_robot_mass * sum(lump.mass_kg for lump in lumps)
-    doubts = extra, *(2 * [OPTIONS.tilt_sd_rad if extra else 0.0])
-    bounds = [(-OPTIONS.nuisance_bound_sd * doubt, OPTIONS.nuisance_bound_sd * doubt) for doubt in doubts]
+    extra = extra or OPTIONS.payload_sd_per_robot_mass * sum(point_mass.mass_kg for point_mass in point_masses)
+    nuisance_sd = extra, *(2 * [OPTIONS.tilt_sd_rad if extra else 0.0])
+    bounds = [(-OPTIONS.nuisance_bound_sd * doubt, OPTIONS.nuisance_bound_sd * doubt) for doubt in nuisance_sd]
     bounds[0] = -OPTIONS.max_missing_mass_share * float(told.min(initial=np.inf) if len(told) else 0.0), bounds[0][1]
-    return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (doubts, bounds))
+    return tuple(dict(zip(weight_names(robot), values, strict=True)) for values in (nuisance_sd, bounds))
 
 
-def as_found(problem, strengths):
-    """Coefficients (k,) of a Projected problem of one level at strengths (1, terms)."""
-    return posterior_mean(problem, problem.scale(strengths)[0])
+def as_found(problem, prior_scales):
+    """Coefficients (k,) of a MarginalProblem of one level at prior_scales (1, terms)."""
+    return posterior_mean(problem, problem.scale(prior_scales)[0])
 
 
 def borne(problem, count, blocks, steps, found, grams):
-    """The Projected problem of so many terms with what the weight may be as further coefficients.
+    """The MarginalProblem of so many terms with what the weight may be as further coefficients.
 
     blocks: by number of a term that gives way the matrix (c, k) of its own k coefficients' coordinates, and the
     numbers (q, c) of the columns that a step of each of q numbers of the weight makes of its columns; steps: of the
-    weight, see `rrru.diagnosis.state.Linear`; found (k,): the coefficients that such a step changes, the same at all
-    levels; grams: as in `Projected.of`.
+    weight, see `rrru.diagnosis.state.LinearizedProblem`; found (k,): the coefficients that such a step changes, the
+    same at all levels; grams: as in `MarginalProblem.of`.
     """
     means = np.array([step[-1] for step in steps])
     acting = {k: matrix @ found[problem.owner == k] for k, (matrix, _) in blocks.items()}
@@ -99,16 +99,17 @@ def borne(problem, count, blocks, steps, found, grams):
     return whole.on(*grams(joined["index"]))
 
 
-def gained_over_cases(problem, strengths):
-    """`gained` of a Projected problem at strengths (m, terms), averaged over the cases of the weight."""
+def gained_over_cases(problem, prior_scales):
+    """`gained` of a MarginalProblem at prior_scales (m, terms), averaged over the cases of the weight."""
     if not problem.weights:
-        return gained(problem, problem.scale(strengths))
-    # where it is not free the weight stays as it is, no more probable than under the least strengths that leave it free
-    least = np.maximum(strengths, OPTIONS.min_prior_scale_per_size * problem.at_least)
+        return gained(problem, problem.scale(prior_scales))
+    # where it is not free the weight stays as it is, no more probable than under the least prior scales that leave it
+    # free
+    least = np.maximum(prior_scales, OPTIONS.min_prior_scale_per_size * problem.at_least)
     result = _over_cases(problem, problem.scale(least))
-    narrow = (least > strengths).any(axis=1)
+    narrow = (least > prior_scales).any(axis=1)
     if narrow.any():
-        as_it_is = problem.scale(np.concatenate([strengths[narrow], least[narrow]]))
+        as_it_is = problem.scale(np.concatenate([prior_scales[narrow], least[narrow]]))
         # under a prior too narrow for the coefficients the weight's columns, as large as these, would stand for them
         as_it_is[:, -len(problem.weights) :] = OPTIONS.fixed_nuisance_sd_ratio
         own, at_least = np.split(gained(replace(problem, about=np.zeros_like(problem.about)), as_it_is), 2, axis=1)
@@ -116,18 +117,18 @@ def gained_over_cases(problem, strengths):
     return result
 
 
-def mean_over_cases(problem, strengths):
-    """Mean (k,) of the coefficients of a Projected problem of one level at strengths (1, terms).
+def mean_over_cases(problem, prior_scales):
+    """Mean (k,) of the coefficients of a MarginalProblem of one level at prior_scales (1, terms).
 
-    Of a mixture of the cases of the weight, which is always free: the strengths are raised to where it is.
+    Of a mixture of the cases of the weight, which is always free: the prior scales are raised to where it is.
     """
-    share, scales = _mixture(problem, strengths)
+    share, scales = _mixture(problem, prior_scales)
     return share @ [posterior_mean(problem, scale) for scale in scales]
 
 
-def over_cases(problem, strengths):
+def over_cases(problem, prior_scales):
     """`mean_over_cases` and the covariance (k, k), which does not know of positive coefficients."""
-    share, scales = _mixture(problem, strengths)
+    share, scales = _mixture(problem, prior_scales)
     means = np.array([posterior_mean(problem, scale) for scale in scales])
     spreads = np.array([posterior_covariance(problem, scale) for scale in scales])
     mean = share @ means
@@ -135,11 +136,11 @@ def over_cases(problem, strengths):
     return mean, np.einsum("c,cij->ij", share, spreads) + np.einsum("c,ci,cj->ij", share, apart, apart)
 
 
-def _mixture(problem, strengths):
+def _mixture(problem, prior_scales):
     """Probabilities (c,) of the cases of a weight that is free after the data, and prior deviations (c, k) in each."""
     if not problem.weights:
-        return np.ones(1), problem.scale(strengths)
-    log, scales = _in_cases(problem, problem.scale(np.maximum(strengths, problem.at_least)))
+        return np.ones(1), problem.scale(prior_scales)
+    log, scales = _in_cases(problem, problem.scale(np.maximum(prior_scales, problem.at_least)))
     log = log + gained(problem, scales)[0]
     return np.exp(log - np.logaddexp.reduce(log)), scales
 
@@ -165,7 +166,7 @@ def cases_of(names):
 
 @cache
 def _cases(weights):
-    """Logarithms (c,) of the probabilities of all cases of `Projected.weights`, and shares (c, q) of their sizes."""
+    """Log probabilities (c,) of all cases of `MarginalProblem.weights`, and shares (c, q) of their sizes."""
     kinds = sorted(set(weights))
     combined = list(product(_CASES, repeat=len(kinds)))
     shares = [[case[kinds.index(kind)][1] for kind in weights] for case in combined]

@@ -10,7 +10,7 @@ from rrru.diagnosis.evidence_kernels import log_sum_exp
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.terms import EACH, SAME, variants
-from rrru.diagnosis.whitened import levels_of
+from rrru.diagnosis.whitened import discrepancy_scales
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class Weigher:
 
     def __init__(self, evidence, prior):
         library = evidence.library
-        self._evidence, self._levels = evidence, levels_of(evidence.noise)
+        self._evidence, self._levels = evidence, discrepancy_scales(evidence.noise)
         self._prior, self._effects = prior, {}
         self._legs = {name: len(np.unique(effect.coordinates.legs)) for name, effect in library.items()}
         self._functions = sum(name in UNKNOWN for name in library)

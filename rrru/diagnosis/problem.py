@@ -40,7 +40,7 @@ class Case:
     deviation per axis; arm_mm: of `rrru.kinematics.readings.Readings`; noise: its NoiseModel, white where there is
     none; beside_scale: factor by which rows of reflectors beside the robot count, so that they have the noise of the
     others; motion_at: from where the robot stands to the motion with the loads there, see
-    `rrru.effects.motion.make_motion`; doubts, bounds: what the weight may be off by, see
+    `rrru.effects.motion.make_motion`; nuisance_sd, bounds: what the weight may be off by, see
     `rrru.diagnosis.payload_nuisance`; known: effect to the points (N,) at which the campaign has all that the effect
     needs, of the effects that lack something at a used point.
     """
@@ -56,7 +56,7 @@ class Case:
     noise: NoiseModel | None = None
     beside_scale: float = 1.0
     motion_at: Callable | None = None
-    doubts: dict = field(default_factory=dict)
+    nuisance_sd: dict = field(default_factory=dict)
     bounds: dict = field(default_factory=dict)
     known: dict = field(default_factory=dict)
 
@@ -236,7 +236,7 @@ class Case:
 
     def weight(self, state):
         """What the weight of a state is off by, by name."""
-        return dict.fromkeys(self.doubts, 0.0) | state.weight
+        return dict.fromkeys(self.nuisance_sd, 0.0) | state.weight
 
     @last_kept_of
     def contributions(self, state):

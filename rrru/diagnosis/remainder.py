@@ -39,17 +39,17 @@ class _Variable:
     steps: bool = False
 
 
-def remainder_rows(attribution):
+def remainder_rows(inference):
     """Rows of `gap_remainder` without the campaign, the variable that explains most first.
 
     explained: share of the mean square, noise taken off, that is predicted at left-out points, 0 to 1; scale: distance
     over which the function changes, in the unit of its variable, NaN for steps; rms_mm: of the prediction.
     """
-    case = attribution.case
+    case = inference.case
     rows = case.on_robot
-    linear = attribution.evidence.linear
+    linear = inference.evidence.linear
     # under a smooth discrepancy a fit leaves to that what the calibration could take away
-    left, drive = _without_calibration(case.residual(attribution.state), linear, rows), linear.drive[rows]
+    left, drive = _without_calibration(case.residual(inference.state), linear, rows), linear.drive[rows]
     stretch = within(case.run, case.stop) // OPTIONS.points_per_stretch + case.run
     fold = (stretch % OPTIONS.stretch_folds)[rows]
     beyond = (left**2).sum() - left.size * case.noise_mm**2
@@ -63,7 +63,7 @@ def remainder_rows(attribution):
     return pd.DataFrame(result, columns=COLUMNS)
 
 
-def followed_alike(attribution, rows, names):
+def followed_alike(inference, rows, names):
     """Which of some effects of the fit do what the remainder does, and the remainder's rms in mm.
 
     rows: of `gap_remainder`; names: of effects. Where one variable predicts most of the remainder, an effect is such a
@@ -73,7 +73,7 @@ def followed_alike(attribution, rows, names):
     best = rows.iloc[0] if len(rows) else None
     if best is None or best["explained"] < OPTIONS.min_followed_share:
         return (), 0.0
-    case, linear, state = attribution.case, attribution.evidence.linear, attribution.state
+    case, linear, state = inference.case, inference.evidence.linear, inference.state
     on_robot = case.on_robot
     variable = next(one for one in _variables(case, on_robot) if one.follows == best["follows"])
     scaled = dict(_functions(variable))

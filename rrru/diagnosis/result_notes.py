@@ -60,9 +60,9 @@ def _one_with(robot, zero, least):
     return " and ".join(dict.fromkeys(others))
 
 
-def weight_notes(attribution):
+def weight_notes(inference):
     """Sentences on what the weight is surely off by, as far as the readings determine it."""
-    for name, unit, value, interval, determined in _weight_off(attribution):
+    for name, unit, value, interval, determined in _weight_off(inference):
         if determined:
             size = _sized(value, interval, unit)
             if unit == "kg":
@@ -71,22 +71,22 @@ def weight_notes(attribution):
                 yield f"the base is tilted by {size} about {name[-1]}, the configuration assumes 0"
 
 
-def weight_doubts(attribution):
+def weight_doubts(inference):
     """Sentences on what the weight seems to be off by where something else may be the reason."""
-    for name, unit, *_, determined in _weight_off(attribution):
+    for name, unit, *_, determined in _weight_off(inference):
         if not determined:
             what = "a mass at the platform" if unit == "kg" else f"a tilt of the base about {name[-1]}"
             do = "measure with two loads" if unit == "kg" else "level the base"
             yield f"{what} and a compliance are not separately identifiable from these readings: {do}"
 
 
-def _weight_off(attribution):
+def _weight_off(inference):
     """Name, unit, value, 95 % interval and whether it is determined of each number of the weight that is surely off.
 
     With one load all that gives way is in proportion to it: the mass is then measured against masses of the links that
     nobody has weighed.
     """
-    fit, case = attribution.fit, attribution.case
+    fit, case = inference.fit, inference.case
     estimate, weight = fit.estimate, fit.weight
     if not weight:
         return
@@ -128,9 +128,9 @@ def posterior_notes(beliefs):
         )
 
 
-def fit_notes(attribution):
+def fit_notes(inference):
     """Sentences on a fit that did not converge."""
-    end, terms = attribution.fit.estimate.end, attribution.fit.terms
+    end, terms = inference.fit.estimate.end, inference.fit.terms
     if not end.converged:
         names = ", ".join(term.effect for term in terms) or "the calibration"
         yield f"the fit of {names} did not converge ({end.message}): its numbers are preliminary"

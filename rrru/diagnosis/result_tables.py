@@ -7,13 +7,13 @@ import pandas as pd
 from scipy.stats import t as student_t
 
 from rrru.campaign import measurements as rows
-from rrru.diagnosis.detectability import identify
+from rrru.diagnosis.detectability import detectability
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.problem import GEOMETRY
 from rrru.diagnosis.shrink import shrink_table
 from rrru.diagnosis.terms import per_leg, sites, spread
-from rrru.diagnosis.variance_by_factor import drive_errors, locate
+from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor
 from rrru.diagnosis.verdict import label
 from rrru.estimation.intervals import QUANTILE_95
 
@@ -23,25 +23,25 @@ _EMPTY = {"legs": "", "log_evidence": np.nan}
 _EMPTY |= dict.fromkeys(("heldout_gain", "heldout_gain_low", "heldout_gain_high"), np.nan) | {"note": ""}
 
 
-def details_of(attribution, verdict, steps, residual_mm, generator, draws):
+def details_of(inference, verdict, steps, residual_mm, generator, draws):
     """Frames by table name, without the campaign; residual_mm (n, 3): measured minus calibrated sim."""
-    case, linear = attribution.case, attribution.case.linearise(attribution.calibrated)
-    exact = case.residual(attribution.state) if attribution.state.effects else None
+    case, linear = inference.case, inference.case.linearise(inference.calibrated)
+    exact = case.residual(inference.state) if inference.state.effects else None
     drive = drive_errors(case.by_point(residual_mm), case.by_point(linear.drive))
     return {
-        "gap_locate": locate(case, residual_mm, linear.drive, generator, draws),
-        "gap_identifiability": identify(case, linear),
-        "gap_attribute": _attribute_rows(attribution, verdict),
-        "gap_sets": _set_rows(attribution),
+        "gap_locate": variance_by_factor(case, residual_mm, linear.drive, generator, draws),
+        "gap_identifiability": detectability(case, linear),
+        "gap_attribute": _attribute_rows(inference, verdict),
+        "gap_sets": _set_rows(inference),
         "gap_shrink": shrink_table(case, steps, exact),
-        "gap_points": _point_rows(attribution, steps[-1].residual_mm[case.positions], drive),
+        "gap_points": _point_rows(inference, steps[-1].residual_mm[case.positions], drive),
     }
 
 
-def _attribute_rows(attribution, verdict):
+def _attribute_rows(inference, verdict):
     """Rows of `gap_attribute`: every effect of the library, none and unexplained, with the Verdict's decision on it."""
-    beliefs, case = attribution.posterior, attribution.case
-    result = [_effect_row(attribution, name) for name in case.effects]
+    beliefs, case = inference.posterior, inference.case
+    result = [_effect_row(inference, name) for name in case.effects]
     result += [
         {"effect": name, "probability": 0.0, **_EMPTY, "note": f"not tested: {note}"}
         for name, note in case.untestable.items()
@@ -56,32 +56,32 @@ def _attribute_rows(attribution, verdict):
     return rows
 
 
-def where(attribution, effects):
+def where(inference, effects):
     """Where the effects of a verdict act: of each its site in words, or the first and the last of several."""
-    case, found = attribution.case, []
-    for term in attribution.hypothesis.terms:
+    case, found = inference.case, []
+    for term in inference.hypothesis.terms:
         if term.effect in effects:
             names = sites(case.library, case.motion, term)
             found.append(names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}")
     return ", ".join(dict.fromkeys(found))
 
 
-def _effect_row(attribution, name):
+def _effect_row(inference, name):
     """The row of one testable effect."""
-    beliefs = attribution.posterior
+    beliefs = inference.posterior
     row = {"effect": name, "probability": beliefs.marginal(name), **_EMPTY}
     holding = [h for h in beliefs.hypotheses if name in h.effects]
     if not holding:
         return row | {"note": "far less probable than others"}
     best = max(holding, key=lambda h: h.evidence.max())
-    row["log_evidence"] = float(best.evidence.max() - attribution.evidence.on_library().none.max())
-    if per_leg(attribution.case.library[name]) and (legs := beliefs.legs(name)):
+    row["log_evidence"] = float(best.evidence.max() - inference.evidence.on_library().none.max())
+    if per_leg(inference.case.library[name]) and (legs := beliefs.legs(name)):
         row["legs"] = str(max(legs, key=legs.get))
     single = max((h for h in holding if len(h.terms) == 1), key=lambda h: h.evidence.max(), default=None)
     if single:
-        level, held_out = int(single.evidence.argmax()), attribution.held_out.on_complete(single.terms)
+        level, held_out = int(single.evidence.argmax()), inference.held_out.on_complete(single.terms)
         alone = held_out.predict((), [], level).log_score
-        gained = held_out.predict(single.terms, single.strengths[level], level).log_score - alone
+        gained = held_out.predict(single.terms, single.prior_scales[level], level).log_score - alone
         by_fold = np.array([gained[held_out.fold == k].sum() for k in np.unique(held_out.fold)])
         row["heldout_gain"] = float(by_fold.sum())
         if len(by_fold) > 1:
@@ -90,12 +90,12 @@ def _effect_row(attribution, name):
     return row
 
 
-def _set_rows(attribution):
+def _set_rows(inference):
     """Rows of `gap_sets`: the most probable sets."""
-    result, none = [], attribution.evidence.on_library().none.max()
-    sets = list(attribution.posterior.sets().items())[: OPTIONS.max_listed_sets]
+    result, none = [], inference.evidence.on_library().none.max()
+    sets = list(inference.posterior.sets().items())[: OPTIONS.max_listed_sets]
     for rank, ((effects, unexplained), probability) in enumerate(sets, start=1):
-        hypothesis, _ = attribution.posterior.best_of(effects, unexplained)
+        hypothesis, _ = inference.posterior.best_of(effects, unexplained)
         row = {
             "rank": rank,
             "effects": label(tuple(sorted(effects)), unexplained),
@@ -108,10 +108,10 @@ def _set_rows(attribution):
     return pd.DataFrame(result)
 
 
-def parameter_rows(attribution):
+def parameter_rows(inference):
     """Rows of `gap_parameters`: all numbers of the corrected sim with standard errors."""
-    fit, library = attribution.fit, attribution.case.library
-    parameters, errors = attribution.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
+    fit, library = inference.fit, inference.case.library
+    parameters, errors = inference.case.mechanism.parameters, fit.estimate.block_errors(GEOMETRY)
     intervals, places = fit.estimate.intervals, fit.estimate.parameters.places
     result = [
         ("calibration", parameter.name, parameter.unit, value, error, *interval, held)
@@ -134,7 +134,7 @@ def parameter_rows(attribution):
                 effect.parameters, values, errors, ends, bound.tolist(), strict=True
             )
         ]
-    bounds, own = attribution.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
+    bounds, own = inference.case.bounds, intervals[places[WEIGHT]] if WEIGHT in places else ()
     result += [
         (WEIGHT, name, unit, value, error, *interval, value in bounds[name])
         for (name, unit, value, error), interval in zip(fit.weight, own, strict=True)
@@ -189,11 +189,11 @@ def _effect_values(fit, library, term):
     return values, errors, ends
 
 
-def _point_rows(attribution, after, drive):
+def _point_rows(inference, after, drive):
     """Rows of `gap_points`; after (n, 3), drive (n, K): residuals of the corrected sim and errors of the drives."""
-    case = attribution.case
+    case = inference.case
     frame = case.measurements[["run", "trajectory", "point"]].reset_index(drop=True)
-    before = case.left(attribution.calibrated)[: len(frame)]
+    before = case.left(inference.calibrated)[: len(frame)]
     units = case.mechanism.parts.units
     after, drive = (_at(case.used, values) for values in (after, drive))
     unknown = np.full(len(before), np.nan)

@@ -94,9 +94,9 @@ class GapSettings:
         alike = robot.legs.parallel
         return {name: replace(one, coordinates=replace(one.coordinates, alike=alike)) for name, one in result.items()}
 
-    def doubts(self, doubts):
+    def nuisance_sd(self, nuisance_sd):
         """What the weight may be off by, by name: nothing where it is known."""
-        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in doubts.items()}
+        return {name: 0.0 if name in self.known.get(WEIGHT, {}) else doubt for name, doubt in nuisance_sd.items()}
 
 
 def _check_weight(values):

@@ -51,14 +51,14 @@ def gap_rms(squares):
     return float(np.sqrt(max(float(np.mean(squares)), 0.0)))
 
 
-def order_by_share(attribution):
+def order_by_share(inference):
     """(term, share of the gap's mean square on left-out points that it removes when it comes next), largest first."""
-    hypothesis, level = attribution.hypothesis, attribution.level
+    hypothesis, level = inference.hypothesis, inference.level
     left, chosen, result = list(hypothesis.terms), [], []
-    noise, counted = 3.0 * attribution.case.noise_mm**2, attribution.case.on_robot
+    noise, counted = 3.0 * inference.case.noise_mm**2, inference.case.on_robot
 
     def gap(terms):
-        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
+        prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=False)
         return max(float((prediction.residual_mm[counted] ** 2).sum(axis=1).mean()) - noise, 0.0)
 
     start = now = gap([])
@@ -71,7 +71,7 @@ def order_by_share(attribution):
     return tuple(result)
 
 
-def shrink_steps(attribution, ordered, generator, draws):
+def shrink_steps(inference, ordered, generator, draws):
     """Steps from the calibration alone to all effects, one after another.
 
     ordered: terms in the order in which they are added. What the last step leaves is the uncertainty of its numbers
@@ -79,14 +79,14 @@ def shrink_steps(attribution, ordered, generator, draws):
     probability that something is unexplained. The draws resample runs (stretches where there are fewer than ten) and
     redraw the fitted numbers.
     """
-    case, hypothesis, level = attribution.case, attribution.hypothesis, attribution.level
+    case, hypothesis, level = inference.case, inference.hypothesis, inference.level
     picks, result = resampled_rows(case, generator, draws), []
     for count in range(len(ordered) + 1):
         terms = ordered[:count]
         last = count == len(ordered)
-        prediction = attribution.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
+        prediction = inference.held_out.predict(terms, hypothesis.strengths_of(terms, level), level, uncertain=last)
         shown = (prediction.residual_mm**2).sum(axis=1) - 3.0 * case.noise_mm**2
-        weight = attribution.posterior.probability_unexplained if last else 1.0
+        weight = inference.posterior.probability_unexplained if last else 1.0
         numbers = generator.standard_normal((draws, prediction.spread.shape[-1]))
         moved = ((prediction.spread @ numbers.T) ** 2).sum(axis=1).T
         squares = weight * shown + (1.0 - weight) * prediction.uncertainty_mm2

@@ -51,7 +51,7 @@ class State:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearizedProblem:
     """The sim linearised about a state.
 
     data (m, 3): what was read minus model, with the state's effects taken out again; base (m, 3, p): derivative by the

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.campaign.stated_motion import DRIVES, TOOL
 from rrru.effects.backlash import play
-from rrru.kinematics.inverse import drives_at
+from rrru.kinematics.inverse import inverse_kinematics
 
 # points of a way, closer to each other near its ends: what a drive turns back by just before a stop is its last stretch
 _STEPS = 16
@@ -73,7 +73,9 @@ def _straight_in_tool(mechanism, drive, position_mm):
         place = poses.point(np.asarray(mechanism.tool_mm))
         place = place[:-1, None] + _SHARES[:, None] * np.diff(place, axis=0)[:, None]
         place = place.reshape(-1, 3)
-        found = drives_at(mechanism, (place, turn), (first.copy(), place), mechanism.twists(), False).reshape(shape)
+        found = inverse_kinematics(mechanism, (place, turn), (first.copy(), place), mechanism.twists(), False).reshape(
+            shape
+        )
     else:
         found = mechanism.inverse(place.reshape(-1, 3)).reshape(shape)
     # both ends are what the rows say, also of a controller that knows the robot's errors

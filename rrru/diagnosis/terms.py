@@ -9,7 +9,7 @@ EACH, SAME = "each", "same"
 
 
 @dataclass(frozen=True)
-class Term:
+class EffectTerm:
     """One effect of a hypothesis: its name, the number of its shape, and "each", "same" or the one leg it acts on."""
 
     effect: str
@@ -50,7 +50,7 @@ def variants(effect):
         *((SAME,) if legs and coordinates.alike and coordinates.positive.all() else ()),
         *(np.unique(coordinates.legs).tolist() if legs else ()),
     )
-    return tuple(Term(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
+    return tuple(EffectTerm(effect.name, shape, legs) for shape in range(len(coordinates.shapes)) for legs in choices)
 
 
 def signatures(library, linear, terms):

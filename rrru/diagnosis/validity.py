@@ -7,19 +7,19 @@ from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.problem import GEOMETRY
 
 
-def why_no_answer(attribution, stated_mm=None):
+def why_no_answer(inference, stated_mm=None):
     """Why no cause can be named, in words; empty where the fit of the best answer may be read.
 
     A fit whose geometric errors end at their bounds has its minimum where no robot is, and one that leaves many times
     the noise has a model of another robot, or readings of another campaign. stated_mm: noise per axis, None where
     nobody states it.
     """
-    return "; ".join(filter(None, (_at_bounds(attribution), _far_off(attribution, stated_mm))))
+    return "; ".join(filter(None, (_at_bounds(inference), _far_off(inference, stated_mm))))
 
 
-def _at_bounds(attribution):
+def _at_bounds(inference):
     """Which geometric errors bounds hold, in words; empty where none."""
-    estimate, parameters = attribution.fit.estimate, attribution.case.mechanism.parameters
+    estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
     held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
     if not len(held):
         return ""
@@ -31,10 +31,10 @@ def _at_bounds(attribution):
     return f"the fit ends at bounds of the calibration's numbers ({', '.join(shown)}{more})"
 
 
-def _far_off(attribution, stated_mm):
+def _far_off(inference, stated_mm):
     """How far the best answer is from the readings, in words; empty where that is less than many times the noise."""
-    case = attribution.case
-    left = float(np.sqrt((case.residual(attribution.state) ** 2).sum(axis=1).mean()))
+    case = inference.case
+    left = float(np.sqrt((case.residual(inference.state) ** 2).sum(axis=1).mean()))
     repeated, count = repeat_noise(case.measurements[case.used])
     axis_mm = max(stated_mm or case.noise_mm, repeated if count else 0.0)
     noise = float(np.sqrt(3.0) * axis_mm)

@@ -17,7 +17,7 @@ _COLUMNS = ("factor", "level", "points", "rms_mm", "share", "share_low", "share_
 _MORE_COLUMNS = ("drive_rms_rad", "drive_rms_mm", "x_mm", "y_mm", "z_mm")
 
 
-def locate(case, residual_mm, drive, generator, draws=200):
+def variance_by_factor(case, residual_mm, drive, generator, draws=200):
     """Rows of `gap_locate` without the campaign.
 
     residual_mm (m, 3): what was read minus calibrated sim; drive (m, 3, K): derivative by the actuator values. Shares

@@ -15,18 +15,19 @@ from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.terms import EACH, SAME, per_leg, spread
 from rrru.estimation.noise_model import NoiseModel, lengths
 
-LEVELS = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
+DISCREPANCY_SCALES = np.array([0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
 
 
-def levels_of(noise):
-    """Deviations (levels,) of the discrepancy over those of a NoiseModel: LEVELS, moved so that one is what it found.
+def discrepancy_scales(noise):
+    """Deviations (levels,) of the discrepancy over those of a NoiseModel: DISCREPANCY_SCALES, moved so that one is what
+    it found.
 
     Between two levels intervals would be up to 1.8 times too wide or too narrow.
     """
     if not noise.discrepancy:
-        return LEVELS
-    nearest = LEVELS[1 + np.abs(np.log(LEVELS[1:] / noise.discrepancy)).argmin()]
-    return LEVELS * noise.discrepancy / nearest
+        return DISCREPANCY_SCALES
+    nearest = DISCREPANCY_SCALES[1 + np.abs(np.log(DISCREPANCY_SCALES[1:] / noise.discrepancy)).argmin()]
+    return DISCREPANCY_SCALES * noise.discrepancy / nearest
 
 
 def spectrum(wave):
@@ -39,8 +40,8 @@ def spectrum(wave):
 class Whitened:
     """Gram matrices of all columns of a linearisation, made when they are asked for.
 
-    library: effects by name; linear: `rrru.diagnosis.state.Linear`; run (n,): the series of each row; noise: a
-    NoiseModel.
+    library: effects by name; linear: `rrru.diagnosis.state.LinearizedProblem`; run (n,): the series of each row; noise:
+    a NoiseModel.
     """
 
     library: dict
@@ -100,7 +101,7 @@ class Whitened:
         """
         (cosines, wave), p, unit = self._together, self.linear.base.shape[-1], self.noise.mean_mm
         own = self.noise.variance(wave, lengths(self.run)) / unit**2
-        variance = own + levels_of(self.noise)[level] ** 2 * spectrum(wave)[:, None]
+        variance = own + discrepancy_scales(self.noise)[level] ** 2 * spectrum(wave)[:, None]
         white = (cosines / (unit * np.sqrt(variance))[..., None]).reshape(-1, cosines.shape[-1])
         if self.linear.base_prior is None:
             return white, variance, p

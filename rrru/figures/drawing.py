@@ -14,8 +14,8 @@ def draw_all(figures, paths, options, outputs):
     says of it is the caption in all files.
     """
     for name, (place, needed) in figures.items():
-        module, _, attribute = place.partition(":")
-        function = getattr(importlib.import_module(module), attribute)
+        module, _, infer = place.partition(":")
+        function = getattr(importlib.import_module(module), infer)
         figure = function({table: tables.read(paths[table]) for table in needed}, options)
         files = {kind: outputs[f"{name}_{kind}"] for kind in style.KINDS}
         style.save(figure, files, inspect.cleandoc(function.__doc__))

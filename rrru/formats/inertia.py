@@ -15,7 +15,7 @@ from rrru.formats.mjcf_reader import MM
 from rrru.formats.urdf_reader import NO_MASS_KG
 from rrru.kinematics.chain import Twists, walk
 from rrru.kinematics.legs import turn_about
-from rrru.kinematics.point_masses import PLATFORM, Lump
+from rrru.kinematics.point_masses import PLATFORM, PointMass
 
 
 def points_of(model, body):
@@ -27,7 +27,7 @@ def points_of(model, body):
     return MM * (model.body_ipos[body] + np.concatenate([arms.T, -arms.T]))
 
 
-def lumps_of(chains, open_legs, legs):
+def point_masses_of(chains, open_legs, legs):
     """Lumps of all bodies that move with Legs; open_legs: the same ones without bars."""
     assembly, result = chains.assembly, []
     for body in range(1, assembly.model.nbody):
@@ -38,14 +38,14 @@ def lumps_of(chains, open_legs, legs):
         home = undone(assembly.home_of(holder)) @ assembly.home_of(body)
         at = _moved(there @ home, points_of(assembly.model, body))
         if part == assembly.frames[assembly.platform][0]:
-            result += [Lump(PLATFORM, mass / 6.0, point) for point in at]
+            result += [PointMass(PLATFORM, mass / 6.0, point) for point in at]
             continue
         place = chains.parts[part]
         at, leg = _moved(place.placement, at), legs.legs[place.leg]
         if leg.bar and place.joint >= len(leg.joints) - 1:
             result += _of_bar(open_legs, legs, place, mass, at)
         else:
-            result += [Lump(leg.joints[place.joint].name, mass / 6.0, point) for point in at]
+            result += [PointMass(leg.joints[place.joint].name, mass / 6.0, point) for point in at]
     return tuple(result)
 
 
@@ -78,7 +78,7 @@ def _of_bar(open_legs, legs, place, mass, at):
     arm = np.sqrt(0.5 * (((spots - middle) ** 2).sum(axis=1) + along**2).mean())
     centre = (middle - (far if moving else near)) @ line
     site = leg.bar_sites[1 if moving else 0]
-    return [Lump(site, 0.5 * mass, np.array([centre + side * arm, 0.0, 0.0])) for side in (1.0, -1.0)]
+    return [PointMass(site, 0.5 * mass, np.array([centre + side * arm, 0.0, 0.0])) for side in (1.0, -1.0)]
 
 
 def _behind(legs, chain, way, number):

@@ -129,8 +129,8 @@ def _hold(document, connect, bodies, points, errors):
     """Write a connect (number, element) between sites at points of two bodies."""
     k, element = connect
     name = element.get("name") or f"connect{k + 1}"
-    for attribute in ("body1", "body2", "anchor"):
-        element.attrib.pop(attribute, None)
+    for infer in ("body1", "body2", "anchor"):
+        element.attrib.pop(infer, None)
     for end, (body, point) in enumerate(zip(bodies, points, strict=True)):
         own = element.get(f"site{end + 1}", f"{name}_{end + 1}")
         error = errors.get(("anchor", k, end), np.full(3, np.nan))

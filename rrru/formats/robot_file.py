@@ -15,7 +15,7 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.formats import urdf_reader as urdf_files
 from rrru.formats.couplings import of_equalities, of_mimics
-from rrru.formats.inertia import lumps_of
+from rrru.formats.inertia import point_masses_of
 from rrru.formats.mjcf_reader import MM, Assembly
 from rrru.formats.structure import structure_of
 from rrru.kinematics.end_effectors import shared_joints, with_hands
@@ -179,7 +179,7 @@ def _moved_by(model, k):
 
 def _robot(assembly, servos, follows, options):
     """The GeneralRobot of an Assembly's legs, servos the driven joints as `_servos` gives them, follows by joint."""
-    read = {"legs", "parts", "lumps", "effort_limits", "velocity_limits"}
+    read = {"legs", "parts", "point_masses", "effort_limits", "velocity_limits"}
     known = {one.name for one in fields(GeneralRobot) if one.init} - read
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
@@ -191,7 +191,7 @@ def _robot(assembly, servos, follows, options):
     drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(each)])
     parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
     stated = [_stated(assembly, move, servos[move.joint]) for move in each[: len(servos)]]
-    own = {"legs": legs, "parts": parts, "lumps": lumps_of(chains, structure.open_legs, legs)}
+    own = {"legs": legs, "parts": parts, "point_masses": point_masses_of(chains, structure.open_legs, legs)}
     own["drive_range"] = np.array([_range(assembly, move, one) for move, one in zip(each, stated, strict=False)])
     own["assumed"] = frozenset(drive.column for drive, one in zip(drives, stated, strict=True) if not one)
     own |= _limits(assembly, each[: len(servos)])

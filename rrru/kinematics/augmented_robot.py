@@ -19,7 +19,7 @@ _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
 
 
 @dataclass(frozen=True, eq=False)
-class AsRead(Robot):
+class AugmentedRobot(Robot):
     """A robot and what its campaign's Reads leave open; added: Candidates that join its parameters, None for all."""
 
     robot: Robot
@@ -121,4 +121,4 @@ for _name in (
         "SEARCHED",
     ),
 ):
-    setattr(AsRead, _name, _own(_name))
+    setattr(AugmentedRobot, _name, _own(_name))

@@ -23,7 +23,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Reads:
+class MeasurementConfig:
     """What the readings of a campaign leave open.
 
     reflectors: names of the sites of the reflectors that were read, none where the tool was; fitted: those of them
@@ -37,7 +37,7 @@ class Reads:
     frame: bool = False
 
 
-def open_numbers(reads: Reads) -> tuple[Candidate, ...]:
+def open_numbers(reads: MeasurementConfig) -> tuple[Candidate, ...]:
     """Candidates that Reads leave open: places of reflectors, the tool's pose where orientations tell it, the frame."""
     first = 3 if reads.fitted else 0
     tool = range(first, 6) if reads.turned and reads.frame else ()
@@ -50,7 +50,7 @@ def candidates_of(legs, parts, reads=None):
 
     What Reads leave open comes before the rest of tool and world.
     """
-    reads = reads or Reads()
+    reads = reads or MeasurementConfig()
     drives = [
         Candidate(f"d{drive.column.rpartition('_')[0]}", drive.unit, number, drive.twists)
         for number, drive in enumerate(parts.drives, 1)

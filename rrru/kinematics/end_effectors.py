@@ -25,7 +25,7 @@ _SAME_MM = 1e-6
 
 
 @dataclass(frozen=True)
-class HandPoses(Poses):
+class EndEffectorPoses(Poses):
     """Poses of hands; leg (n,): number of the leg whose end each is."""
 
     leg: np.ndarray
@@ -48,13 +48,13 @@ class Ends:
         return np.broadcast_to(_EYE, wrenches[0].shape)
 
     def solve(self, actuators, start, twists=None):
-        """HandPoses (n) of the hands of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
+        """EndEffectorPoses (n) of the hands of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
         every, own = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
         rows = np.arange(len(own))
         position, turn = (np.stack(part)[own, rows] for part in zip(*every, strict=True))
         known = np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         position[~known], turn[~known] = np.nan, np.nan
-        return HandPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
+        return EndEffectorPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
 
 
 def ends(legs, actuators, twists):
@@ -64,7 +64,7 @@ def ends(legs, actuators, twists):
 
 
 @dataclass(frozen=True, eq=False)
-class HandedRobot(GeneralRobot):
+class MultiArmRobot(GeneralRobot):
     """A GeneralRobot of several hands. Its inverse is that of the first one."""
 
     @cached_property
@@ -73,11 +73,13 @@ class HandedRobot(GeneralRobot):
         return Ends(self.legs)
 
     def near(self, position_mm, actuators):
-        """HandPoses (n) of those whose tools nominally are nearest to positions (n, 3), at actuator values (n, K)."""
+        """EndEffectorPoses (n) of those whose tools nominally are nearest to positions (n, 3), at actuator values (n,
+        K).
+        """
         actuators = np.asarray(actuators, dtype=float)
         off = np.nan_to_num(self._tools(actuators) - np.asarray(position_mm))
         none, leg = np.zeros((len(actuators), 0)), np.linalg.norm(off, axis=2).argmin(axis=0)
-        return self.model.solve(actuators, HandPoses(None, None, none, None, None, leg))
+        return self.model.solve(actuators, EndEffectorPoses(None, None, none, None, None, leg))
 
     def guess(self, actuators, targets=None):
         """Positions (n, 3) of the tools of the hands that carry targets (n,), by default of the first hand.
@@ -103,7 +105,7 @@ class HandedRobot(GeneralRobot):
 
 
 def with_hands(arms, shared, carries=None):
-    """The HandedRobot that arms by name, robots of one leg of driven joints each, make.
+    """The MultiArmRobot that arms by name, robots of one leg of driven joints each, make.
 
     shared: number of joints, the base's frame among them, from the base to where the arms part, alike in all of them;
     carries: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
@@ -128,10 +130,10 @@ def with_hands(arms, shared, carries=None):
         "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
         "drive_range": ranges,
         "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),
-        "lumps": _lumps([*arms.values()], shared),
+        "point_masses": _point_masses([*arms.values()], shared),
         **{name: _limits(arms.values(), name, drives) for name in ("effort_limits", "velocity_limits")},
     }
-    return HandedRobot(**options | own)
+    return MultiArmRobot(**options | own)
 
 
 def _drives(arms):
@@ -161,18 +163,18 @@ def shared_joints(arms):
     return next((number for number, names in enumerate(chains) if len(set(names)) > 1), 0)
 
 
-def _lumps(arms, shared):
+def _point_masses(arms, shared):
     """The point masses of arms: of the trunk those that all have there, as one may count another arm to its trunk."""
     first, *others = arms
     trunk = set(_names(first)[:shared])
-    common = [one for one in first.lumps if one.joint in trunk and all(_has(arm, one) for arm in others)]
-    return (*common, *(lump for arm in arms for lump in arm.lumps if lump.joint not in trunk))
+    common = [one for one in first.point_masses if one.joint in trunk and all(_has(arm, one) for arm in others)]
+    return (*common, *(point_mass for arm in arms for point_mass in arm.point_masses if point_mass.joint not in trunk))
 
 
-def _has(arm, lump):
+def _has(arm, point_mass):
     """Whether an arm has a point mass."""
-    alike = (one for one in arm.lumps if (one.joint, one.mass_kg) == (lump.joint, lump.mass_kg))
-    return any(np.allclose(one.at_mm, lump.at_mm, rtol=0.0, atol=_SAME_MM) for one in alike)
+    alike = (one for one in arm.point_masses if (one.joint, one.mass_kg) == (point_mass.joint, point_mass.mass_kg))
+    return any(np.allclose(one.at_mm, point_mass.at_mm, rtol=0.0, atol=_SAME_MM) for one in alike)
 
 
 def _names(arm):
@@ -186,8 +188,12 @@ def _apart(arm, hand, shared):
     new = {joint.name: f"{hand} {joint.name}" for joint in leg.joints[shared:] if joint.kind == "fixed"}
     new[PLATFORM] = new.get(leg.joints[-1].name, leg.joints[-1].name)
     joints = tuple(replace(joint, name=new.get(joint.name, joint.name)) for joint in leg.joints)
-    lumps = tuple(replace(lump, joint=new.get(lump.joint, lump.joint)) for lump in arm.lumps)
-    return replace(arm, legs=replace(arm.legs, legs=(replace(leg, name=hand, joints=joints),)), lumps=lumps)
+    point_masses = tuple(
+        replace(point_mass, joint=new.get(point_mass.joint, point_mass.joint)) for point_mass in arm.point_masses
+    )
+    return replace(
+        arm, legs=replace(arm.legs, legs=(replace(leg, name=hand, joints=joints),)), point_masses=point_masses
+    )
 
 
 def _chains(arms, shared, robot):

@@ -14,7 +14,15 @@ from scipy.spatial.transform import Rotation
 
 from rrru.errors import ConfigError
 from rrru.kinematics import base_parameters
-from rrru.kinematics.base_parameters import Reads, candidates_of, choose, direction, in_words, offered, open_numbers
+from rrru.kinematics.base_parameters import (
+    MeasurementConfig,
+    candidates_of,
+    choose,
+    direction,
+    in_words,
+    offered,
+    open_numbers,
+)
 from rrru.kinematics.inverse import bar_lengths, drives_from_home, end_of, followed, in_range, near_or_followed
 from rrru.kinematics.legs import TOOL, WORLD, Legs, Parts
 from rrru.kinematics.point_masses import base_moment, driven_loads, member_forces, moments
@@ -31,9 +39,9 @@ class GeneralRobot(Robot):
     """A robot of any legs.
 
     drive_range (K, 2): actuator values between which it works; assumed: columns of the drives that nobody states a
-    range of, which may go beyond it; parameter_set: one of SETS; lumps: point masses of its links; sample: actuator
-    values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names
-    that it is chosen from, by default all; reads: what a campaign's readings leave open; effort_limits,
+    range of, which may go beyond it; parameter_set: one of SETS; point_masses: point masses of its links; sample:
+    actuator values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace;
+    among: names that it is chosen from, by default all; reads: what a campaign's readings leave open; effort_limits,
     velocity_limits: of `Robot`.
     """
 
@@ -47,11 +55,11 @@ class GeneralRobot(Robot):
     length_limit_mm: float = 30.0
     tool_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    lumps: tuple = ()
+    point_masses: tuple = ()
     assumed: frozenset[str] = frozenset()
     sample: tuple | None = None
     among: tuple[str, ...] = ()
-    reads: Reads = field(default_factory=Reads)
+    reads: MeasurementConfig = field(default_factory=MeasurementConfig)
     effort_limits: np.ndarray | None = None
     velocity_limits: np.ndarray | None = None
 
@@ -241,19 +249,19 @@ class GeneralRobot(Robot):
         """Loads (n, D) on the driven values, in N mm or N, of the robot's point masses; see
         `rrru.kinematics.point_masses`.
         """
-        return driven_loads(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+        return driven_loads(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
     def own_member_forces(self, motion, poses, gravity_mm_s2):
         """Forces (n, members) in N of the robot's point masses on its members, compression positive."""
-        return member_forces(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+        return member_forces(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
     def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
         """Moments (n, J, 3) in N mm of an arm's point masses about the places (n, J, 3) of its turning joints."""
-        return moments(self, motion, poses, gravity_mm_s2, at_mm) if self.lumps else 0.0
+        return moments(self, motion, poses, gravity_mm_s2, at_mm) if self.point_masses else 0.0
 
     def own_base_moment(self, motion, poses, gravity_mm_s2):
         """Moments (n, 3) in N mm of the robot's point masses about the origin."""
-        return base_moment(self, motion, poses, gravity_mm_s2) if self.lumps else 0.0
+        return base_moment(self, motion, poses, gravity_mm_s2) if self.point_masses else 0.0
 
     @property
     def workspace_lines(self):

@@ -20,13 +20,13 @@ _CLOSE = 0.1
 
 
 def drives_from_home(robot, place, twists, nearest):
-    """`drives_at` near the home pose."""
+    """`inverse_kinematics` near the home pose."""
     count, legs = len(place[0]), robot.legs
     start = np.tile(legs.home_drives, (count, 1)).astype(float), np.tile(legs.home_mm, (count, 1))
-    return drives_at(robot, place, start, twists, nearest)
+    return inverse_kinematics(robot, place, start, twists, nearest)
 
 
-def drives_at(robot, place, start, twists, nearest=True):
+def inverse_kinematics(robot, place, start, twists, nearest=True):
     """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
     place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose

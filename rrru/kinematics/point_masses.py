@@ -21,11 +21,11 @@ PLATFORM = "platform"
 
 
 @dataclass(frozen=True, eq=False)
-class Lump:
+class PointMass:
     """A point mass in mass_kg at at_mm (3,) of the frame behind the motion of a joint, called by its site.
 
-    joint "platform": the platform's frame. Of a bar's mass, lumps of the site "<leg> bar" count along it from its first
-    ball joint, those of "<leg> end", at negative x, along it from its end: what moves with a driven slide.
+    joint "platform": the platform's frame. Of a bar's mass, point masses of the site "<leg> bar" count along it from
+    its first ball joint, those of "<leg> end", at negative x, along it from its end: what moves with a driven slide.
     """
 
     joint: str
@@ -34,28 +34,28 @@ class Lump:
 
 
 def places(robot, actuators, poses, twists=None):
-    """Places (n, lumps, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them.
+    """Places (n, point masses, 3) in mm of a robot's point masses at actuator values (n, K) and Poses that fit them.
 
     twists: finite ones (1, sites, 6) at the sites.
     """
     ways = dict(zip(robot.legs.legs, walks(robot.legs, actuators, poses, Twists(robot.legs, twists)), strict=True))
     holders = {name: leg for leg in robot.legs.legs for name in (*(j.name for j in leg.joints), *leg.bar_sites)}
     result = []
-    for lump in robot.lumps:
-        if lump.joint == PLATFORM:
-            result.append(poses.point(lump.at_mm))
+    for point_mass in robot.point_masses:
+        if point_mass.joint == PLATFORM:
+            result.append(poses.point(point_mass.at_mm))
             continue
-        leg = holders[lump.joint]
-        if lump.joint in leg.bar_sites:
-            result.append(_along_bar(leg, ways[leg], lump))
+        leg = holders[point_mass.joint]
+        if point_mass.joint in leg.bar_sites:
+            result.append(_along_bar(leg, ways[leg], point_mass))
         else:
-            result.append(_behind_joint(robot.legs, leg, ways[leg], lump, (poses, actuators)))
+            result.append(_behind_joint(robot.legs, leg, ways[leg], point_mass, (poses, actuators)))
     return np.stack(result, axis=1)
 
 
-def _behind_joint(legs, leg, way, lump, state):
+def _behind_joint(legs, leg, way, point_mass, state):
     """Places (n, 3) of a lump fixed in the frame behind the motion of a joint."""
-    (poses, actuators), number = state, [joint.name for joint in leg.joints].index(lump.joint)
+    (poses, actuators), number = state, [joint.name for joint in leg.joints].index(point_mass.joint)
     joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
     if joint.kind != "fixed":
         known = value_of(legs, joint, actuators, poses.passive)
@@ -63,13 +63,13 @@ def _behind_joint(legs, leg, way, lump, state):
             turn = turn @ turn_about(joint.axis, known)
         else:
             place = place + known[:, None] * way.axes[number]
-    return place + turn @ lump.at_mm
+    return place + turn @ point_mass.at_mm
 
 
-def _along_bar(leg, way, lump):
+def _along_bar(leg, way, point_mass):
     """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
-    end = way.bar.near if lump.joint == leg.bar_sites[0] else way.bar.far
-    return end + lump.at_mm[0] * way.bar.line
+    end = way.bar.near if point_mass.joint == leg.bar_sites[0] else way.bar.far
+    return end + point_mass.at_mm[0] * way.bar.line
 
 
 def driven_loads(robot, motion, poses, gravity_mm_s2):
@@ -114,7 +114,7 @@ def moments(robot, motion, poses, gravity_mm_s2, at_mm):
     behind = _behind(robot.legs)
     result = np.empty(at_mm.shape)
     for k, name in enumerate(robot.legs.arm_joints):
-        carried = [lump.joint in (*behind[name], PLATFORM) for lump in robot.lumps]
+        carried = [point_mass.joint in (*behind[name], PLATFORM) for point_mass in robot.point_masses]
         lever = place[:, carried] - at_mm[:, k, None]
         result[:, k] = cross(lever, force[:, carried]).sum(axis=1)
     return result
@@ -144,15 +144,15 @@ def _uncoupled(robot, motion):
 
 
 def _moved(robot, actuators, poses, twists=None):
-    """Places (n, lumps, 3) at other driven values (n, D) or under twists (1, sites, 6), from Poses nearby."""
+    """Places (n, point masses, 3) at other driven values (n, D) or under twists (1, sites, 6), from Poses nearby."""
     return places(robot, actuators, robot.model.solve(actuators, poses, twists), twists)
 
 
 def _forces(robot, motion, poses, gravity_mm_s2):
-    """Weight and inertia force (n, lumps, 3) in N of every point mass."""
+    """Weight and inertia force (n, point masses, 3) in N of every point mass."""
     actuators, rate, acceleration = motion
     bend = 0.5 * _STEP_S**2 * acceleration
     steps = (_moved(robot, actuators + sign * _STEP_S * rate + bend, poses) for sign in (1.0, -1.0))
     second = (sum(steps) - 2.0 * places(robot, actuators, poses)) / _STEP_S**2
-    mass = np.array([lump.mass_kg for lump in robot.lumps])
+    mass = np.array([point_mass.mass_kg for point_mass in robot.point_masses])
     return mass[:, None] * (gravity_mm_s2 - second) / 1000.0

@@ -86,9 +86,9 @@ class Robot(ABC):
 
     def reading(self, reads):
         """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""
-        from rrru.kinematics.augmented_robot import AsRead
+        from rrru.kinematics.augmented_robot import AugmentedRobot
 
-        return AsRead(self, reads) if reads.reflectors or reads.turned or reads.frame else self
+        return AugmentedRobot(self, reads) if reads.reflectors or reads.turned or reads.frame else self
 
     def seen_at(self, _actuators, _position_mm, _readings=None):
         """The robot with its parameters chosen for poses of a campaign; those of most robots stay as they are."""

@@ -17,7 +17,7 @@ from rrru.errors import ConfigError
 from rrru.kinematics.general_robot import GeneralRobot
 from rrru.kinematics.inverse import end_of
 from rrru.kinematics.legs import TOOL, WORLD, Drive, Joint, Leg, Legs, Parts, X, Z, turn_about, unit_twist
-from rrru.kinematics.point_masses import Lump
+from rrru.kinematics.point_masses import PointMass
 
 # keys of a row: of a joint, of a fixed frame
 JOINT = ("a", "alpha", "d", "theta", "sliding", "name", "drives", "mass_kg", "com_mm")
@@ -38,7 +38,7 @@ def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), nam
     """
     links = _links(rows, modified, name)
     coupling = _coupling([link for link in links if link.name], name)
-    joints, lumps, driven = [Joint("base")], [], 0
+    joints, point_masses, driven = [Joint("base")], [], 0
     shift, turn = np.zeros(3), np.eye(3)
     for link in links:
         seat = Joint(link.site, link.kind, Z, shift + turn @ link.shift_mm, turn @ link.turn)
@@ -46,7 +46,7 @@ def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), nam
         driven += bool(link.name)
         shift, turn = link.after
         if link.mass_kg:
-            lumps.append(Lump(link.site, link.mass_kg, shift + turn @ np.asarray(link.com_mm)))
+            point_masses.append(PointMass(link.site, link.mass_kg, shift + turn @ np.asarray(link.com_mm)))
     leg = Leg("arm", (*joints, Joint("flange", "fixed", Z, shift, turn)))
     matrix = np.array(list(coupling.values())).T
     own = None if np.array_equal(matrix, np.eye(len(matrix))) else matrix
@@ -58,7 +58,7 @@ def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), nam
         parts=_parts([link for link in links if link.name], coupling),
         drive_range=np.asarray(drive_range, dtype=float),
         tool_mm=tuple(tool_mm),
-        lumps=tuple(lumps),
+        point_masses=tuple(point_masses),
         **options,
     )
 

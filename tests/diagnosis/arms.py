@@ -13,7 +13,7 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.make_problem import make_case
 from rrru.effects.library import find
 from rrru.effects.protocol import ActiveEffect, together
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.dynamics import Masses
 from rrru.kinematics.readings import orientation
 from rrru.robots.from_dh import from_dh
@@ -84,4 +84,4 @@ def reading(frame):
 
 def reads_of(sites):
     """What readings of reflectors at some sites leave open."""
-    return Reads(tuple(sites), tuple(sites))
+    return MeasurementConfig(tuple(sites), tuple(sites))

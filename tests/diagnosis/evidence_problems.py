@@ -7,32 +7,32 @@ from typing import NamedTuple
 import numpy as np
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.marginal_problem import Projected
-from rrru.diagnosis.terms import SAME, Term
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.marginal_problem import MarginalProblem
+from rrru.diagnosis.terms import SAME, EffectTerm
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from tests.diagnosis import arms, campaigns
 
 # prior scales over what is left of an effect, and levels of the discrepancy
 _WEAK, _STRONG, _NO_LEVEL, _HIGH_LEVEL = 1.0, 30.0, 0, 3
-_SOFT = Term("drive_compliance"), Term("link_flexure")
-_PLAY = Term("backlash"), Term("joint_clearance")
+_SOFT = EffectTerm("drive_compliance"), EffectTerm("link_flexure")
+_PLAY = EffectTerm("backlash"), EffectTerm("joint_clearance")
 _TRIPOD = (
-    (Term("backlash"),),
-    (Term("drive_compliance", legs=SAME),),
-    (Term("joint_clearance", 3), Term("backlash")),
+    (EffectTerm("backlash"),),
+    (EffectTerm("drive_compliance", legs=SAME),),
+    (EffectTerm("joint_clearance", 3), EffectTerm("backlash")),
     _SOFT,
-    (*_PLAY, Term("servo_lag")),
-    (*_SOFT, Term("thermal_growth", 2)),
+    (*_PLAY, EffectTerm("servo_lag")),
+    (*_SOFT, EffectTerm("thermal_growth", 2)),
     (*_SOFT, *_PLAY),
-    (*_SOFT, *_PLAY, Term("servo_lag")),
-    (*_SOFT, *_PLAY, Term("servo_lag"), Term("thermal_growth", 4)),
-    (*_SOFT, *_PLAY, Term("axis_tilt"), Term("encoder_eccentricity")),
+    (*_SOFT, *_PLAY, EffectTerm("servo_lag")),
+    (*_SOFT, *_PLAY, EffectTerm("servo_lag"), EffectTerm("thermal_growth", 4)),
+    (*_SOFT, *_PLAY, EffectTerm("axis_tilt"), EffectTerm("encoder_eccentricity")),
 )
 _ARM = (
-    (Term("backlash"),),
-    (Term("drive_compliance"),),
-    (Term("drive_compliance"), Term("backlash")),
-    (Term("drive_compliance"), Term("backlash"), Term("encoder_eccentricity")),
+    (EffectTerm("backlash"),),
+    (EffectTerm("drive_compliance"),),
+    (EffectTerm("drive_compliance"), EffectTerm("backlash")),
+    (EffectTerm("drive_compliance"), EffectTerm("backlash"), EffectTerm("encoder_eccentricity")),
 )
 # coefficients and shared part of random columns: correlations of 0.99 to 0.9999
 _RANDOM = ((2, 10.0), (3, 10.0), (6, 30.0), (6, 100.0), (12, 30.0), (18, 100.0))
@@ -40,11 +40,13 @@ COUNT = len(_TRIPOD) + len(_ARM) + len(_RANDOM)
 
 
 class Problem(NamedTuple):
-    """A problem of one level: its name, the Projected problem, prior scales (terms,), and the evidence with terms."""
+    """A problem of one level: its name, the MarginalProblem, prior scales (terms,), and the evidence with
+    terms.
+    """
 
     name: str
-    problem: Projected
-    strengths: np.ndarray
+    problem: MarginalProblem
+    prior_scales: np.ndarray
     evidence: object = None
     terms: tuple = ()
     level: int = 0
@@ -52,7 +54,7 @@ class Problem(NamedTuple):
     @property
     def scale(self):
         """Prior standard deviations (k,)."""
-        return self.problem.scale(self.strengths[None])[0]
+        return self.problem.scale(self.prior_scales[None])[0]
 
 
 def without_nuisance(linear):
@@ -76,11 +78,11 @@ def arm_evidence():
     return case.evidence(without_nuisance(case.linearise(calibrate(case))))
 
 
-def _of_robot(name, evidence, terms, strength, level):
-    strengths = strength * np.resize([1.0, 0.3, 0.1], len(terms))
+def _of_robot(name, evidence, terms, prior_scale, level):
+    prior_scales = prior_scale * np.resize([1.0, 0.3, 0.1], len(terms))
     level = level if level in evidence.levels else 0
     evidence = evidence.on_complete(terms)
-    return Problem(name, evidence.projected(terms, [level]), strengths, evidence, terms, level)
+    return Problem(name, evidence.projected(terms, [level]), prior_scales, evidence, terms, level)
 
 
 def _random(number, count, shared):
@@ -92,7 +94,7 @@ def _random(number, count, shared):
     data = design @ made + generator.normal(size=3 * count)
     nothing, owner = np.zeros(count), np.arange(count) * 6 // max(count, 6)
     prior = nothing + 1.0, nothing + np.inf, nothing == 0.0, nothing
-    problem = Projected((design.T @ design)[None], (data @ design)[None], *prior, owner, np.arange(count))
+    problem = MarginalProblem((design.T @ design)[None], (data @ design)[None], *prior, owner, np.arange(count))
     return Problem(f"{count} random columns, shared {shared:g}", problem, np.full(owner.max() + 1, 1.0))
 
 
@@ -101,9 +103,9 @@ def problems():
     """All COUNT of them."""
     result = []
     for k, terms in enumerate(_TRIPOD):
-        strength, level = (_WEAK, _STRONG)[k % 2], (_NO_LEVEL, _HIGH_LEVEL)[k // 2 % 2]
-        name = f"3-RRRU: {', '.join(term.effect for term in terms)}, discrepancy {LEVELS[level]:g}"
-        result.append(_of_robot(name, tripod_evidence(), terms, strength, level))
+        prior_scale, level = (_WEAK, _STRONG)[k % 2], (_NO_LEVEL, _HIGH_LEVEL)[k // 2 % 2]
+        name = f"3-RRRU: {', '.join(term.effect for term in terms)}, discrepancy {DISCREPANCY_SCALES[level]:g}"
+        result.append(_of_robot(name, tripod_evidence(), terms, prior_scale, level))
     for k, terms in enumerate(_ARM):
         name = f"arm: {', '.join(term.effect for term in terms)}"
         result.append(_of_robot(name, arm_evidence(), terms, (_STRONG, _WEAK)[k % 2], _NO_LEVEL))

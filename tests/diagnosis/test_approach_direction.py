@@ -11,7 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.approach_direction import at_reversals, read_back_jitter, rest_widths
 from rrru.diagnosis.determined import require_determined
 from rrru.diagnosis.diagnose import sim
-from rrru.diagnosis.inference import attribute
+from rrru.diagnosis.inference import infer
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.options import OPTIONS
@@ -22,7 +22,7 @@ from rrru.effects.backlash import play
 from rrru.effects.library import find
 from rrru.effects.protocol import together
 from rrru.errors import FitError
-from rrru.kinematics.inverse import drives_at
+from rrru.kinematics.inverse import inverse_kinematics
 from rrru.studies.setup import as_measured
 from tests.diagnosis import arms
 from tests.diagnosis.campaigns import ROBOT, active, case_of, measure, plan_of, robot_of, strong
@@ -134,7 +134,7 @@ def _open(case, share, seed=0):
 def test_open_senses_change_no_verdict_and_every_reading_counts(acting):
     """At two thirds of the points nobody knows the senses; the robot's errors are found as if they were known."""
     frame = measure(tuple(strong(name, 4.0) for name in acting))
-    found = attribute(_open(case_of(frame), 0.66), Prior())
+    found = infer(_open(case_of(frame), 0.66), Prior())
     assert found.case.count == len(frame) and found.case.known["backlash"].mean() < 0.35
     assert found.hypothesis.effects == set(acting) and found.posterior.marginal("backlash") > 0.9 * (
         "backlash" in acting
@@ -146,7 +146,7 @@ def test_open_senses_change_no_verdict_and_every_reading_counts(acting):
 def test_a_set_that_imitates_play_does_not_win_by_the_readings_of_open_senses():
     """A law of the drives' values may explain readings at which play says nothing: that is none of its merits."""
     case = _open(case_of(measure((strong("backlash", 4.0),))), 0.66)
-    found = attribute(case, Prior()).posterior
+    found = infer(case, Prior()).posterior
     assert found.sets()[frozenset({"backlash"}), False] > 0.8 and found.probability_unexplained < 0.1
 
 
@@ -162,7 +162,7 @@ def _along_lines(effects, jitter_rad, seed=4):
         line = arm.forward(start[None]) + 5.0 * np.arange(24)[:, None] * way / np.linalg.norm(way)
         turn = np.broadcast_to(at.turn, (len(line), 3, 3))
         near = np.repeat(start[None], len(line), axis=0), np.repeat(line[:1], len(line), axis=0)
-        drive = drives_at(arm, (line, turn), near, arm.twists(), False)
+        drive = inverse_kinematics(arm, (line, turn), near, arm.twists(), False)
         lines += [drive, drive[::-1]]
     run = np.repeat(np.arange(1, len(lines) + 1), [len(line) for line in lines])
     drive = np.concatenate(lines)
@@ -190,7 +190,7 @@ def _of_arm(frame, *names):
 def along_lines():
     """Attributions of one robot by its joint values as driven, and as read back with a jitter of 1e-5 rad."""
     names, acting = ("backlash", "encoder_eccentricity"), (arms.active("backlash", np.full(6, 1.5e-3)),)
-    return [attribute(_of_arm(_along_lines(acting, jitter), *names), Prior()) for jitter in (0.0, 1e-5)]
+    return [infer(_of_arm(_along_lines(acting, jitter), *names), Prior()) for jitter in (0.0, 1e-5)]
 
 
 def test_jitter_of_joint_values_changes_neither_verdict_nor_errors(along_lines):
@@ -212,7 +212,7 @@ def test_where_hardly_a_sense_is_known_only_play_is_not_tested():
     case = require_determined(arms.case_of(frame, "backlash", "drive_compliance", "read_before_rest"))
     assert case.used.all() and set(case.effects) == {"drive_compliance", "read_before_rest"}
     assert "is known at 5 of 250 points; allowed: at least 50% of them" in case.untestable["backlash"]
-    found = attribute(case, Prior())
+    found = infer(case, Prior())
     assert found.hypothesis.effects == {"drive_compliance"} and found.case.count == 250
 
 

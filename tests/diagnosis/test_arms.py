@@ -39,9 +39,9 @@ def test_distances_are_those_of_positions_where_orientations_are_read_too():
     frame = arms.measure((acting,), _COUNT, 1, noise)
     robot = MeasuredRobot(arms.reading(frame), arms.MASSES, noise[0], "arm", noise[1])
     found = diagnose(frame, robot, GapSettings(("encoder_eccentricity",), draws=50))
-    case = found.attribution.case
+    case = found.inference.case
     assert case.arm_mm == pytest.approx(5000.0)
-    left = case.left(found.attribution.calibrated)[: len(frame)]
+    left = case.left(found.inference.calibrated)[: len(frame)]
     squares = (left**2).sum(axis=1) - 3.0 * noise[0] ** 2
     true = np.sqrt(squares.mean())
     assert found.verdict["gap_rms_mm"] == pytest.approx(true, rel=0.1)
@@ -78,8 +78,8 @@ def test_a_rough_function_of_all_drives_is_named(spectrum, seed):
     assert found.verdict["noise_rms_mm"] == pytest.approx(np.sqrt(3.0) * arms.NOISE_MM, rel=0.15)
     (values,) = found.state.effects.values()
     # functions along the drives' ranges, but for what the calibration's own numbers make
-    motion = found.attribution.case.motion
-    law = found.attribution.case.library["drive_error_function"]
+    motion = found.inference.case.motion
+    law = found.inference.case.library["drive_error_function"]
     for own, true, made in zip(np.split(values, 6), np.split(truth, 6), law.along_drives(motion), strict=True):
         off, whole = made @ (own - true), made @ true
         assert np.std(off) < 0.5 * np.std(whole)
@@ -105,7 +105,7 @@ def test_three_sharp_orders_of_different_drives_are_named(waves, size_rad):
     acting, size = _sharp(waves, size_rad, 4)
     found = _diagnosed((acting,), 4)
     assert found.verdict["effects"] == "transmission_orders" and found.verdict["share_closed"] > 0.7
-    case = found.attribution.case
+    case = found.inference.case
     law, (values,) = case.library["transmission_orders"], found.state.effects.values()
     told = {}
     for parameter, sine, cosine in zip(law.parameters.names[::2], values[::2], values[1::2], strict=True):
@@ -125,7 +125,7 @@ def test_sharp_orders_are_found_behind_a_law_that_hides_them():
     # one drive's wave is a transmission error of that drive alone as well
     assert {"drive_compliance", "transmission_orders"} <= named
     assert named <= {"drive_compliance", "transmission_orders", "transmission_error"}
-    waves = list(found.attribution.case.library["transmission_orders"].waves)
+    waves = list(found.inference.case.library["transmission_orders"].waves)
     if "transmission_error" in named:
         own = found.tables["gap_parameters"].set_index(["effect", "parameter"])["value"]["transmission_error"]
         waves.append((int(own.filter(like="amplitude").argmax()), own["ratio"]))
@@ -138,5 +138,5 @@ def test_sharp_orders_are_found_behind_a_law_that_hides_them():
 def test_nothing_is_named_where_nothing_acts(seed):
     found = _diagnosed((), seed)
     assert found.verdict["effects"] == "none" and found.verdict["probability"] > 0.5
-    assert "transmission_orders" not in found.attribution.case.library
+    assert "transmission_orders" not in found.inference.case.library
     assert found.verdict["gap_rms_mm"] < 0.5 * found.verdict["noise_rms_mm"]

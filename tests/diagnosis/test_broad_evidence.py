@@ -11,12 +11,12 @@ from scipy.optimize import lsq_linear
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal, norm
 
-from rrru.diagnosis.evidence import STRENGTHS, ModelEvidence
+from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.marginal import Average, averaged_mean
-from rrru.diagnosis.state import Linear
-from rrru.diagnosis.terms import Term
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.diagnosis.terms import EffectTerm
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
 
@@ -45,7 +45,7 @@ LIBRARY = {
     "other": _effect([1.0, 1.0, 1.5], needs=("drive_load",)),
     "pull": _effect([0.7], positive=True),
 }
-ROUGH, FINE, FREE, OTHER, PULL = (Term(name) for name in LIBRARY)
+ROUGH, FINE, FREE, OTHER, PULL = (EffectTerm(name) for name in LIBRARY)
 
 
 def _evidence(seed, with_law=False, smooth=False):
@@ -57,13 +57,13 @@ def _evidence(seed, with_law=False, smooth=False):
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape) + 0.1 * columns["pull", 0][..., 0]
     steps = (("a number", 1.3, 2.3, _ABOUT),)
-    linear = Linear(data, base, columns, laws, {}, None, weight, steps)
+    linear = LinearizedProblem(data, base, columns, laws, {}, None, weight, steps)
     return ModelEvidence(LIBRARY, linear, np.ones(_POINTS, dtype=int), NoiseModel.white(NOISE_MM), smooth)
 
 
 @dataclass(frozen=True)
 class Dense:
-    """The whole Gaussian model of some terms at strengths: columns (3n, k) in units of the noise, sizes (k,)."""
+    """The whole Gaussian model of some terms at prior_scales: columns (3n, k) in units of the noise, sizes (k,)."""
 
     data: np.ndarray
     base: np.ndarray
@@ -74,19 +74,19 @@ class Dense:
     weight: np.ndarray
 
     @classmethod
-    def of(cls, evidence, terms, strengths):
-        """The model of terms at strengths on the evidence's columns and data."""
+    def of(cls, evidence, terms, prior_scales):
+        """The model of terms at prior scales on the evidence's columns and data."""
         linear = evidence.linear
         base = linear.base.reshape(-1, 3) / NOISE_MM
         basis, _ = np.linalg.qr(base)
         columns, sizes, owner = [np.zeros((len(base), 0))], [], []
-        for number, (term, strength) in enumerate(zip(terms, strengths, strict=True)):
+        for number, (term, prior_scale) in enumerate(zip(terms, prior_scales, strict=True)):
             own = linear.columns[term.effect, 0].reshape(len(base), -1) / NOISE_MM
             typical = LIBRARY[term.effect].coordinates.typical
             beyond = (own - basis @ (basis.T @ own)) * typical
             columns.append(own)
-            # of strength 1 the rms of its part beyond the calibration is that of the noise
-            sizes.extend(strength * typical / np.sqrt((beyond**2).sum() / len(base)))
+            # of prior scale 1 the rms of its part beyond the calibration is that of the noise
+            sizes.extend(prior_scale * typical / np.sqrt((beyond**2).sum() / len(base)))
             owner.extend([number] * len(typical))
         for term in terms:
             if term.effect in linear.shape_columns:
@@ -161,22 +161,22 @@ class Dense:
 
 def _by_weight(evidence, terms):
     """What a step of the weight makes (3n,) of "other" as large as it is beside the others, the broadest left out, and
-    the strength under which it is that large.
+    the prior scale under which it is that large.
     """
     rest, linear = [term for term in terms if term != ROUGH], evidence.linear
     known = replace(evidence, linear=replace(linear, by_weight={}))
-    dense = Dense.of(known, rest, [STRENGTHS[-1]] * len(rest))
+    dense = Dense.of(known, rest, [PRIOR_SCALES[-1]] * len(rest))
     own = dense.owner == rest.index(OTHER)
-    at_least = np.sqrt(((dense.mean / dense.size)[own] ** 2).mean()) * STRENGTHS[-1]
+    at_least = np.sqrt(((dense.mean / dense.size)[own] ** 2).mean()) * PRIOR_SCALES[-1]
     return linear.by_weight["other", 0].reshape(-1, 3) @ dense.mean[own], at_least
 
 
-def _borne(evidence, terms, strengths, number, least):
-    """Log likelihood where under less than the least strength of one term the weight stays, and costs what it does."""
-    given = Dense.of(evidence, terms, strengths)
-    if strengths[number] >= least:
+def _borne(evidence, terms, prior_scales, number, least):
+    """Log likelihood where under less than the least prior scale of one term the weight stays, at the same cost."""
+    given = Dense.of(evidence, terms, prior_scales)
+    if prior_scales[number] >= least:
         return given.averaged
-    raised = Dense.of(evidence, terms, (*strengths[:number], least, *strengths[number + 1 :]))
+    raised = Dense.of(evidence, terms, (*prior_scales[:number], least, *prior_scales[number + 1 :]))
     return given.as_it_is + min(raised.averaged - raised.as_it_is, 0.0)
 
 
@@ -201,7 +201,7 @@ def test_scores_equal_a_dense_marginal_likelihood(terms, with_law):
     assert [tuple(one) for one in combinations] == list(product(*grids)) and found.shape == (1, len(combinations))
     expected = [Dense.of(evidence, terms, one).averaged for one in combinations]
     if with_law and OTHER in terms:
-        # half the strength of what was found is the nearest one that is tried
+        # half the prior scale of what was found is the nearest one that is tried
         number, least = terms.index(OTHER), 0.5 * _by_weight(evidence, terms)[1]
         expected = [_borne(evidence, terms, one, number, least) for one in combinations]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
@@ -217,9 +217,9 @@ def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, 
     data = size * NOISE_MM * a[..., 0] + NOISE_MM * generator.normal(size=shape)
     base, steps = generator.normal(size=(*shape, 3)), (("a number", off, off + 1.0, -off),)
     library = {"one": _effect([1.0], needs=("drive_load",))}
-    linear = Linear(data, base, {("one", 0): a}, {}, {}, None, {("one", 0): b}, steps)
+    linear = LinearizedProblem(data, base, {("one", 0): a}, {}, {}, None, {("one", 0): b}, steps)
     evidence = ModelEvidence(library, linear, np.ones(_POINTS, dtype=int), NoiseModel.white(NOISE_MM), False)
-    found, grid = evidence.over_strengths((Term("one"),))
+    found, grid = evidence.over_strengths((EffectTerm("one"),))
     basis, _ = np.linalg.qr(base.reshape(-1, 3))
     a, b, data = (one.reshape(-1, 1) - basis @ (basis.T @ one.reshape(-1, 1)) for one in (a, b, data))
     unit = NOISE_MM * np.sqrt(len(a) / (a**2).sum())
@@ -230,9 +230,9 @@ def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, 
     moment, square = slope[0] + w * slope[1], gram[0] + 2.0 * w * gram[1] + w**2 * gram[2]
     told = logsumexp([norm.logpdf(w, -off, 0.1), norm.logpdf(w, -off, 1.0)], axis=0, b=0.5)
     exact = []
-    for (strength,) in grid:
-        wide = 1.0 + square * (strength * unit) ** 2
-        given = 0.5 * moment**2 * (strength * unit) ** 2 / wide - 0.5 * np.log(wide)
+    for (prior_scale,) in grid:
+        wide = 1.0 + square * (prior_scale * unit) ** 2
+        given = 0.5 * moment**2 * (prior_scale * unit) ** 2 / wide - 0.5 * np.log(wide)
         exact.append(logsumexp(given + told) + np.log(w[1] - w[0]))
     gained = found[0] - evidence.none[0]
     assert abs(logsumexp(gained) - logsumexp(exact)) < 0.3
@@ -245,12 +245,12 @@ def test_evidence_where_the_weight_is_fitted_is_that_of_the_exact_product(size, 
 def test_alone_it_is_averaged_over_all_strengths_and_levels():
     evidence = _evidence(2, smooth=True)
     found, grid = evidence.over_strengths((ROUGH,))
-    assert found.shape == (len(LEVELS), len(STRENGTHS)) and grid[:, 0].tolist() == STRENGTHS.tolist()
-    expected = [Dense.of(evidence, (ROUGH,), (strength,)).likelihood for strength in STRENGTHS]
+    assert found.shape == (len(DISCREPANCY_SCALES), len(PRIOR_SCALES)) and grid[:, 0].tolist() == PRIOR_SCALES.tolist()
+    expected = [Dense.of(evidence, (ROUGH,), (prior_scale,)).likelihood for prior_scale in PRIOR_SCALES]
     np.testing.assert_allclose(found[0], expected, rtol=1e-8)
     alone, best = evidence.over_all_strengths((ROUGH,), 0)
-    np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(STRENGTHS)), rtol=1e-8)
-    assert best[0] == STRENGTHS[np.argmax(expected)]
+    np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(PRIOR_SCALES)), rtol=1e-8)
+    assert best[0] == PRIOR_SCALES[np.argmax(expected)]
 
 
 @pytest.mark.parametrize("terms", _SETS[:-2], ids=lambda terms: "+".join(term.effect for term in terms))
@@ -267,12 +267,12 @@ def test_a_broad_term_is_what_the_same_term_is_that_is_not(terms):
     np.testing.assert_allclose(broad.over_strengths(terms, grids)[0], plain.over_strengths(terms, grids)[0], rtol=1e-9)
 
 
-def _with_positive(evidence, terms, strengths):
+def _with_positive(evidence, terms, prior_scales):
     """Log likelihood with the positive half of the prior of "pull", by quadrature over its coefficient."""
     others = tuple(term for term in terms if term != PULL)
     number = terms.index(PULL)
-    rest = Dense.of(evidence, others, np.delete(strengths, number))
-    pull = Dense.of(evidence, (PULL,), [strengths[number]])
+    rest = Dense.of(evidence, others, np.delete(prior_scales, number))
+    pull = Dense.of(evidence, (PULL,), [prior_scales[number]])
     column, size = pull.columns[:, 0], pull.size[0]
 
     def log_density(c):
@@ -306,14 +306,14 @@ def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_
     evidence = _evidence(5, with_law)
     # the weight's share of it has a test of its own
     evidence = replace(evidence, linear=replace(evidence.linear, by_weight={}))
-    strengths = np.array([3.0, 0.5, 10.0])[: len(terms)]
-    dense = Dense.of(evidence, terms, strengths)
-    found = evidence._mean(terms, strengths, 0)
+    prior_scales = np.array([3.0, 0.5, 10.0])[: len(terms)]
+    dense = Dense.of(evidence, terms, prior_scales)
+    found = evidence._mean(terms, prior_scales, 0)
     np.testing.assert_allclose(found, dense.mean, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(evidence.coefficients(terms, strengths, 0)[0], dense.mean, rtol=1e-6, atol=1e-9)
-    value = np.full(len(LEVELS), -np.inf)
+    np.testing.assert_allclose(evidence.coefficients(terms, prior_scales, 0)[0], dense.mean, rtol=1e-6, atol=1e-9)
+    value = np.full(len(DISCREPANCY_SCALES), -np.inf)
     value[0] = 0.0
-    hypothesis = Hypothesis(terms, value, np.tile(strengths, (len(LEVELS), 1)))
+    hypothesis = Hypothesis(terms, value, np.tile(prior_scales, (len(DISCREPANCY_SCALES), 1)))
     for names in ({"rough"}, {"free"}, {"free", "rough"}, {term.effect for term in terms}):
         chosen = np.array([*(term.effect in names for term in terms), True])[dense.owner]
         expected = dense.explained(chosen) if names & hypothesis.effects else 0.0
@@ -323,8 +323,8 @@ def test_coefficients_and_what_they_explain_are_the_direct_solution(terms, with_
 @pytest.mark.parametrize("terms", [(OTHER,), (FREE, OTHER)])
 def test_under_an_unknown_weight_coefficients_are_a_mixtures(terms):
     """Means and covariance of both cases by their probabilities, each by least squares of the whole."""
-    evidence, strengths = _evidence(6, with_law=True), {1: [300.0], 2: [3.0, 300.0]}[len(terms)]
-    wide = Dense.of(evidence, terms, strengths)
+    evidence, prior_scales = _evidence(6, with_law=True), {1: [300.0], 2: [3.0, 300.0]}[len(terms)]
+    wide = Dense.of(evidence, terms, prior_scales)
     cases = [replace(wide, size=np.where(wide.weight, share * wide.size, wide.size)) for share in (0.1, 1.0)]
     chance = np.exp([one.likelihood - logsumexp([case.likelihood for case in cases]) for one in cases])
     expected = chance @ [one.mean for one in cases]
@@ -332,7 +332,7 @@ def test_under_an_unknown_weight_coefficients_are_a_mixtures(terms):
         p * (one.covariance + np.outer(one.mean - expected, one.mean - expected))
         for p, one in zip(chance, cases, strict=True)
     )
-    mean, covariance = evidence.coefficients(terms, strengths, 0)
+    mean, covariance = evidence.coefficients(terms, prior_scales, 0)
     np.testing.assert_allclose(mean, expected, rtol=1e-6, atol=1e-9)
     np.testing.assert_allclose(covariance, spread, rtol=1e-6, atol=1e-12)
     assert chance.min() > 0.0 and wide.weight[-1]
@@ -344,11 +344,11 @@ def test_coefficients_that_cannot_be_negative_are_bounded_least_squares(terms, s
     evidence = _evidence(6)
     linear = evidence.linear
     evidence = replace(evidence, linear=replace(linear, data=sign * linear.data))
-    strengths = np.array([3.0, 1.0, 10.0])[: len(terms)]
-    dense = Dense.of(evidence, terms, strengths)
+    prior_scales = np.array([3.0, 1.0, 10.0])[: len(terms)]
+    dense = Dense.of(evidence, terms, prior_scales)
     positive = dense.owner == terms.index(PULL)
     expected = dense.bounded_mean(positive)
-    found = evidence._mean(terms, strengths, 0)
+    found = evidence._mean(terms, prior_scales, 0)
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-7)
     assert (expected[positive] == 0.0).all() == (sign < 0.0)
 
@@ -383,14 +383,14 @@ def test_an_average_is_an_integral_over_the_coefficients():
 
 
 def test_of_sizes_that_the_campaign_has_chosen_one_strength_is_just_these():
-    """Many coefficients tell their common size far better than the strengths that are tried lie apart."""
+    """Many coefficients tell their common size far better than the prior scales that are tried lie apart."""
     plain, rough = _evidence(8), LIBRARY["rough"].coordinates
     for factor in (0.01, 0.17, 1.0, 2.3):
         typical = factor * rough.typical
         sized = SimpleNamespace(coordinates=replace(rough, typical=typical, sized=True))
         evidence = replace(plain, library=LIBRARY | {"rough": sized})
-        scales = np.array([evidence.scales((ROUGH,), [strength]) for strength in STRENGTHS])
+        scales = np.array([evidence.scales((ROUGH,), [prior_scale]) for prior_scale in PRIOR_SCALES])
         shares = scales / typical
         np.testing.assert_allclose(shares, np.tile(shares[:, :1], len(typical)), rtol=1e-9)
         assert np.abs(shares[:, 0] - 1.0).min() < 1e-9
-        np.testing.assert_allclose(shares[:, 0] / shares[0, 0], STRENGTHS / STRENGTHS[0], rtol=1e-9)
+        np.testing.assert_allclose(shares[:, 0] / shares[0, 0], PRIOR_SCALES / PRIOR_SCALES[0], rtol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.drive_functions import drive_functions
 from rrru.diagnosis.model_fit import fit_model
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from tests.diagnosis import arms
 from tests.schemas import check
 
@@ -24,7 +24,7 @@ def found():
     name = "encoder_eccentricity"
     case = arms.case_of(arms.measure((arms.active(name, WAVES.ravel()),), count=120), name)
     scales = 3.0 * case.library[name].coordinates.typical
-    fit = fit_model(case, [calibrate(case)], [Term(name)], scales)
+    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], scales)
     table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
     return check("gap_drive_functions", table.assign(campaign="made up")), case
 
@@ -54,14 +54,14 @@ def test_it_spans_the_measured_range_and_one_place_of_each_drive_is_the_worst(fo
 
 def test_an_effect_that_is_no_function_of_a_drive_s_value_has_no_rows():
     case = arms.case_of(arms.measure(count=60), "drive_compliance")
-    fit = SimpleNamespace(terms=[Term("drive_compliance")])
+    fit = SimpleNamespace(terms=[EffectTerm("drive_compliance")])
     assert drive_functions(SimpleNamespace(case=case, fit=fit), NAMES).empty
 
 
 def test_a_function_of_many_coefficients_is_what_steps_of_each_of_them_give():
     name = "drive_error_function"
     case = arms.case_of(arms.measure(count=60), name)
-    fit = fit_model(case, [calibrate(case)], [Term(name)], 3.0 * case.library[name].coordinates.typical)
+    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], 3.0 * case.library[name].coordinates.typical)
     table = drive_functions(SimpleNamespace(case=case, fit=fit), NAMES)
     stepped = replace(case, library={name: replace(case.library[name], along_drives=None)})
     again = drive_functions(SimpleNamespace(case=stepped, fit=fit), NAMES)

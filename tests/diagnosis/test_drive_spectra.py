@@ -142,12 +142,12 @@ def test_the_spectrum_that_made_the_data_is_the_likeliest():
     for number, size in enumerate(spectra):
         for seed in range(4):
             generator = np.random.default_rng([number, seed])
-            strength = generator.uniform(0.7, 2.0)
-            data = columns @ (strength * size * generator.standard_normal(len(size)))
+            prior_scale = generator.uniform(0.7, 2.0)
+            data = columns @ (prior_scale * size * generator.standard_normal(len(size)))
             data = data + NOISE_MM * generator.standard_normal(len(data))
             found, factor = likeliest(data - basis @ (basis.T @ data), columns, spectra, basis.shape[1])
             assert abs(found - number) <= 1
-            assert found != number or factor == pytest.approx(strength, rel=0.3)
+            assert found != number or factor == pytest.approx(prior_scale, rel=0.3)
             hits, draws = hits + (found == number), draws + 1
     assert draws == 20 and hits >= 14
 

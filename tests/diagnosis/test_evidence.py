@@ -15,10 +15,10 @@ from scipy.stats import multivariate_normal, norm
 
 from rrru.campaign.noise import along_runs
 from rrru.diagnosis import evidence_kernels as kernels
-from rrru.diagnosis.evidence import STRENGTHS, ModelEvidence
-from rrru.diagnosis.state import Linear
-from rrru.diagnosis.terms import EACH, SAME, Term
-from rrru.diagnosis.whitened import LEVELS, spectrum
+from rrru.diagnosis.evidence import PRIOR_SCALES, ModelEvidence
+from rrru.diagnosis.state import LinearizedProblem
+from rrru.diagnosis.terms import EACH, SAME, EffectTerm
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES, spectrum
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
 
@@ -45,7 +45,9 @@ def _evidence(seed=0, with_law=False):
     laws = {"free": 0.03 * generator.normal(size=(*shape, 2))} if with_law else {}
     base = generator.normal(size=(*shape, 3)) * [1.0, 30.0, 500.0]
     data = 0.2 * generator.normal(size=shape)
-    return ModelEvidence(LIBRARY, Linear(data, base, columns, laws, {}, None), RUN, NoiseModel.white(NOISE_MM))
+    return ModelEvidence(
+        LIBRARY, LinearizedProblem(data, base, columns, laws, {}, None), RUN, NoiseModel.white(NOISE_MM)
+    )
 
 
 def _discrepancy():
@@ -65,7 +67,7 @@ def _marginal(evidence, columns, prior_covariance, level):
     in `ModelEvidence`.
     """
     data, base = evidence.linear.data.ravel() / NOISE_MM, evidence.linear.base.reshape(-1, 3) / NOISE_MM
-    covariance = np.eye(len(data)) + LEVELS[level] ** 2 * _discrepancy()
+    covariance = np.eye(len(data)) + DISCREPANCY_SCALES[level] ** 2 * _discrepancy()
     if columns is not None:
         covariance = covariance + columns @ prior_covariance @ columns.T / NOISE_MM**2
     solve = np.linalg.inv(covariance)
@@ -83,7 +85,7 @@ def _unit_size(evidence, columns, typical):
     return typical / np.sqrt((beyond**2 * typical**2).sum() / columns.shape[0]) * NOISE_MM
 
 
-@pytest.mark.parametrize("level", range(len(LEVELS)))
+@pytest.mark.parametrize("level", range(len(DISCREPANCY_SCALES)))
 @pytest.mark.parametrize("legs", [EACH, SAME, 2])
 def test_scores_equal_a_dense_marginal_likelihood(level, legs):
     evidence = _evidence()
@@ -91,14 +93,14 @@ def test_scores_equal_a_dense_marginal_likelihood(level, legs):
     columns = {EACH: raw, SAME: raw.sum(axis=1, keepdims=True), 2: raw[:, 1:2]}[legs]
     typical = {EACH: np.array([1.0, 1.0, 1.5]), SAME: np.array([3.5 / 3.0]), 2: np.array([1.0])}[legs]
     size = _unit_size(evidence, columns, typical)
-    expected = [_marginal(evidence, columns, np.diag((s * size) ** 2), level) for s in STRENGTHS]
-    term = Term("legged", 0, legs)
+    expected = [_marginal(evidence, columns, np.diag((s * size) ** 2), level) for s in PRIOR_SCALES]
+    term = EffectTerm("legged", 0, legs)
     found, grid = evidence.over_strengths((term,))
-    np.testing.assert_allclose(grid[:, 0], STRENGTHS)
+    np.testing.assert_allclose(grid[:, 0], PRIOR_SCALES)
     np.testing.assert_allclose(found[level], expected, rtol=1e-8)
     alone, best = evidence.over_all_strengths((term,), level)
-    np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(STRENGTHS)), rtol=1e-8)
-    assert best[0] == STRENGTHS[np.argmax(expected)]
+    np.testing.assert_allclose(alone, logsumexp(expected) - np.log(len(PRIOR_SCALES)), rtol=1e-8)
+    assert best[0] == PRIOR_SCALES[np.argmax(expected)]
     np.testing.assert_allclose(evidence.none[level], _marginal(evidence, None, None, level), rtol=1e-8)
 
 
@@ -117,10 +119,10 @@ def test_two_terms_and_a_laws_doubt_equal_a_dense_marginal_likelihood(level):
     )
     together = np.concatenate([free, legged, law], axis=1)
     expected = []
-    for first, second in product(STRENGTHS, STRENGTHS):
+    for first, second in product(PRIOR_SCALES, PRIOR_SCALES):
         prior = np.concatenate([first * sizes[0], second * sizes[1], np.ones(2)])
         expected.append(_marginal(evidence, together, np.diag(prior**2), level))
-    found, _ = evidence.over_strengths((Term("free"), Term("legged")))
+    found, _ = evidence.over_strengths((EffectTerm("free"), EffectTerm("legged")))
     np.testing.assert_allclose(found[level], expected, rtol=1e-7)
 
 
@@ -130,13 +132,13 @@ def test_coefficients_are_the_generalised_ridge_solution(level):
     columns = evidence.linear.columns["free", 0].reshape(-1, 2)
     scale = 3.0 * _unit_size(evidence, columns, LIBRARY["free"].coordinates.typical)
     base, data = evidence.linear.base.reshape(-1, 3), evidence.linear.data.ravel()
-    weight = np.linalg.inv(np.eye(len(data)) + LEVELS[level] ** 2 * _discrepancy()) / NOISE_MM**2
+    weight = np.linalg.inv(np.eye(len(data)) + DISCREPANCY_SCALES[level] ** 2 * _discrepancy()) / NOISE_MM**2
     design = np.concatenate([base, columns], axis=1)
     precision = design.T @ weight @ design + np.diag([0.0, 0.0, 0.0, *scale**-2.0])
-    mean, covariance = evidence.coefficients((Term("free"),), [3.0], level)
+    mean, covariance = evidence.coefficients((EffectTerm("free"),), [3.0], level)
     np.testing.assert_allclose(mean, np.linalg.solve(precision, design.T @ weight @ data)[3:], rtol=1e-6)
     np.testing.assert_allclose(covariance, np.linalg.inv(precision)[3:, 3:], rtol=1e-6)
-    np.testing.assert_allclose(evidence.scales((Term("free"),), [3.0]), scale, rtol=1e-9)
+    np.testing.assert_allclose(evidence.scales((EffectTerm("free"),), [3.0]), scale, rtol=1e-9)
 
 
 def _kernel(design, data, scale, positive):
@@ -222,13 +224,13 @@ def test_no_effect_explains_nothing_and_a_strong_one_what_it_made():
     evidence = _evidence(seed=4)
     linear = evidence.linear
     made = linear.columns["free", 0] @ np.array([2.0, -1.0])
-    same = Linear(made, linear.base, linear.columns, {}, {}, None)
+    same = LinearizedProblem(made, linear.base, linear.columns, {}, {}, None)
     strong = ModelEvidence(LIBRARY, same, RUN, NoiseModel.white(NOISE_MM))
     hypothesis = SimpleNamespace(
-        terms=(Term("free"),),
+        terms=(EffectTerm("free"),),
         effects={"free"},
-        evidence=np.eye(len(LEVELS))[0],
-        strengths=np.full((len(LEVELS), 1), 300.0),
+        evidence=np.eye(len(DISCREPANCY_SCALES))[0],
+        prior_scales=np.full((len(DISCREPANCY_SCALES), 1), 300.0),
     )
     basis, _ = np.linalg.qr(linear.base.reshape(-1, 3))
     beyond = made.ravel() - basis @ (basis.T @ made.ravel())
@@ -245,12 +247,14 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     columns = generator.normal(size=(len(RUN), 3, 2))
     columns[..., 1] = -0.9 * columns[..., 0] + 0.3 * columns[..., 1]
     data = columns @ np.array([1.0, -0.4])
-    linear = Linear(data, 1e-9 + 0.0 * columns[..., :1] + np.eye(3)[0][:, None], {("pair", 0): columns}, {}, {}, None)
+    linear = LinearizedProblem(
+        data, 1e-9 + 0.0 * columns[..., :1] + np.eye(3)[0][:, None], {("pair", 0): columns}, {}, {}, None
+    )
     evidence = ModelEvidence(PULLS, linear, RUN, NoiseModel.white(NOISE_MM))
-    mean, _ = evidence.coefficients((Term("pair"),), [100.0], 0)
-    problem = evidence.projected((Term("pair"),), evidence.levels)
+    mean, _ = evidence.coefficients((EffectTerm("pair"),), [100.0], 0)
+    problem = evidence.projected((EffectTerm("pair"),), evidence.levels)
     gram, moment = problem.gram, problem.moment
-    precision = gram[0] + np.diag(evidence.scales((Term("pair"),), [100.0]) ** -2.0)
+    precision = gram[0] + np.diag(evidence.scales((EffectTerm("pair"),), [100.0]) ** -2.0)
     grid = np.stack(np.meshgrid(*(np.linspace(0.0, 2.0, 401),) * 2), axis=-1).reshape(-1, 2)
     cost = 0.5 * np.einsum("ij,jk,ik->i", grid, precision, grid) - grid @ moment[0]
     assert (mean >= 0.0).all()
@@ -263,10 +267,10 @@ def test_no_strength_makes_a_prior_wider_than_its_law_allows():
     law = free.library["free"].coordinates
     narrow = SimpleNamespace(coordinates=replace(law, most=np.array([1e-3, 2e-3])))
     bounded = replace(free, library=free.library | {"free": narrow})
-    term = (Term("free"),)
+    term = (EffectTerm("free"),)
     assert (bounded.scales(term, [300.0]) <= [1e-3, 2e-3]).all() and (free.scales(term, [300.0]) > 1.0).all()
     _, covariance = bounded.coefficients(term, [300.0], 0)
     assert (np.sqrt(np.diag(covariance)) <= [1e-3, 2e-3]).all()
-    # strengths beyond the bound are all the same hypothesis
+    # prior scales beyond the bound are all the same hypothesis
     value, _ = bounded.over_strengths(term, None, [0])
     assert value[0, -1] == pytest.approx(value[0, -2]) and value[0, 0] != pytest.approx(value[0, -1])

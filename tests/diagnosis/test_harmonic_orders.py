@@ -50,7 +50,7 @@ def test_a_turn_resolves_whole_orders():
 def test_a_ratio_that_nobody_states_is_found(ratio, seed):
     result = diagnosed(measure((_geared(ratio, seed),), seed=seed))
     assert result.verdict["effects"] == "transmission_error"
-    case = result.attribution.case
+    case = result.inference.case
     ((key, _),) = result.state.effects.items()
     found = result.state.shape(case.library, key)["ratio"]
     assert abs(found - ratio) < 0.15 * resolution(case.motion.drive[case.used])

@@ -16,8 +16,8 @@ from rrru.diagnosis import shrink
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.heldout import HeldOut, Prediction, resampled_rows
 from rrru.diagnosis.inference import with_noise
-from rrru.diagnosis.terms import Term
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.terms import EffectTerm
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.errors import ConfigError
 from tests.diagnosis.campaigns import (
     EFFECTS,
@@ -34,8 +34,8 @@ from tests.diagnosis.campaigns import (
     strong,
 )
 
-TERMS = (Term("servo_lag", 0, 2), Term("leg_asymmetry"))
-STRENGTHS = [1.0, 3.0]
+TERMS = (EffectTerm("servo_lag", 0, 2), EffectTerm("leg_asymmetry"))
+PRIOR_SCALES = [1.0, 3.0]
 
 
 def _setting(passes, effects=()):
@@ -57,8 +57,8 @@ def _refitted(held_out, level, smooth):
     columns = np.concatenate(
         [linear.base, linear.columns["servo_lag", 0][..., 1:2], linear.columns["leg_asymmetry", 0]], axis=-1
     )
-    prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, STRENGTHS) ** -2.0])
-    weight = np.eye(n) / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2))
+    prior = np.concatenate([np.zeros(7), evidence.scales(TERMS, PRIOR_SCALES) ** -2.0])
+    weight = np.eye(n) / (case.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2))
     if smooth:
         transform, wave = np.zeros((n, n)), np.zeros(n)
         for run in np.unique(case.run):
@@ -70,7 +70,7 @@ def _refitted(held_out, level, smooth):
         density = 1.0 / (1.0 + (wave / 3.0) ** 2) + 0.01
         weight = (
             transform.T
-            @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + LEVELS[level] ** 2 * density / density.mean())))
+            @ np.diag(1.0 / (case.noise_mm**2 * (1.0 + DISCREPANCY_SCALES[level] ** 2 * density / density.mean())))
             @ transform
         )
     residual, uncertain = np.empty((n, 3)), np.empty(n)
@@ -89,7 +89,7 @@ def _refitted(held_out, level, smooth):
 @pytest.mark.parametrize("passes", [(FORWARD,), FULL], ids=["stretches", "runs"])
 def test_predictions_equal_a_refit_without_the_fold(passes, level):
     held_out = _setting(passes)
-    found = held_out.predict(TERMS, STRENGTHS, level)
+    found = held_out.predict(TERMS, PRIOR_SCALES, level)
     residual, uncertain = _refitted(held_out, level, smooth=passes is FULL)
     np.testing.assert_allclose(found.residual_mm, residual, atol=2e-6)
     np.testing.assert_allclose(found.uncertainty_mm2, uncertain, rtol=1e-4)
@@ -97,9 +97,9 @@ def test_predictions_equal_a_refit_without_the_fold(passes, level):
 
 @pytest.mark.parametrize("level", [0, 3])
 def test_what_an_effect_gains_is_what_its_prediction_alone_loses(full, level):
-    whole = full.predict(TERMS, STRENGTHS, level).log_score.sum()
-    without = [full.predict(TERMS[1 - k : 2 - k], STRENGTHS[1 - k : 2 - k], level).log_score.sum() for k in range(2)]
-    np.testing.assert_allclose(full.gains(TERMS, STRENGTHS, level), whole - np.array(without), rtol=1e-5, atol=1e-5)
+    whole = full.predict(TERMS, PRIOR_SCALES, level).log_score.sum()
+    without = [full.predict(TERMS[1 - k : 2 - k], PRIOR_SCALES[1 - k : 2 - k], level).log_score.sum() for k in range(2)]
+    np.testing.assert_allclose(full.gains(TERMS, PRIOR_SCALES, level), whole - np.array(without), rtol=1e-5, atol=1e-5)
     assert full.gains((), [], level) == []
 
 
@@ -115,7 +115,7 @@ def test_folds_are_runs_where_every_trajectory_was_driven_twice_else_stretches(f
 
 
 def test_predictions_of_a_true_law_miss_by_noise_and_their_own_uncertainty(full):
-    found = full.predict((Term("leg_asymmetry"),), [3.0], 0)
+    found = full.predict((EffectTerm("leg_asymmetry"),), [3.0], 0)
     expected = 3.0 * NOISE_MM**2 + found.uncertainty_mm2
     ratio = ((found.residual_mm**2).sum(axis=1) / expected).mean()
     assert ratio == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (3.0 * len(full.case))))
@@ -150,7 +150,7 @@ def test_the_share_closed_holds_on_other_trajectories(name):
     effect = strong(name, 5.0)
     found = diagnosed(measure((effect,)))
     case = case_of(measure((effect,), 0.0, plan=plan_of(FULL, OTHER)))
-    before, after = case.residual(found.attribution.calibrated), case.residual(found.state)
+    before, after = case.residual(found.inference.calibrated), case.residual(found.state)
     true = 1.0 - np.sqrt((after**2).sum() / (before**2).sum())
     assert found.verdict["share_closed"] == pytest.approx(true, abs=0.03)
     assert found.verdict["share_closed_low"] <= found.verdict["share_closed"] <= found.verdict["share_closed_high"]

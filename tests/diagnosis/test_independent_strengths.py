@@ -3,7 +3,7 @@
 import pytest
 
 from rrru.diagnosis.evidence import averaged
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from tests.diagnosis.evidence_problems import tripod_evidence
 
 # nats between both: 0.04 with four effects, 0.1 with five, 0.13 with six (not tested here: 262,144 combinations)
@@ -18,7 +18,7 @@ _SETS = (
 
 @pytest.mark.parametrize("names", _SETS, ids=[" ".join(names) for names in _SETS])
 def test_the_average_over_each_strength_is_near_that_over_all_combinations(names):
-    evidence, terms = tripod_evidence(), tuple(map(Term, names))
+    evidence, terms = tripod_evidence(), tuple(map(EffectTerm, names))
     found, _ = evidence.over_all_strengths(terms, 0)
     value, _ = evidence.over_strengths(terms, levels=[0])
     assert abs(found - averaged(value, len(terms))[0]) < _MAX_ERROR_NATS

@@ -68,7 +68,7 @@ def test_a_local_error_of_one_encoder_is_its_error_function(measured):
     assert found.verdict["leg"] == _LEG + 1
     assert found.verdict["gap_after_rms_mm"] < 0.4 * found.verdict["gap_rms_mm"]
     # the function of that drive is the hill, up to a constant and a slope, which a length and others stand for
-    case, state = found.attribution.case, found.state
+    case, state = found.inference.case, found.state
     law, values = case.library["drive_error_function"], state.effects["drive_error_function", 0]
     made = [f @ own for f, own in zip(law.along_drives(case.motion), np.reshape(values, (6, -1)), strict=True)]
     lengths = frame[robot.parts.columns[_LEG]].to_numpy()

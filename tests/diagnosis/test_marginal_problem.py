@@ -8,20 +8,22 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from rrru.diagnosis.evidence import ModelEvidence
-from rrru.diagnosis.marginal_problem import Projected, posterior_mean
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.marginal_problem import MarginalProblem, posterior_mean
+from rrru.diagnosis.terms import EffectTerm
 from tests.diagnosis.test_evidence import LIBRARY, _evidence
 
 GRIDS = [0.3, 10.0, 100.0], [1.0, 30.0], [3.0, 300.0]
 
 
 def _problem(generator, size, positive, alike):
-    """Least squares of rows, and the Projected problem of them; the columns are alike but for a share of 10^-alike."""
+    """Least squares of rows, and the MarginalProblem of them; the columns are alike but for a share of
+    10^-alike.
+    """
     design = generator.normal(size=(3 * size, 1)) + 10.0**-alike * generator.normal(size=(3 * size, size))
     data, nothing = generator.normal(size=3 * size), np.zeros(size)
     prior = nothing + 1.0, nothing + np.inf, positive, nothing
     gram, moment = (design.T @ design)[None], (data @ design)[None]
-    return design, data, Projected(gram, moment, *prior, np.zeros(size, dtype=int), np.arange(size))
+    return design, data, MarginalProblem(gram, moment, *prior, np.zeros(size, dtype=int), np.arange(size))
 
 
 @pytest.mark.parametrize("alike", [0, 2, 4])
@@ -67,11 +69,11 @@ def coefficients_of(evidence, terms, order):
 
 def test_the_order_of_the_terms_makes_no_difference():
     """Neither to what is made anew nor to what is kept from another order."""
-    terms = Term("free"), Term("legged")
+    terms = EffectTerm("free"), EffectTerm("legged")
     evidence = _evidence(seed=3, with_law=True)
     linear = evidence.linear
-    doubts = {"free": linear.shape_columns["free"], "legged": linear.shape_columns["free"][..., :1]}
-    evidence = replace(evidence, linear=replace(linear, shape_columns=doubts))
+    nuisance_sd = {"free": linear.shape_columns["free"], "legged": linear.shape_columns["free"][..., :1]}
+    evidence = replace(evidence, linear=replace(linear, shape_columns=nuisance_sd))
     kept = asked(evidence, terms, GRIDS)
     the_same(kept)
     fresh = ModelEvidence(LIBRARY, evidence.linear, evidence.run, evidence.noise)

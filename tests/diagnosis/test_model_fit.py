@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.inference import KNOWN, attribute, with_effects
+from rrru.diagnosis.inference import KNOWN, infer, with_effects
 from rrru.diagnosis.model_fit import EffectModel, fit_model, fit_named_effects, whitening_of
 from rrru.diagnosis.payload_nuisance import WEIGHT
 from rrru.diagnosis.result_tables import parameter_rows
 from rrru.diagnosis.settings import GapSettings
 from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import EACH, SAME, Term
+from rrru.diagnosis.terms import EACH, SAME, EffectTerm
 from rrru.effects.library import find
 from rrru.estimation.noise_model import NoiseModel
 from rrru.estimation.problem import Problem
@@ -40,9 +40,9 @@ def _count(case, term):
 @pytest.mark.parametrize(
     "terms",
     [
-        (Term("leg_asymmetry"),),
-        (Term("drive_compliance", 0, SAME), Term("encoder_eccentricity")),
-        (Term("thermal_growth"), Term("link_flexure", 0, 2)),
+        (EffectTerm("leg_asymmetry"),),
+        (EffectTerm("drive_compliance", 0, SAME), EffectTerm("encoder_eccentricity")),
+        (EffectTerm("thermal_growth"), EffectTerm("link_flexure", 0, 2)),
     ],
     ids=lambda terms: "+".join(t.effect for t in terms),
 )
@@ -79,7 +79,7 @@ def _objective(fit, values):
 def test_the_fit_is_the_minimum_of_the_penalised_whitened_objective(effect, level):
     case = _case(effect, acting=effect)
     scales = 3.0 * EFFECTS[effect].coordinates.typical
-    fit = fit_model(case, [calibrate(case)], [Term(effect)], scales, level)
+    fit = fit_model(case, [calibrate(case)], [EffectTerm(effect)], scales, level)
     assert fit.estimate.end.converged
     best = _objective(fit, fit.estimate.values)
     assert best == pytest.approx(fit.estimate.end.cost, rel=1e-9)
@@ -105,9 +105,9 @@ def test_an_effect_that_is_named_has_numbers_whatever_the_start():
     case = _case("leg_asymmetry")
     lost = State(calibrate(case).deviations, {("leg_asymmetry", 0): np.tile([0.0, 0.0, -700.0], 3)})
     assert not np.isfinite(case.residual(lost)).all()
-    fit = fit_model(case, [lost], [Term("leg_asymmetry")], 3.0 * EFFECTS["leg_asymmetry"].coordinates.typical)
+    fit = fit_model(case, [lost], [EffectTerm("leg_asymmetry")], 3.0 * EFFECTS["leg_asymmetry"].coordinates.typical)
     assert fit.estimate.end.converged and set(fit.state.effects) == {("leg_asymmetry", 0)}
-    other = fit_model(case, [calibrate(case)], [Term("leg_asymmetry")], fit.model.scales)
+    other = fit_model(case, [calibrate(case)], [EffectTerm("leg_asymmetry")], fit.model.scales)
     np.testing.assert_allclose(
         fit.estimate.values, other.estimate.values, atol=1e-3 * np.nanmax(fit.estimate.standard_errors)
     )
@@ -115,15 +115,15 @@ def test_an_effect_that_is_named_has_numbers_whatever_the_start():
 
 def test_the_fit_is_of_the_named_set_under_the_case_it_is_stated_for():
     case = case_of(measure((strong("backlash", 5.0),)))
-    found = attribute(case, GapSettings().prior, KNOWN)
-    for attribution in (found, with_effects(found, ("backlash",)), with_effects(found, ("backlash", "servo_lag"))):
-        terms = {(t.effect, t.shape) for t in attribution.hypothesis.terms}
-        assert set(attribution.state.effects) == terms == {(t.effect, t.shape) for t in attribution.fit.terms}
-        complete = attribution.case.at_complete(attribution.hypothesis.effects)
-        np.testing.assert_array_equal(attribution.fit.model.case.used, complete.used)
-        assert attribution.fit.level == attribution.level
-        rows = parameter_rows(attribution)
-        for name in attribution.hypothesis.effects:
+    found = infer(case, GapSettings().prior, KNOWN)
+    for inference in (found, with_effects(found, ("backlash",)), with_effects(found, ("backlash", "servo_lag"))):
+        terms = {(t.effect, t.shape) for t in inference.hypothesis.terms}
+        assert set(inference.state.effects) == terms == {(t.effect, t.shape) for t in inference.fit.terms}
+        complete = inference.case.at_complete(inference.hypothesis.effects)
+        np.testing.assert_array_equal(inference.fit.model.case.used, complete.used)
+        assert inference.fit.level == inference.level
+        rows = parameter_rows(inference)
+        for name in inference.hypothesis.effects:
             assert rows.loc[rows["effect"] == name, "standard_error"].notna().any()
 
 
@@ -149,7 +149,7 @@ def test_named_effects_keep_their_sign_free():
 def test_one_problem_by_the_core_and_by_the_case():
     """The Problem that `fit_model` solves is the case's own residual, whitened."""
     case = _case("servo_lag", acting="servo_lag")
-    model = _model(case, Term("servo_lag"))
+    model = _model(case, EffectTerm("servo_lag"))
     problem = Problem(model, model.parameters, whitening_of(case, 0))
     state = calibrate(case)
     np.testing.assert_allclose(problem.observations.residual(model.vector(state)), case.residual(state), atol=1e-6)

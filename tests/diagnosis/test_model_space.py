@@ -8,14 +8,14 @@ import pytest
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.candidates import Candidates
 from rrru.diagnosis.discrepancy_basis import UNKNOWN
-from rrru.diagnosis.evidence import STRENGTHS
+from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.model_space import ModelSpace, explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.terms import Term, variants
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.terms import EffectTerm, variants
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.library import find
 from rrru.robots.rrru3 import Rrru3
 from tests.diagnosis.campaigns import EFFECTS, case_of, measure, strong
@@ -38,7 +38,7 @@ def _of_all_sets(evidence, library):
     for size in range(5):
         for names in combinations(library, size):
             for terms in product(*(choices[name] for name in names)):
-                values, best = evidence.none.copy(), np.ones((len(LEVELS), size))
+                values, best = evidence.none.copy(), np.ones((len(DISCREPANCY_SCALES), size))
                 for level in evidence.levels if terms else ():
                     values[level], best[level] = evidence.over_all_strengths(terms, level)
                 found.append(weigher.weighed(Hypothesis(terms, values, best)))
@@ -95,17 +95,17 @@ class _Short:
 @pytest.mark.parametrize("terms", [(), ("axis_tilt",), ("base_placement", "axis_tilt"), ("drive_error_function",)])
 @pytest.mark.parametrize("level", [0, 3])
 def test_what_a_candidate_adds_is_the_difference_of_two_evidences(terms, level):
-    """At given strengths of the set, where all coefficients may have any sign."""
+    """At given prior scales of the set, where all coefficients may have any sign."""
     names = (*FEW, "drive_error_function")
     evidence, library = _evidence((strong("axis_tilt", 3.0),), names)
-    terms, strengths = tuple(map(Term, terms)), [3.0, 1.0][: len(terms)]
+    terms, prior_scales = tuple(map(EffectTerm, terms)), [3.0, 1.0][: len(terms)]
     candidates = Candidates(evidence, [term for effect in library.values() for term in variants(effect)])
-    gains = candidates.gains(terms, strengths, level)
-    grids = [[one] for one in strengths]
+    gains = candidates.gains(terms, prior_scales, level)
+    grids = [[one] for one in prior_scales]
     own = evidence.over_strengths(terms, grids, [level])[0][0, 0] if terms else evidence.none[level]
     for term, gain in zip(candidates.terms, gains, strict=True):
         if term.effect in {one.effect for one in terms}:
             assert (gain == -np.inf).all()
         elif not library[term.effect].coordinates.positive.any():
-            value, _ = evidence.over_strengths((*terms, term), (*grids, STRENGTHS), [level])
+            value, _ = evidence.over_strengths((*terms, term), (*grids, PRIOR_SCALES), [level])
             np.testing.assert_allclose(gain, value[0] - own, rtol=1e-6, atol=1e-6)

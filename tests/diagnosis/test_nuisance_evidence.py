@@ -8,9 +8,9 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.evidence import STRENGTHS
+from rrru.diagnosis.evidence import PRIOR_SCALES
 from rrru.diagnosis.evidence_kernels import log_evidence
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from tests.diagnosis import arms, campaigns
 from tests.reference.nuisance_evidence import ProductModel, sample_evidence
 
@@ -82,9 +82,9 @@ def _evidence(robot):
 @pytest.mark.parametrize("robot", ["3-RRRU", "arm"])
 @pytest.mark.parametrize("names", [("drive_compliance",), ("drive_compliance", "backlash")])
 def test_the_linearisation_is_a_quarter_of_a_nat_off_where_the_effect_acts(robot, names):
-    terms = tuple(map(Term, names))
+    terms = tuple(map(EffectTerm, names))
     evidence = _evidence(robot).on_complete(terms)
-    grids = STRENGTHS, *([1.0],) * (len(terms) - 1)
+    grids = PRIOR_SCALES, *([1.0],) * (len(terms) - 1)
     found, grid = evidence.over_strengths(terms, grids, [0])
     grams = partial(evidence._grams, [0])
     parts = evidence._bare(terms, grams), evidence._blocks(terms), evidence.linear.weight_steps, grams

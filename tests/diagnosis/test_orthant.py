@@ -96,7 +96,7 @@ def test_the_evidence_is_that_of_importance_sampling(number):
     if problem.evidence is None:
         found = log_evidence(own.gram, own.moment, scale[None], own.positive)[0, 0]
     else:
-        grids = [[strength] for strength in problem.strengths]
+        grids = [[prior_scale] for prior_scale in problem.prior_scales]
         value, _ = problem.evidence.over_strengths(problem.terms, grids, [problem.level])
         found = value[0, 0] - problem.evidence.none[problem.level]
     error = abs(found - sampled.log)

@@ -13,8 +13,8 @@ from rrru.diagnosis.design.expected_information import worth
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
 from rrru.diagnosis.payload_nuisance import doubts_of
 from rrru.diagnosis.settings import GapSettings, check
-from rrru.diagnosis.terms import Term
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.terms import EffectTerm
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.protocol import bears_load, gives_way
 from rrru.errors import ConfigError
 from rrru.kinematics.dynamics import Masses
@@ -40,7 +40,7 @@ def _found(more, settings=None):
     measurements = robot.measured(known)
     told = MeasuredRobot(known.seen(measurements), known.masses, known.noise_mm)
     result = diagnose(measurements, told, settings or GapSettings(), details=False)
-    return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"]), result.attribution
+    return result.verdict, result.tables["gap_parameters"].set_index(["effect", "parameter"]), result.inference
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +56,17 @@ def as_told():
 
 
 def test_the_campaign_driven_once_more_is_worth_as_much_again(misled):
-    *_, attribution = misled
-    nothing = replace(attribution.hypothesis, terms=(), strengths=np.zeros((len(LEVELS), 0)))
-    answers = (attribution.hypothesis, attribution.level), (nothing, attribution.level)
-    now, runs = worth(attribution, *answers, attribution.case)
+    *_, inference = misled
+    nothing = replace(inference.hypothesis, terms=(), prior_scales=np.zeros((len(DISCREPANCY_SCALES), 0)))
+    answers = (inference.hypothesis, inference.level), (nothing, inference.level)
+    now, runs = worth(inference, *answers, inference.case)
     assert (sum(runs[1:], now + runs[0])).nats() == pytest.approx(2.0 * now.nats(), rel=1e-3)
 
 
 def test_beside_a_weight_the_order_of_the_terms_makes_no_difference(misled):
-    *_, attribution = misled
-    evidence = attribution.evidence
-    terms = Term("backlash"), Term("drive_compliance"), Term("joint_clearance", 1)
+    *_, inference = misled
+    evidence = inference.evidence
+    terms = EffectTerm("backlash"), EffectTerm("drive_compliance"), EffectTerm("joint_clearance", 1)
     assert evidence.projected(terms, [0]).weights
     the_same(asked(evidence, terms, GRIDS))
     first, *others = (coefficients_of(evidence, terms, order) for order in permutations(range(3)))
@@ -126,8 +126,8 @@ def test_leans_about_all_axes_may_be_known_for_robots_of_one_configuration_stand
 
 def test_a_weight_may_lean_either_way_and_no_platform_is_lighter_than_nothing():
     masses = Masses(platform_kg=3.0, arm_kg=1.0, forearm_kg=0.0)
-    doubts, bounds = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses)
-    assert doubts["extra_kg"] == pytest.approx(0.3 * 23.0) and -3.0 < bounds["extra_kg"][0] < -2.0
+    nuisance_sd, bounds = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.array([0.0, 20.0, np.nan])), masses)
+    assert nuisance_sd["extra_kg"] == pytest.approx(0.3 * 23.0) and -3.0 < bounds["extra_kg"][0] < -2.0
     assert all(bounds[lean][0] == -bounds[lean][1] for lean in ("lean_x", "lean_y"))
     nothing, _ = doubts_of(SimpleNamespace(robot=ROBOT, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
     assert not any(nothing.values())
@@ -135,9 +135,14 @@ def test_a_weight_may_lean_either_way_and_no_platform_is_lighter_than_nothing():
 
 def test_an_arm_that_was_told_no_tool_may_carry_one():
     arm = conditions("arm6_file").mechanism
-    arm = replace(arm, lumps=tuple(lump for lump in arm.lumps if lump.joint != PLATFORM))
-    doubts, _ = doubts_of(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
-    assert doubts["extra_kg"] == pytest.approx(0.1 * sum(lump.mass_kg for lump in arm.lumps)) and doubts["lean_x"] > 0.0
+    arm = replace(
+        arm, point_masses=tuple(point_mass for point_mass in arm.point_masses if point_mass.joint != PLATFORM)
+    )
+    nuisance_sd, _ = doubts_of(SimpleNamespace(robot=arm, payload_kg=np.zeros(1)), Masses(0.0, 0.0, 0.0))
+    assert (
+        nuisance_sd["extra_kg"] == pytest.approx(0.1 * sum(point_mass.mass_kg for point_mass in arm.point_masses))
+        and nuisance_sd["lean_x"] > 0.0
+    )
 
 
 def test_where_a_joint_is_loose_the_weight_is_not_found():
@@ -145,5 +150,5 @@ def test_where_a_joint_is_loose_the_weight_is_not_found():
     assert bears_load(loose.effect) and not gives_way(loose.effect)
     measurements = measure((loose,), seed=3)
     result = diagnose(measurements, MeasuredRobot(ROBOT, Masses(3.0, 1.0, 0.5), 0.02), GapSettings(), details=False)
-    assert result.verdict["effects"] == "joint_clearance" and not result.attribution.state.weight
+    assert result.verdict["effects"] == "joint_clearance" and not result.inference.state.weight
     assert "weight not" not in result.verdict["notes"]

@@ -11,9 +11,9 @@ from scipy.special import logsumexp
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.posterior import Posterior, Weigher
 from rrru.diagnosis.settings import GapSettings, Prior
-from rrru.diagnosis.terms import EACH, SAME, Term, per_leg, spread, variants
+from rrru.diagnosis.terms import EACH, SAME, EffectTerm, per_leg, spread, variants
 from rrru.diagnosis.verdict import decide, label
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.estimation.noise_model import NoiseModel
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.rrru3 import Rrru3
@@ -45,8 +45,8 @@ def _arm():
 
 
 def _hypothesis(*terms, evidence=0.0):
-    value = np.broadcast_to(np.asarray(evidence, dtype=float), len(LEVELS)).copy()
-    return Hypothesis(tuple(terms), value, np.ones((len(LEVELS), len(terms))))
+    value = np.broadcast_to(np.asarray(evidence, dtype=float), len(DISCREPANCY_SCALES)).copy()
+    return Hypothesis(tuple(terms), value, np.ones((len(DISCREPANCY_SCALES), len(terms))))
 
 
 def _all(size, library=EFFECTS):
@@ -131,7 +131,7 @@ def test_legs_have_the_prior_of_their_kinds():
 def test_evidence_multiplies_the_prior():
     generator = np.random.default_rng(0)
     hypotheses = [
-        _hypothesis(*terms, evidence=generator.normal(0.0, 3.0, len(LEVELS)))
+        _hypothesis(*terms, evidence=generator.normal(0.0, 3.0, len(DISCREPANCY_SCALES)))
         for size in range(2)
         for terms in _all(size)
     ]
@@ -144,14 +144,18 @@ def test_evidence_multiplies_the_prior():
 
 
 def test_a_discrepancy_counts_as_unexplained_beyond_the_tolerated_share():
-    hypotheses = [_hypothesis(), _hypothesis(Term("servo_lag"))]
+    hypotheses = [_hypothesis(), _hypothesis(EffectTerm("servo_lag"))]
     beliefs = posterior(_stub(35.0), hypotheses, Prior(tolerance=0.1))
-    np.testing.assert_array_equal(beliefs.unexplained[0], LEVELS > 0.0)
-    np.testing.assert_array_equal(beliefs.unexplained[1], LEVELS > 3.5)
+    np.testing.assert_array_equal(beliefs.unexplained[0], DISCREPANCY_SCALES > 0.0)
+    np.testing.assert_array_equal(beliefs.unexplained[1], DISCREPANCY_SCALES > 3.5)
 
 
 def test_the_best_of_a_set_is_its_heaviest_hypothesis():
-    hypotheses = [_hypothesis(), _hypothesis(Term("axis_tilt")), _hypothesis(Term("axis_tilt", 0, 2), evidence=5.0)]
+    hypotheses = [
+        _hypothesis(),
+        _hypothesis(EffectTerm("axis_tilt")),
+        _hypothesis(EffectTerm("axis_tilt", 0, 2), evidence=5.0),
+    ]
     beliefs = posterior(_stub(1.5), hypotheses, Prior())
     assert beliefs.best_of(frozenset({"axis_tilt"})) == (hypotheses[2], 0)
     assert beliefs.best_of(frozenset({"axis_tilt"}), True)[1] > 0
@@ -163,8 +167,8 @@ def test_improbable_pairs_are_forgotten_and_single_effects_stay():
     far = -100.0
     hypotheses = [
         _hypothesis(),
-        _hypothesis(Term("axis_tilt"), evidence=far),
-        _hypothesis(Term("axis_tilt"), Term("backlash"), evidence=far),
+        _hypothesis(EffectTerm("axis_tilt"), evidence=far),
+        _hypothesis(EffectTerm("axis_tilt"), EffectTerm("backlash"), evidence=far),
     ]
     beliefs = posterior(_stub(), hypotheses, Prior())
     assert [len(h.terms) for h in beliefs.hypotheses] == [0, 1] and beliefs.weights.sum() == pytest.approx(1.0)
@@ -179,7 +183,7 @@ def _decided(*entries):
     return decide(Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained), EFFECTS)
 
 
-LAG, PLAY, TILT, HEAT = (Term(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
+LAG, PLAY, TILT, HEAT = (EffectTerm(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
 
 
 def test_nothing_is_decided_where_nothing_is_most_probable():
@@ -209,7 +213,7 @@ def test_a_name_needs_all_sets_together_and_not_one_that_is_probable():
 
 
 def test_hypotheses_of_one_set_add_up():
-    legs = [Term("servo_lag", 0, leg) for leg in (1, 2, 3)]
+    legs = [EffectTerm("servo_lag", 0, leg) for leg in (1, 2, 3)]
     verdict = _decided(*(((leg,), 0.25, False) for leg in legs), ((PLAY,), 0.25, False))
     assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.75)
     assert verdict.confusable_with == ("backlash",) and verdict.groups == ()
@@ -275,13 +279,13 @@ def test_two_groups_stand_beside_each_other():
 @pytest.mark.parametrize(
     ("terms", "leg"),
     [
-        ((Term("servo_lag", 0, 2),), 2),
-        ((Term("servo_lag", 0, 2), Term("backlash", 0, 2)), 2),
-        ((Term("servo_lag", 0, 2), Term("backlash", 0, 3)), 0),
-        ((Term("servo_lag", 0, 2), HEAT), 2),
+        ((EffectTerm("servo_lag", 0, 2),), 2),
+        ((EffectTerm("servo_lag", 0, 2), EffectTerm("backlash", 0, 2)), 2),
+        ((EffectTerm("servo_lag", 0, 2), EffectTerm("backlash", 0, 3)), 0),
+        ((EffectTerm("servo_lag", 0, 2), HEAT), 2),
         ((HEAT,), 0),
         ((LAG,), 0),
-        ((Term("servo_lag", 0, SAME),), 0),
+        ((EffectTerm("servo_lag", 0, SAME),), 0),
     ],
 )
 def test_a_leg_is_named_where_all_effects_with_legs_agree_on_it(terms, leg):

@@ -15,7 +15,7 @@ ROBOT = Rrru3()
 
 
 def _attribution(make, seed=0, count=240):
-    """A made-up Attribution: twelve runs of twenty points; make: from motion and drives' derivatives to (m, 3)."""
+    """A made-up InferenceResult: twelve runs of twenty points; make: from motion and drives' derivatives to (m, 3)."""
     generator = np.random.default_rng(seed)
     along = np.tile(np.linspace(0.0, 1.0, 20), count // 20)
     start = np.repeat(generator.uniform(-1.0, 1.0, (count // 20, 3)), 20, axis=0)

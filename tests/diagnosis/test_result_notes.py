@@ -15,7 +15,7 @@ from rrru.diagnosis.diagnose import sim
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.result_notes import weight_doubts, weight_notes, zero_notes
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from rrru.kinematics.dynamics import Masses
 from rrru.robots.serial import serial
 from tests.diagnosis import campaigns
@@ -115,14 +115,14 @@ def test_a_zero_that_a_link_imitates_is_said_to_be_most_probable_only():
 
 
 def _weighed(passes, told_kg):
-    """Numbers of the weight, notes and doubts on it, of a soft robot whose platform is told to weigh so much."""
+    """Numbers of the weight, notes and nuisance_sd on it, of a soft robot whose platform is told to weigh so much."""
     name = "drive_compliance"
     library = {name: campaigns.EFFECTS[name]}
     frame = campaigns.measure((campaigns.strong(name, 30.0),), plan=campaigns.plan_of(passes))
     masses = replace(campaigns.MASSES, platform_kg=told_kg)
     case = make_case(frame, campaigns.SIM, masses, campaigns.NOISE_MM, library)
     sizes = 20.0 * np.asarray(library[name].coordinates.typical)
-    fit = fit_model(case, [calibrate(case)], [Term(name)], sizes)
+    fit = fit_model(case, [calibrate(case)], [EffectTerm(name)], sizes)
     found = SimpleNamespace(case=case, fit=fit)
     return fit.weight, list(weight_notes(found)), list(weight_doubts(found))
 
@@ -132,14 +132,14 @@ _PLATFORM_KG = campaigns.MASSES.platform_kg
 
 @pytest.mark.parametrize("passes", [(campaigns.FORWARD, campaigns.REVERSE), (campaigns.FORWARD, campaigns.LOADED)])
 def test_of_a_weight_that_is_as_told_nothing_is_said(passes):
-    weight, notes, doubts = _weighed(passes, _PLATFORM_KG)
-    assert weight and not notes and not doubts
+    weight, notes, nuisance_sd = _weighed(passes, _PLATFORM_KG)
+    assert weight and not notes and not nuisance_sd
 
 
 def test_a_mass_that_nobody_told_is_said_where_two_loads_were_driven():
-    _, (note,), doubts = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
+    _, (note,), nuisance_sd = _weighed((campaigns.FORWARD, campaigns.LOADED), 0.5 * _PLATFORM_KG)
     low, high = map(float, re.search(r"\(95 %: (\S+) to (\S+)\) more than stated", note).groups())
-    assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not doubts
+    assert low < 0.5 * _PLATFORM_KG < high < 1.2 * low and not nuisance_sd
 
 
 def test_with_one_load_a_mass_and_a_compliance_are_not_told_apart():

@@ -60,7 +60,7 @@ def test_a_gear_error_of_a_ratio_that_nobody_stated_is_named_beside_a_slide():
         assert numbers[f"amplitude{drive}"] == pytest.approx(true[f"amplitude{drive}"], rel=0.15)
     assert not {"amplitude3", "phase3"} & set(numbers.index)
     # a slide has no such error
-    motion = found.attribution.case.motion
+    motion = found.inference.case.motion
     law, robot = find("transmission_error", known.mechanism), known.mechanism
     change = law.contribute(motion, law.parameters.vector(true))
     turned = robot.drive_errors(np.broadcast_to(change.twists, (len(motion), *change.twists.shape[1:])))

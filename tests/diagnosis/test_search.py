@@ -14,14 +14,14 @@ from rrru.diagnosis.design.advise import NOTHING, advise
 from rrru.diagnosis.design.run_limits import StatedLimits
 from rrru.diagnosis.evidence import averaged
 from rrru.diagnosis.hypothesis import Hypothesis
-from rrru.diagnosis.inference import Attribution, attribute, fit_hypothesis
+from rrru.diagnosis.inference import InferenceResult, fit_hypothesis, infer
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.settings import Prior
 from rrru.diagnosis.state import State
-from rrru.diagnosis.terms import Term, spread, variants
+from rrru.diagnosis.terms import EffectTerm, spread, variants
 from rrru.diagnosis.verdict import Group, decide
-from rrru.diagnosis.whitened import LEVELS
+from rrru.diagnosis.whitened import DISCREPANCY_SCALES
 from rrru.effects.protocol import Coordinates
 from rrru.kinematics.dynamics import Masses
 from rrru.parameters import ParameterSet
@@ -47,7 +47,7 @@ def _library(*names):
 
 
 def _score(evidence, terms):
-    """Log evidence (levels,) averaged over all combinations of strengths."""
+    """Log evidence (levels,) averaged over all combinations of prior scales."""
     return averaged(evidence.over_strengths(terms)[0], len(terms)) if terms else evidence.none
 
 
@@ -70,7 +70,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
     case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
     evidence = case.evidence(case.linearise(calibrate(case)))
-    terms = tuple(Term(name) for name in FEW[-count:])
+    terms = tuple(EffectTerm(name) for name in FEW[-count:])
     for level in (0, 2, 4):
         one_by_one, best = evidence.over_all_strengths(terms, level)
         together, grid = evidence.over_strengths(terms, None, [level])
@@ -81,7 +81,7 @@ def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combination
 def test_five_effects_at_once_are_all_found():
     names = ("leg_asymmetry", "servo_lag", "backlash", "thermal_growth", "encoder_eccentricity")
     case = case_of(measure(tuple(strong(name, 8.0) for name in names)), EFFECTS)
-    found = attribute(case, Prior())
+    found = infer(case, Prior())
     assert found.hypothesis.effects == set(names)
     assert min(found.posterior.marginal(name) for name in names) > 0.99
     assert sum(p for (effects, flag), p in found.posterior.sets().items() if not flag and effects == set(names)) > 0.5
@@ -102,7 +102,7 @@ def _fitted(case, start, *terms):
 
 def _hypothesis(*terms):
     """A hypothesis of strong terms."""
-    return Hypothesis(terms, np.zeros(len(LEVELS)), np.full((len(LEVELS), len(terms)), 30.0))
+    return Hypothesis(terms, np.zeros(len(DISCREPANCY_SCALES)), np.full((len(DISCREPANCY_SCALES), len(terms)), 30.0))
 
 
 @pytest.mark.parametrize("name", ["backlash", "servo_lag", "axis_tilt", "joint_clearance", "encoder_eccentricity"])
@@ -110,8 +110,8 @@ def test_the_exact_fit_finds_the_truth_without_noise(name):
     truth = 3.0 * drawn(name, 7)
     case = case_of(measure((active(name, truth),), 0.0), _library(name))
     start = calibrate(case)
-    fit = _fitted(case, start, Term(name))
-    state, (shapes, covariance) = fit.state, fit.effect_covariance(Term(name))
+    fit = _fitted(case, start, EffectTerm(name))
+    state, (shapes, covariance) = fit.state, fit.effect_covariance(EffectTerm(name))
     before, after = np.abs(case.residual(start)), np.abs(case.residual(state))
     # in the mean the few points matter at which a hard contact has just changed sides
     assert np.median(after) < 0.03 * np.median(before) and covariance.shape == (len(truth) + len(shapes),) * 2
@@ -124,7 +124,7 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
     true = replace(active("thermal_growth", [8e-4]), values={"strain": 8e-4, "time_constant": 380.0})
     case = case_of(measure((true,)), {"thermal_growth": effect})
     shape = next(k for k, shape in enumerate(effect.coordinates.shapes) if shape["time_constant"] == 250.0)
-    state = _fitted(case, calibrate(case), Term("thermal_growth", shape)).state
+    state = _fitted(case, calibrate(case), EffectTerm("thermal_growth", shape)).state
     assert state.shape_values["thermal_growth"]["time_constant"] == pytest.approx(380.0, rel=0.1)
     assert state.effects["thermal_growth", shape][0] == pytest.approx(8e-4, rel=0.05)
 
@@ -132,10 +132,10 @@ def test_the_exact_fit_finds_a_time_constant_between_those_tried():
 def test_an_exact_fit_from_another_fit_keeps_what_both_share():
     both = (strong("servo_lag", 4.0), strong("leg_asymmetry", 4.0))
     case = case_of(measure(both), _library("servo_lag", "leg_asymmetry"))
-    one = _fitted(case, calibrate(case), Term("servo_lag")).state
-    fit = _fitted(case, one, Term("servo_lag"), Term("leg_asymmetry"))
-    two, covariance = fit.state, fit.effect_covariance(Term("servo_lag"))[1]
-    direct = _fitted(case, calibrate(case), Term("servo_lag"), Term("leg_asymmetry")).state
+    one = _fitted(case, calibrate(case), EffectTerm("servo_lag")).state
+    fit = _fitted(case, one, EffectTerm("servo_lag"), EffectTerm("leg_asymmetry"))
+    two, covariance = fit.state, fit.effect_covariance(EffectTerm("servo_lag"))[1]
+    direct = _fitted(case, calibrate(case), EffectTerm("servo_lag"), EffectTerm("leg_asymmetry")).state
     error = np.sqrt(np.diag(covariance)[:3])
     assert (np.abs(two.effects["servo_lag", 0] - direct.effects["servo_lag", 0]) < error).all()
     left = np.sqrt((case.residual(two) ** 2).mean())
@@ -162,13 +162,15 @@ class FakeCompliance:
 
 @pytest.fixture(scope="module")
 def twins():
-    """Attribution, about the calibration alone, of a campaign without payloads between two effects that differ under
-    payload only.
+    """InferenceResult, about the calibration alone, of a campaign without payloads between two effects that differ
+    under payload only.
     """
     case, calibrated = _twins()
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = explore(evidence, Prior())
-    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    found = InferenceResult(
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+    )
     verdict = decide(beliefs, case.library)
     return found, verdict, advise(found, verdict, MASSES).runs
 
@@ -190,7 +192,7 @@ def test_what_no_run_tells_apart_shares_the_probability(twins):
 
 
 def test_it_still_does_once_one_of_them_has_been_fitted():
-    beliefs = attribute(_twins()[0], Prior()).posterior
+    beliefs = infer(_twins()[0], Prior()).posterior
     assert beliefs.marginal("own_weight") == pytest.approx(beliefs.marginal("drive_compliance"), rel=0.1)
 
 
@@ -251,9 +253,9 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
         favoured, rival = rival, favoured
     keys = [(term.effect, term.shape) for term in (*favoured[0].terms, *rival[0].terms)]
     new = longer.linearise(found.calibrated, keys)
-    mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].strengths[favoured[1]], favoured[1])
+    mean, _ = found.evidence.coefficients(favoured[0].terms, favoured[0].prior_scales[favoured[1]], favoured[1])
     size = _columns(case.library, new, favoured[0]).shape[-1] - 7
-    prior = found.evidence.scales(rival[0].terms, rival[0].strengths[rival[1]])
+    prior = found.evidence.scales(rival[0].terms, rival[0].prior_scales[rival[1]])
     costs = []
     for rows in (np.zeros(len(tail), dtype=bool), tail):
         made = [
@@ -274,7 +276,7 @@ def test_the_best_runs_gain_is_what_appending_it_brings(twins):
 
 
 def test_nothing_is_advised_where_nothing_rivals():
-    found = attribute(
+    found = infer(
         case_of(
             measure((strong("frame_misregistration", 10.0),), plan=plan_of(FULL)), _library("frame_misregistration")
         ),

@@ -8,9 +8,9 @@ import pytest
 from scipy.stats import chi2
 
 from rrru.diagnosis.calibrate import calibrate
-from rrru.diagnosis.detectability import identify
+from rrru.diagnosis.detectability import detectability
 from rrru.diagnosis.state import State
-from rrru.diagnosis.variance_by_factor import drive_errors, locate, worst_spot
+from rrru.diagnosis.variance_by_factor import drive_errors, variance_by_factor, worst_spot
 from rrru.effects.protocol import Coordinates, plain_coordinates
 from rrru.parameters import Parameter, ParameterSet
 from tests.diagnosis.campaigns import EFFECTS, NOISE_MM, case_of, measure
@@ -30,7 +30,7 @@ def linear(case):
 
 
 def _located(case, residual, linear, seed=0):
-    table = locate(case, residual, linear.drive, np.random.default_rng(seed), 40)
+    table = variance_by_factor(case, residual, linear.drive, np.random.default_rng(seed), 40)
     return check("gap_locate", table.assign(campaign="made up"))
 
 
@@ -150,7 +150,7 @@ class ArmGrowth:
 
 def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
     case = case_of(measure(), {"arm_growth": ArmGrowth(), "servo_lag": EFFECTS["servo_lag"]})
-    table = identify(case, case.linearise(calibrate(case))).set_index("effect")
+    table = detectability(case, case.linearise(calibrate(case))).set_index("effect")
     assert table.loc["arm_growth", "visible_share"] < 1e-6 and not table.loc["arm_growth", "testable"]
     assert "calibration" in table.loc["arm_growth", "note"]
     assert table.loc["servo_lag", "testable"] and table.loc["servo_lag", "imitated_share"] < 0.05
@@ -159,7 +159,9 @@ def test_an_effect_that_the_calibration_knows_already_cannot_be_seen():
 @pytest.fixture(scope="module")
 def identified(case):
     plain = case.linearise(State(calibrate(case).deviations, {}))
-    return plain, check("gap_identifiability", identify(case, plain).assign(campaign="made up")).set_index("effect")
+    return plain, check("gap_identifiability", detectability(case, plain).assign(campaign="made up")).set_index(
+        "effect"
+    )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -201,7 +203,7 @@ def test_a_gap_of_the_detectable_size_is_detected_nine_times_of_ten(case, identi
 
 def test_effects_that_cannot_be_tested_say_why():
     case = case_of(measure().assign(time_s=np.nan))
-    table = identify(case, case.linearise(calibrate(case)))
+    table = detectability(case, case.linearise(calibrate(case)))
     table = check("gap_identifiability", table.assign(campaign="made up")).set_index("effect")
     assert (
         set(table.index) == set(EFFECTS)

@@ -8,12 +8,12 @@ import pytest
 from rrru.diagnosis import diagnose
 from rrru.diagnosis.calibrate import calibrate
 from rrru.diagnosis.evidence import ModelEvidence
-from rrru.diagnosis.inference import Attribution
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.settings import Prior
-from rrru.diagnosis.state import Linear
+from rrru.diagnosis.state import LinearizedProblem
 from rrru.effects.protocol import Coordinates
 from rrru.estimation.noise_model import NoiseModel
 from tests.diagnosis.campaigns import EFFECTS, case_of, measure, strong
@@ -38,7 +38,7 @@ def _found(off, whole=True):
     library = {name: effect for name, effect in LIBRARY.items() if whole or name != "whole"}
     columns = {("whole", 0): own} | columns if whole else columns
     data = own @ [1.0, -0.8] + NOISE_MM * generator.standard_normal(shape)
-    linear = Linear(data, generator.normal(size=(*shape, 3)), columns, {}, {}, None)
+    linear = LinearizedProblem(data, generator.normal(size=(*shape, 3)), columns, {}, {}, None)
     evidence = ModelEvidence(library, linear, np.ones(40, dtype=int), NoiseModel.white(NOISE_MM), smooth=False)
     return SimpleNamespace(evidence=evidence, posterior=explore(evidence, PRIOR))
 
@@ -79,18 +79,20 @@ def test_what_was_ruled_out_before_does_not_come_back():
 
 
 @pytest.fixture(scope="module")
-def attribution():
-    """Attribution, about the calibration alone, of a campaign in which two effects act for certain."""
+def inference():
+    """InferenceResult, about the calibration alone, of a campaign in which two effects act for certain."""
     names = ("servo_lag", "leg_asymmetry", "backlash")
     case = case_of(measure((strong("servo_lag", 8.0), strong("leg_asymmetry", 8.0))), {n: EFFECTS[n] for n in names})
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     decisive = evidence.on_library()
     beliefs = explore(decisive, PRIOR)
-    return Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    return InferenceResult(
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+    )
 
 
-def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypatch):
+def test_a_verdict_is_decided_anew_until_prediction_agrees(inference, monkeypatch):
     """Gains made up: one effect spoils what is predicted wherever it is named."""
     asked, gains = [], diagnose._gains
 
@@ -98,17 +100,17 @@ def test_a_verdict_is_decided_anew_until_prediction_agrees(attribution, monkeypa
         asked.append(fitted.hypothesis.effects)
         return gains(fitted) | {name: -50.0 for name in asked[-1] if name == "servo_lag"}
 
-    assert set(diagnose._decide(attribution, PRIOR)[0].effects) == {"servo_lag", "leg_asymmetry"}
+    assert set(diagnose._decide(inference, PRIOR)[0].effects) == {"servo_lag", "leg_asymmetry"}
     monkeypatch.setattr(diagnose, "_gains", spoilt)
-    verdict, fitted, ordered = diagnose._decide(attribution, PRIOR)
+    verdict, fitted, ordered = diagnose._decide(inference, PRIOR)
     assert "servo_lag" in asked[0] and all("servo_lag" not in names for names in asked[1:]) and len(asked) > 1
     assert "servo_lag" not in verdict.effects and "servo_lag" not in verdict.confusable_with
     assert fitted.posterior.marginal("servo_lag") == 0.0
     assert {term.effect for term, _ in ordered} == fitted.hypothesis.effects == set(verdict.effects)
 
 
-def test_where_every_effect_is_vetoed_nothing_of_the_library_is_named(attribution, monkeypatch):
+def test_where_every_effect_is_vetoed_nothing_of_the_library_is_named(inference, monkeypatch):
     monkeypatch.setattr(diagnose, "_gains", lambda fitted: dict.fromkeys(fitted.hypothesis.effects, -50.0))
-    verdict, fitted, _ = diagnose._decide(attribution, PRIOR)
+    verdict, fitted, _ = diagnose._decide(inference, PRIOR)
     assert verdict.effects == () and verdict.label in ("none", "unexplained")
     assert fitted.hypothesis.effects == frozenset()

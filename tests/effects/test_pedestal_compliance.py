@@ -53,7 +53,7 @@ def _driven(count=60):
 def test_the_base_bears_the_weight_of_links_and_payload_about_the_origin():
     driven = _driven(5)
     at = places(ARM, driven, ARM.solve(driven, ARM.forward(driven)))
-    mass = np.array([lump.mass_kg for lump in ARM.lumps])
+    mass = np.array([point_mass.mass_kg for point_mass in ARM.point_masses])
     weight = mass[:, None] * [0.0, 0.0, -9.80665]
     expected = np.cross(at, weight).sum(axis=1) + np.cross(ARM.forward(driven), [0.0, 0.0, -3.0 * 9.80665])
     np.testing.assert_allclose(_motion(ARM, driven, 3.0).base_moment, expected, rtol=1e-6, atol=1e-3)

@@ -15,7 +15,7 @@ from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import estimate_at
 
 
-class Linear:
+class LinearizedProblem:
     """Readings (n, 2) that depend linearly on the parameters."""
 
     def __init__(self, columns, readings):
@@ -38,7 +38,9 @@ def estimate(seed, rows=6, parameters=3, sd=None):
     """An Estimate away from the optimum of 2 rows readings, some of a noise of their own."""
     generator = np.random.default_rng(seed)
     sd = generator.uniform(0.2, 3.0, (rows, 2)) if sd is None else sd
-    observations = Linear(generator.normal(size=(rows, 2, parameters)), sd * generator.normal(size=(rows, 2)))
+    observations = LinearizedProblem(
+        generator.normal(size=(rows, 2, parameters)), sd * generator.normal(size=(rows, 2))
+    )
     problem = Problem(observations, Parameters((flat(parameters),)), WhiteNoise(sd))
     return estimate_at(problem, generator.normal(size=parameters), "anywhere"), generator
 

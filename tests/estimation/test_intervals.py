@@ -40,7 +40,7 @@ def test_of_a_mixture_it_holds_its_share_and_has_equal_densities_at_its_ends():
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearizedProblem:
     """Readings (n, 1) of a linear model."""
 
     matrix: np.ndarray
@@ -75,7 +75,7 @@ def test_truths_that_are_drawn_from_the_prior_lie_inside_as_often_as_stated():
         truth = generator.standard_normal(3)
         truth[1], truth[2] = abs(truth[1]), truth[2] * (narrow if generator.random() < 0.5 else wide)
         data = matrix @ truth + 2.0 * generator.standard_normal(6)
-        estimate = solve(Problem(Linear(matrix, data), parameters, lambda v: v / 2.0), [np.zeros(3)])
+        estimate = solve(Problem(LinearizedProblem(matrix, data), parameters, lambda v: v / 2.0), [np.zeros(3)])
         low, high = estimate.intervals.T
         held.append((low <= truth) & (truth <= high))
     np.testing.assert_allclose(np.mean(held, axis=0), 0.95, atol=4.0 * np.sqrt(0.05 * 0.95 / draws))

@@ -204,7 +204,7 @@ def test_intervals_under_unequal_and_correlated_noise_hold_the_truth():
         for k in range(1, points):
             e[:, k] = phi * e[:, k - 1] + np.sqrt(1.0 - phi**2) * shocks[:, k]
         data = columns @ truth + axes * e.reshape(-1, 3)
-        made = Linear(columns, data)
+        made = LinearizedProblem(columns, data)
         found = solve(Problem(made, _block(5, 10.0), noise.whitening(series)))
         hits += np.abs(found.values - truth) < 1.96 * found.standard_errors
     share = hits / draws
@@ -213,7 +213,7 @@ def test_intervals_under_unequal_and_correlated_noise_hold_the_truth():
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearizedProblem:
     """Readings (n, a) of a linear model with columns (n, a, p)."""
 
     columns: np.ndarray
@@ -238,7 +238,7 @@ def test_a_prior_that_is_a_mixture_gives_the_mean_and_covariance_of_the_mixture(
             Block.of("a", ["a"], ["mm"], 5.0),
             Block.of("b", ["b"], ["kg"], 0.1, wide_sd=1.0),
         )
-        found = solve(Problem(Linear(columns, data), Parameters(blocks), lambda v: v / 0.5))
+        found = solve(Problem(LinearizedProblem(columns, data), Parameters(blocks), lambda v: v / 0.5))
         a, b = np.meshgrid(np.linspace(-4.0, 5.0, 901), np.linspace(-5.0, 6.0, 2201), indexing="ij")
         squares = ((data[:, 0, None] - columns[:, 0] @ np.stack([a.ravel(), b.ravel()])) ** 2).sum(axis=0) / 0.25
         mixture = np.exp(-0.5 * (b / 0.1) ** 2) / 0.1 + np.exp(-0.5 * b**2)

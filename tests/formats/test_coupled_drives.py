@@ -366,10 +366,10 @@ def _lifted(motion, at, site, turn):
     total = np.zeros(len(motion))
     now = places(ROBOT, motion.drive, at.poses)
     whole = frame @ Rotation.from_rotvec(turn).as_matrix() @ np.swapaxes(frame, 1, 2)
-    for number, lump in enumerate(ROBOT.lumps):
-        if lump.joint not in order or order.index(lump.joint) >= order.index(name):
+    for number, point_mass in enumerate(ROBOT.point_masses):
+        if point_mass.joint not in order or order.index(point_mass.joint) >= order.index(name):
             moved = np.einsum("nab,nb->na", whole, now[:, number] - place) + place
-            total += lump.mass_kg * GRAVITY_MM_S2 / 1e3 * (moved @ up)
+            total += point_mass.mass_kg * GRAVITY_MM_S2 / 1e3 * (moved @ up)
     return total
 
 

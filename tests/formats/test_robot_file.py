@@ -98,7 +98,9 @@ def test_an_arm_may_be_read_from_its_tip_to_its_root():
         np.testing.assert_allclose(poses.position_mm[k], position, atol=1e-9)
         np.testing.assert_allclose(poses.turn[k], turn, atol=1e-12)
     # the root stands still in the file, but moves in this frame
-    assert sum(lump.mass_kg for lump in robot.lumps if lump.joint == "platform") == pytest.approx(14.0)
+    assert sum(
+        point_mass.mass_kg for point_mass in robot.point_masses if point_mass.joint == "platform"
+    ) == pytest.approx(14.0)
 
 
 def test_an_inverse_of_an_arm_is_undone_by_mujoco():
@@ -212,7 +214,9 @@ def test_bars_are_found_behind_any_joints_that_make_them(six, tmp_path):
     assert all(leg.bar for leg in robot.legs.legs)
     np.testing.assert_allclose(robot.forward(changes), six.forward(changes), atol=1e-9)
     # the tops are parts of the plate
-    assert sum(lump.mass_kg for lump in robot.lumps if lump.joint == "platform") == pytest.approx(4.9)
+    assert sum(
+        point_mass.mass_kg for point_mass in robot.point_masses if point_mass.joint == "platform"
+    ) == pytest.approx(4.9)
 
 
 def test_mujoco_s_simulation_of_the_hexapod_comes_to_rest_on_the_closed_form(six):
@@ -359,8 +363,8 @@ def test_sites_hold_together_too(tmp_path):
     poses = robot.solve(np.array([[0.3]]), robot.legs.home_mm[None])
     np.testing.assert_allclose(_turned(poses)[0, 1], _four_bar_angle(0.3), atol=1e-12)
     # the hand is a part of the platform, wherever it floats in the file
-    hand = [lump for lump in robot.lumps if lump.joint == "platform"][6:]
-    np.testing.assert_allclose(np.mean([lump.at_mm for lump in hand], axis=0), [0.0, 100.0, 0.0], atol=1e-9)
+    hand = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"][6:]
+    np.testing.assert_allclose(np.mean([point_mass.at_mm for point_mass in hand], axis=0), [0.0, 100.0, 0.0], atol=1e-9)
 
 
 def test_a_home_pose_of_rounded_numbers_is_closed(tmp_path):
@@ -393,8 +397,11 @@ def _inertia(points, mass):
 def test_lumps_have_mass_centre_and_inertia_of_their_bodies():
     robot, model = from_urdf(ARM), _urdf_model(ARM)
     for joint, body in (("axis1", "shoulder"), ("axis2", "upper_arm"), ("axis3", "elbow"), ("axis5", "wrist")):
-        lumps = [lump for lump in robot.lumps if lump.joint == joint]
-        mass, points = np.array([lump.mass_kg for lump in lumps]), np.array([lump.at_mm for lump in lumps])
+        point_masses = [point_mass for point_mass in robot.point_masses if point_mass.joint == joint]
+        mass, points = (
+            np.array([point_mass.mass_kg for point_mass in point_masses]),
+            np.array([point_mass.at_mm for point_mass in point_masses]),
+        )
         own = model.body(body)
         assert mass.sum() == pytest.approx(own.mass[0], rel=1e-12)
         np.testing.assert_allclose(mass @ points / mass.sum(), 1000.0 * own.ipos, atol=1e-9)
@@ -402,25 +409,32 @@ def test_lumps_have_mass_centre_and_inertia_of_their_bodies():
         expected = 1e6 * turn @ np.diag(own.inertia) @ turn.T
         np.testing.assert_allclose(_inertia(points - 1000.0 * own.ipos, mass), expected, atol=1e-6)
     # the flange behind the tool's frame, the base not at all
-    platform = [lump for lump in robot.lumps if lump.joint == "platform"]
-    np.testing.assert_allclose(np.mean([lump.at_mm for lump in platform], axis=0), [0.0, 0.0, -10.0], atol=1e-9)
-    assert sum(lump.mass_kg for lump in robot.lumps) == pytest.approx(31.2)
+    platform = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"]
+    np.testing.assert_allclose(
+        np.mean([point_mass.at_mm for point_mass in platform], axis=0), [0.0, 0.0, -10.0], atol=1e-9
+    )
+    assert sum(point_mass.mass_kg for point_mass in robot.point_masses) == pytest.approx(31.2)
 
 
 def test_lumps_of_a_bar_lie_along_it(six):
-    model, cylinder = mujoco.MjModel.from_xml_path(str(HEXAPOD)), [x for x in six.lumps if x.joint == "leg 2 bar"]
-    centre = np.mean([lump.at_mm[0] for lump in cylinder])
-    assert sum(lump.mass_kg for lump in cylinder) == pytest.approx(1.4) and centre == pytest.approx(125.0)
-    across = sum(lump.mass_kg * (lump.at_mm[0] - centre) ** 2 for lump in cylinder)
+    model, cylinder = (
+        mujoco.MjModel.from_xml_path(str(HEXAPOD)),
+        [x for x in six.point_masses if x.joint == "leg 2 bar"],
+    )
+    centre = np.mean([point_mass.at_mm[0] for point_mass in cylinder])
+    assert sum(point_mass.mass_kg for point_mass in cylinder) == pytest.approx(1.4) and centre == pytest.approx(125.0)
+    across = sum(point_mass.mass_kg * (point_mass.at_mm[0] - centre) ** 2 for point_mass in cylinder)
     assert across == pytest.approx(1e6 * model.body("cylinder2").inertia.max())
-    piston = [lump for lump in six.lumps if lump.joint == "leg 2 end"]
+    piston = [point_mass for point_mass in six.point_masses if point_mass.joint == "leg 2 end"]
     # its middle is 100 mm before its body, which is 200 mm up the leg
-    assert np.mean([lump.at_mm[0] for lump in piston]) == pytest.approx(300.0 - six.legs.legs[1].bar.length_mm)
+    assert np.mean([point_mass.at_mm[0] for point_mass in piston]) == pytest.approx(
+        300.0 - six.legs.legs[1].bar.length_mm
+    )
 
 
 def _mass_centre(robot, actuators, poses):
-    """Mass in kg and its centre (3,) in mm of a robot's lumps at actuator values (K,) and one pose."""
-    mass = np.array([lump.mass_kg for lump in robot.lumps])
+    """Mass in kg and its centre (3,) in mm of a robot's point masses at actuator values (K,) and one pose."""
+    mass = np.array([point_mass.mass_kg for point_mass in robot.point_masses])
     return mass.sum(), mass @ places(robot, actuators[None], poses)[0] / mass.sum()
 
 
@@ -466,14 +480,14 @@ def test_what_hangs_on_a_leg_is_carried_by_it(tmp_path):
         actuators=servos(*CRANKED_JOINTS),
     )
     robot = from_mjcf(path, "tip")
-    own = [lump for lump in robot.lumps if lump.joint == "platform"]
-    assert sum(lump.mass_kg for lump in own) == pytest.approx(0.6) and len(robot.parts.drives) == 6
-    np.testing.assert_allclose(np.mean([lump.at_mm for lump in own[6:]], axis=0), 0.0, atol=1e-9)
+    own = [point_mass for point_mass in robot.point_masses if point_mass.joint == "platform"]
+    assert sum(point_mass.mass_kg for point_mass in own) == pytest.approx(0.6) and len(robot.parts.drives) == 6
+    np.testing.assert_allclose(np.mean([point_mass.at_mm for point_mass in own[6:]], axis=0), 0.0, atol=1e-9)
 
 
 def test_meshes_that_are_not_there_and_links_without_mass_do_no_harm(tmp_path):
     robot = from_urdf(urdf(tmp_path, TREE + joint_of("j3", "continuous", "two", "three")))
-    assert robot.parts.columns == ["j1_rad", "j2_mm", "j3_rad"] and robot.lumps == ()
+    assert robot.parts.columns == ["j1_rad", "j2_mm", "j3_rad"] and robot.point_masses == ()
     np.testing.assert_allclose(robot.drive_range, [[-1.0, 1.0], [-1000.0, 1000.0], [-1.0, 1.0]])
     robot = from_urdf(
         urdf(tmp_path, TREE + joint_of("j3", "fixed", "two", "three")), home={"j2": 50.0}, tool_mm=(1, 2, 3)

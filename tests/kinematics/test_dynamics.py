@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rrru.kinematics.dynamics import GRAVITY_MM_S2, Masses, drive_rates, gravity, level_axes, load_slopes, loads
-from rrru.kinematics.point_masses import Lump
+from rrru.kinematics.point_masses import PointMass
 from rrru.robots.catalogue import make_mechanism
 from rrru.robots.delta import Delta
 from rrru.robots.hexapod import hexapod
@@ -126,8 +126,8 @@ def test_motors_supply_the_change_of_energy(rich_poses):
         drive = np.linalg.solve(_ROBOT.actuator_jacobian(position, angle), speed[..., None])[..., 0]
         platform = _MASSES.platform_kg + payload + 1.5 * _MASSES.forearm_kg
         # a uniform rod about its end, and half a forearm at the rod's other end
-        rod, lump = _MASSES.arm_kg * 400.0**2 / 3.0, 0.5 * _MASSES.forearm_kg * 400.0**2
-        kinetic = 0.5 * platform * (speed**2).sum(axis=1) + 0.5 * (rod + lump) * (drive**2).sum(axis=1)
+        rod, point_mass = _MASSES.arm_kg * 400.0**2 / 3.0, 0.5 * _MASSES.forearm_kg * 400.0**2
+        kinetic = 0.5 * platform * (speed**2).sum(axis=1) + 0.5 * (rod + point_mass) * (drive**2).sum(axis=1)
         return kinetic / 1000.0 + _potential(angle, position)
 
     power = (energy(h) - energy(-h)) / (2.0 * h)
@@ -195,9 +195,9 @@ def test_bars_carry_a_hexapods_own_masses():
         radius * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
         for radius, turns in zip((300.0, 150.0), angles, strict=True)
     )
-    own = [Lump("platform", 4.0, np.array([20.0, -10.0, 30.0]))]
-    own += [Lump(f"leg {k} end", 0.5, np.zeros(3)) for k in range(1, 7)]
-    robot = hexapod(base, plate, 400.0, lumps=tuple(own))
+    own = [PointMass("platform", 4.0, np.array([20.0, -10.0, 30.0]))]
+    own += [PointMass(f"leg {k} end", 0.5, np.zeros(3)) for k in range(1, 7)]
+    robot = hexapod(base, plate, 400.0, point_masses=tuple(own))
     points = np.add([0.0, 0.0, 400.0], np.random.default_rng(8).uniform(-60.0, 60.0, (20, 3)))
     load = _at_rest(robot, robot.inverse(points), points, Masses(0.0, 0.0, 0.0), payload_kg=0.0)
     for point, found in zip(points, load.member_n, strict=True):

@@ -12,7 +12,7 @@ from rrru.effects.library import library
 from rrru.effects.motion import Course, make_motion
 from rrru.errors import ConfigError
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.dynamics import GRAVITY_MM_S2, Masses, gravity
 from rrru.kinematics.readings import Readings, lacking
 from rrru.robots.catalogue import make_mechanism
@@ -72,7 +72,7 @@ def test_what_nobody_knows_is_no_pose():
 
 def test_the_effect_of_every_site_and_drive_is_the_slope_of_what_is_read():
     """Against central differences through the exact chains, with finite twists at all sites."""
-    robot = ROBOT.reading(Reads(tuple(SITES.values()), tuple(SITES.values()), frame=True))
+    robot = ROBOT.reading(MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True))
     generator = np.random.default_rng(4)
     twists = generator.normal(size=(COUNT, len(robot.legs.sites), 6)) * np.repeat([0.5, 5e-3], 3)
     poses, readings = robot.solve(DRIVES, _own(), twists), _readings(_own())
@@ -162,7 +162,7 @@ def test_every_effect_of_arms_is_one_of_a_robot_with_hands():
 def test_both_hands_tell_a_full_set_of_parameters():
     """Shoulders off by tens of mrad, everything else by millimetres and milliradians, in a frame of the instrument."""
     generator = np.random.default_rng(5)
-    reads = Reads(tuple(SITES.values()), tuple(SITES.values()), frame=True)
+    reads = MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True)
     robot = replace(ROBOT, parameter_set="full", angle_limit_rad=0.5, length_limit_mm=200.0).reading(reads)
     readings = _readings(_own())
     robot = robot.seen_at(DRIVES, _own(), readings)
@@ -179,7 +179,7 @@ def test_both_hands_tell_a_full_set_of_parameters():
 
 
 def test_frames_alone_are_a_set_of_parameters():
-    reads = Reads(tuple(SITES.values()), tuple(SITES.values()), frame=True)
+    reads = MeasurementConfig(tuple(SITES.values()), tuple(SITES.values()), frame=True)
     robot = replace(ROBOT, parameter_set="frame").reading(reads).seen_at(DRIVES, _own(), _readings(_own()))
     assert len(robot.parameters) == 12
     assert {name.rpartition("_")[0] for name in robot.parameters.names} == {
@@ -200,7 +200,9 @@ def test_a_urdf_with_several_tips_is_the_same_robot(tmp_path):
     load = robot.own_load(None, (DRIVES[:, order], 0.0 * DRIVES, 0.0 * DRIVES), poses, gravity(robot))
     drives = robot.legs.per_actuator(load)
     np.testing.assert_allclose(drives, _motion().drive_load[:, order], rtol=1e-5, atol=0.1)
-    assert sum(lump.mass_kg for lump in robot.lumps) == pytest.approx(sum(mass for _, (mass, _) in two_arms.masses()))
+    assert sum(point_mass.mass_kg for point_mass in robot.point_masses) == pytest.approx(
+        sum(mass for _, (mass, _) in two_arms.masses())
+    )
     np.testing.assert_array_equal(robot.velocity_limits, np.ones(len(order)))
     np.testing.assert_array_equal(robot.effort_limits, np.full(len(order), 1e3))
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.calibration.calibrate import calibrate
 from rrru.estimation.observations.target_positions import TargetPositions
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.legs import TOOL, WORLD
 from rrru.kinematics.readings import Readings, lacking
 from tests.kinematics.test_general_model import GENERAL, ROBOTS, _about_home, _clear
@@ -21,7 +21,7 @@ _STEPS = np.repeat([1e-2, 1e-5], 3)
 def _poses(name, **reads):
     """A robot as read, 100 positions and actuator values."""
     robot, points, actuators = _about_home(GENERAL[name]) if name in GENERAL else _clear(name)
-    return robot.reading(Reads(tuple(_REFLECTORS), turned=True, **reads)), points, actuators
+    return robot.reading(MeasurementConfig(tuple(_REFLECTORS), turned=True, **reads)), points, actuators
 
 
 def _predicted(robot, poses, twists, names, places, on_world=None):

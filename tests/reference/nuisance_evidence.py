@@ -58,11 +58,11 @@ class ProductModel(NamedTuple):
     sd: np.ndarray
 
     @classmethod
-    def make(cls, problem, blocks, steps, grams, strengths):
-        """Model of a Projected problem without nuisance parameters at strengths (terms,).
+    def make(cls, problem, blocks, steps, grams, prior_scales):
+        """Model of a MarginalProblem without nuisance parameters at prior_scales (terms,).
 
         blocks, steps: as in `rrru.diagnosis.payload_nuisance.borne`; grams: as in
-        `rrru.diagnosis.marginal_problem.Projected.of`, of one level.
+        `rrru.diagnosis.marginal_problem.MarginalProblem.of`, of one level.
         """
         k, q = len(problem.size), len(steps)
         index = np.concatenate([problem.index, *(numbers.ravel() for _, numbers in blocks.values())])
@@ -74,7 +74,7 @@ class ProductModel(NamedTuple):
                 mix[1 + parameter, row : row + len(matrix), problem.owner == term] = matrix.T
                 row += len(matrix)
         (gram,), (moment,) = grams(index)
-        scale = problem.scale(np.asarray(strengths, dtype=float)[None])[0]
+        scale = problem.scale(np.asarray(prior_scales, dtype=float)[None])[0]
         mean = np.array([step[-1] for step in steps])
         return cls(gram, moment, mix, scale, problem.positive, mean, *cases_of([step[0] for step in steps]))
 

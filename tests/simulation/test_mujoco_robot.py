@@ -71,8 +71,8 @@ def test_the_arm_is_the_same_in_both_formats():
     other, points = from_urdf(file_of("arm6").with_suffix(".urdf")), near_home("arm6", *_AWAY)
     drives = mechanism("arm6").inverse(points)
     np.testing.assert_allclose(other.forward(drives), points, atol=1e-9)
-    own = sorted(lump.mass_kg for lump in mechanism("arm6").lumps)
-    np.testing.assert_allclose(own, sorted(lump.mass_kg for lump in other.lumps), rtol=1e-9)
+    own = sorted(point_mass.mass_kg for point_mass in mechanism("arm6").point_masses)
+    np.testing.assert_allclose(own, sorted(point_mass.mass_kg for point_mass in other.point_masses), rtol=1e-9)
 
 
 def test_it_is_measured_as_every_virtual_robot_is():

@@ -29,8 +29,8 @@ def main(settings, inputs, outputs):
         result = diagnose(points, MeasuredRobot(robot, Masses(**told["masses"]), noise_mm, name), known, details=False)
         verdicts.append({"check": check, "robot": name, "kind": kind} | {key: result.verdict[key] for key in VERDICT})
         causes.append(stated(name, result))
-        numbers = fitted(parameter_rows(result.attribution))
-        fit = result.attribution
+        numbers = fitted(parameter_rows(result.inference))
+        fit = result.inference
         states.append(state_row(name, fit.calibrated.deviations, result.state, fit.case.library, numbers))
         budgets.append(result.tables["gap_budget"].assign(robot=name))
     frames = {

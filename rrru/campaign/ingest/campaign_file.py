@@ -13,7 +13,7 @@ from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resol
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
-from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, doubts
+from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, nuisance_sd
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
@@ -196,7 +196,7 @@ def _table(
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
     wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
     places = partial(places_instead, sheet)
-    notes = [*doubts(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
+    notes = [*nuisance_sd(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
     outlier = outliers(frame, digit_mm) | wrong
     told = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:

@@ -124,7 +124,7 @@ def check_measured(sheet, frame_advice):
         sheet.note("reach of measured", MEASURED, position_text(measured[i]), allowed, known.index[i])
 
 
-def doubts(frame, mechanism, places_instead):
+def nuisance_sd(frame, mechanism, places_instead):
     """What is strange about measured positions in the robot's frame: far off in all, or one row late or early.
 
     places_instead: of targets or tool, in words, from the distance in mm that they may leave.

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from rrru.kinematics.base_parameters import Reads, candidates_of, choose, direction, open_numbers
+from rrru.kinematics.base_parameters import MeasurementConfig, candidates_of, choose, direction, open_numbers
 from rrru.kinematics.readings import lacking
 
 # shares of the robot's size: from the first on a residual may be one of zeros, above the second one of nothing else;
@@ -85,7 +85,7 @@ def _fitted(robot, driven, seen, frames, zeros):
     if not poses.closed.all():
         return None
     framed = frames(poses)
-    reads = Reads(tuple(dict.fromkeys(seen.reflectors.tolist())), framed.unknown, frame=True)
+    reads = MeasurementConfig(tuple(dict.fromkeys(seen.reflectors.tolist())), framed.unknown, frame=True)
     robot = robot.reading(reads)
     readings = replace(seen, position_mm=framed.position_mm, place_mm=framed.place_mm)
     # frame and reflectors first: the drives are what is left

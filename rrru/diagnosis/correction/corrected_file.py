@@ -43,23 +43,23 @@ class Corrected:
     mjcf: bool = False
 
 
-def found_of(attribution, stated_reflectors=False):
-    """The Found of an attribution, and the names of its effects that no file holds.
+def found_of(inference, stated_reflectors=False):
+    """The Found of an inference, and the names of its effects that no file holds.
 
     stated_reflectors: whether reflectors whose places are stated belong to it, too.
     """
-    case, state = attribution.case, attribution.state
+    case, state = inference.case, inference.state
     library, sites = case.library, case.mechanism.legs.sites
     constant = {key: state.contribution(library, key, case.motion).twists for key in state.effects}
     constant = {key: twists for key, twists in constant.items() if np.ndim(twists) == 3 and len(twists) == 1}
     twists = case.mechanism.twists(state.deviations)[0] + sum(one[0] for one in constant.values())
-    steps, coordinates = attribution.fit.one_sigma_steps()
+    steps, coordinates = inference.fit.one_sigma_steps()
     spread = np.einsum("scp,qp->qsc", case.mechanism.directions, steps)
     for key, twist in constant.items():
         moved = (state.contribution(library, key, case.motion, state.effects[key] + one) for one in coordinates[key])
         spread = spread + np.stack([one.twists[0] - twist[0] for one in moved])
     moves = [k for k in range(len(sites)) if twists[k].any() or spread[:, k].any()]
-    numbers, count = parameter_rows(attribution), len(case.mechanism.parts.drives)
+    numbers, count = parameter_rows(inference), len(case.mechanism.parts.drives)
     loads = np.nan_to_num(np.abs(case.motion.drive_load)).max(axis=0)
     found = Found(
         {sites[k]: twists[k] for k in moves},
@@ -74,27 +74,27 @@ def found_of(attribution, stated_reflectors=False):
     return found, [name for name, _ in state.effects if name not in held]
 
 
-def fitted_in_file(attribution, section):
-    """The Attribution with its hypothesis fitted in geometric numbers that the robot's own file can hold.
+def fitted_in_file(inference, section):
+    """The InferenceResult with its hypothesis fitted in geometric numbers that the robot's own file can hold.
 
     Numbers of others, such as shifts between the axes of a ball, can stand in for those of the file in the fit; written
     without them the file would miss by what they did. section: the robot's entry in the configuration.
     """
-    mechanism = attribution.case.mechanism
+    mechanism = inference.case.mechanism
     if "urdf" in section:
         parts = urdf_parts(section["urdf"], **{key: section.get(key) for key in ("base", "tip", "home")})
     else:
         parts = mjcf_parts(section["mjcf"], section["platform"])
     held = held_by(structure_of(*parts), mechanism.candidates)
     if set(mechanism.parameters.names) <= set(held):
-        return attribution
+        return inference
     names = [name for name in held if name in mechanism.among] if mechanism.among else held
-    case = replace(attribution.case, mechanism=replace(mechanism, among=tuple(names)))
-    fitted, state = attribution.fit.model, attribution.state
+    case = replace(inference.case, mechanism=replace(mechanism, among=tuple(names)))
+    fitted, state = inference.fit.model, inference.state
     start = replace(calibrate(case), effects=state.effects, shape_values=state.shape_values)
     of_case = replace(fitted.case, mechanism=case.mechanism)
-    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, attribution.fit.level, fitted.signed)
-    return replace(attribution, case=case, fit=fit)
+    fit = fit_model(of_case, [start], fitted.terms, fitted.scales, inference.fit.level, fitted.signed)
+    return replace(inference, case=case, fit=fit)
 
 
 def _of_drives(numbers, effect, stem, count):
@@ -115,25 +115,23 @@ def _places(case, stated):
     return {name: places[np.flatnonzero(sites == name)[0]] for name in pd.unique(sites) if name in wanted}
 
 
-def corrected(attribution, section, folder):
-    """The Corrected file of an attribution for a folder; section: the robot's entry in the configuration.
+def corrected(inference, section, folder):
+    """The Corrected file of an inference for a folder; section: the robot's entry in the configuration.
 
     Its numbers are fitted anew where the format cannot hold all effects and numbers that were. Raises ConfigError for a
     file whose bodies do not all stand in it as such.
     """
     # more links at the end of a URDF's chain would leave its tip open
     reflectors = "mjcf" in section
-    diagnosed, lacking = found_of(attribution, reflectors)
-    others, effects = [*lacking], [name for name, _ in attribution.state.effects]
+    diagnosed, lacking = found_of(inference, reflectors)
+    others, effects = [*lacking], [name for name, _ in inference.state.effects]
     if "urdf" in section:
         lacking += [name for name in effects if name in (_COMPLIANCE[0], _PLAY[0])]
     held = tuple(name for name in effects if name not in lacking)
-    found, _ = found_of(
-        fitted_in_file(with_effects(attribution, held) if lacking else attribution, section), reflectors
-    )
-    if attribution.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
+    found, _ = found_of(fitted_in_file(with_effects(inference, held) if lacking else inference, section), reflectors)
+    if inference.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
-    others += weight_notes(attribution)
+    others += weight_notes(inference)
     if "urdf" in section:
         chain = {key: section.get(key) for key in ("base", "tip", "home")}
         found = replace(found, compliance=diagnosed.compliance, play=diagnosed.play)

@@ -33,18 +33,16 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
     an empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
     robot's; seed: of the fresh poses at which file and diagnosis are compared.
     """
-    file, attribution = Path(file), diagnosis.attribution
+    file, inference = Path(file), diagnosis.inference
     shrink, why, worth = diagnosis.tables["gap_shrink"], "", {}
     try:
         if why_not := diagnosis.verdict["no_answer"]:
             raise ConfigError(why_not)
-        written = corrected(attribution, section, file.resolve().parent)
+        written = corrected(inference, section, file.resolve().parent)
         write_text(written.text, file)
-        more, why = gap_rows(attribution, written, section, file, shrink)
+        more, why = gap_rows(inference, written, section, file, shrink)
         _refuse_worse(more)
-        error = file_error(
-            attribution, _model(attribution, written, section, file), masses, stream(seed, "fresh poses")
-        )
+        error = file_error(inference, _model(inference, written, section, file), masses, stream(seed, "fresh poses"))
         worth = {
             "file_error_mm": error.measured_mm,
             "file_error_fresh_mm": error.fresh_mm,
@@ -58,7 +56,7 @@ def write_corrected(diagnosis, section, masses, file, seed=0):
         lost = (f"{NOT_CORRECTED}{said}",)
     notes = "; ".join(filter(None, (diagnosis.verdict["notes"], why)))
     verdict = diagnosis.verdict | worth | {"notes": notes, "not_in_model": "; ".join(lost)}
-    tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(attribution, masses)}
+    tables = {"gap_shrink": shrink, "corrected_drives": corrected_drives(inference, masses)}
     return replace(diagnosis, verdict=verdict, tables=diagnosis.tables | tables)
 
 
@@ -105,13 +103,13 @@ def _headline(written, error):
     return f"the corrected file misses the readings by {sizes}{lacking}"
 
 
-def _model(attribution, written, section, file):
+def _model(inference, written, section, file):
     """The FileModel of a Corrected file, loaded anew."""
-    robot = _robot(attribution.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
-    return FileModel(robot, written.in_file, _instrument(attribution.case, robot, written.found, True))
+    robot = _robot(inference.case, section | {"mjcf" if written.mjcf else "urdf": str(file)})
+    return FileModel(robot, written.in_file, _instrument(inference.case, robot, written.found, True))
 
 
-def gap_rows(attribution, corrected, section, file, shrink):
+def gap_rows(inference, corrected, section, file, shrink):
     """Rows of `gap_shrink`: of the robot's file as it came, and of the Corrected one, and why MuJoCo did not drive it.
 
     section: the robot's entry in the configuration; file: the corrected one; shrink: the other rows. MuJoCo drives an
@@ -121,22 +119,22 @@ def gap_rows(attribution, corrected, section, file, shrink):
     """
     key = "mjcf" if "mjcf" in section else "urdf"
     models = [
-        ("given_model", _robot(attribution.case, section), {}),
-        ("corrected_model", _robot(attribution.case, section | {key: str(file)}), corrected.in_file),
+        ("given_model", _robot(inference.case, section), {}),
+        ("corrected_model", _robot(inference.case, section | {key: str(file)}), corrected.in_file),
     ]
     files, why = (section[key], file), ""
     try:
         if key == "urdf":
             raise ConfigError("a URDF has no actuators")
         poses = [
-            simulated(attribution.case.motion, robot, Path(one), section["platform"])
+            simulated(inference.case.motion, robot, Path(one), section["platform"])
             for (_, robot, _), one in zip(models, files, strict=True)
         ]
     except (ConfigError, SimulationError, UnreachableError) as error:
         why = f"corrected model not driven: {error}; closed at its drive values instead"
-        poses = [_closed(attribution.case, robot, effects) for _, robot, effects in models]
-    result, case = [], attribution.case
-    known = case.on_robot & case.complete({term.effect for term in attribution.fit.terms})
+        poses = [_closed(inference.case, robot, effects) for _, robot, effects in models]
+    result, case = [], inference.case
+    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
     for (kind, robot, _), (own, twists) in zip(models, poses, strict=True):
         twists = twists + _instrument(case, robot, corrected.found, kind == "corrected_model")
         # the file is not judged where the sense of arrival of a drive is unknown

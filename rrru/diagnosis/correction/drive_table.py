@@ -13,21 +13,23 @@ from rrru.campaign import measurements as rows
 from rrru.diagnosis.options import OPTIONS
 from rrru.effects.motion import Course, make_motion
 from rrru.effects.protocol import Contribution
-from rrru.kinematics.inverse import drives_at
+from rrru.kinematics.inverse import inverse_kinematics
 
 # how far the drives come from, longer than any play
 _APPROACH = {"rad": OPTIONS.approach_distance_rad, "mm": OPTIONS.approach_distance_mm}
 
 
-def corrected_drives(attribution, masses):
-    """Rows of `corrected_drives` of an attribution; masses: of the robot."""
-    case = attribution.case
+def corrected_drives(inference, masses):
+    """Rows of `corrected_drives` of an inference; masses: of the robot."""
+    case = inference.case
     robot, known = case.mechanism, case.used
     commands, drives = rows.command(case.measurements)[known], rows.actuators(case.measurements, robot)[known]
     position, nearest = _grid(commands)
     stated = robot.solve(drives[nearest], commands[nearest])
     turn = stated.turn
-    nominal = drives_at(robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False)
+    nominal = inverse_kinematics(
+        robot, (position, turn), (drives[nearest].copy(), commands[nearest]), robot.twists(), False
+    )
     reached = np.isfinite(nominal).all(axis=1)
     position, turn, nominal = position[reached], turn[reached], nominal[reached]
     payload, end_s = at_end(case)
@@ -36,8 +38,8 @@ def corrected_drives(attribution, masses):
         told = nominal
         for _ in range(OPTIONS.correction_iterations):
             motion = at_rest(robot, masses, (position, told, payload, end_s), approach, nominal)
-            twists = robot.twists(attribution.state.deviations) + effect_twists(attribution, motion)
-            told = drives_at(robot, (position, turn), (nominal.copy(), position), twists)
+            twists = robot.twists(inference.state.deviations) + effect_twists(inference, motion)
+            told = inverse_kinematics(robot, (position, turn), (nominal.copy(), position), twists)
         found[approach] = told
     if np.nanmax(np.abs(found[1] - found[-1]), initial=0.0) < OPTIONS.min_sense_difference:
         found = {0: found[1]}
@@ -103,9 +105,9 @@ def at_rest(robot, masses, state, approach, nominal):
     return make_motion(robot, masses, course, (nominal, robot.map_at(nominal, position)))
 
 
-def effect_twists(attribution, motion):
-    """Twists of the effects of an attribution's state that a robot at rest has."""
-    state, library = attribution.state, attribution.case.library
+def effect_twists(inference, motion):
+    """Twists of the effects of an inference's state that a robot at rest has."""
+    state, library = inference.state, inference.case.library
     change = Contribution(motion.robot.twists())
     for key in state.effects:
         needs = getattr(library[key[0]], "needs", ())

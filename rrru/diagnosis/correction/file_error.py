@@ -43,18 +43,18 @@ class FileError:
     calibrated_mm: float
 
 
-def file_error(attribution, model, masses, generator):
+def file_error(inference, model, masses, generator):
     """The FileError of a FileModel; masses: of the robot; generator: draws the fresh poses."""
-    case = attribution.case
+    case = inference.case
     actuators, command = case.driven
     twists = model.twists(case.motion)
     poses = model.robot.solve(actuators, command, twists)
     of_file = case.by_other(model.robot, poses, twists + model.instrument)
-    known = case.on_robot & case.complete({term.effect for term in attribution.fit.terms})
+    known = case.on_robot & case.complete({term.effect for term in inference.fit.terms})
     of_file, diagnosed, calibrated = (
-        left[known] for left in (of_file, case.residual(attribution.state), case.residual(attribution.calibrated))
+        left[known] for left in (of_file, case.residual(inference.state), case.residual(inference.calibrated))
     )
-    fresh = _fresh_differences(attribution, model, masses, generator)
+    fresh = _fresh_differences(inference, model, masses, generator)
     return FileError(_rms(of_file - diagnosed), _rms(fresh), _rms(of_file), _rms(calibrated))
 
 
@@ -64,12 +64,12 @@ def _rms(distances_mm):
     return float(np.sqrt(squares.mean())) if len(squares) else np.nan
 
 
-def _fresh_differences(attribution, model, masses, generator):
+def _fresh_differences(inference, model, masses, generator):
     """Vectors (n, 3) from the file's robot to the diagnosed one at fresh poses, NaN where one of them has none.
 
     The drive values are weighted means of those at three measured poses, so that they lie within the measured range.
     """
-    case = attribution.case
+    case = inference.case
     robot, (actuators, command) = case.mechanism, case.driven
     on_world = rows.on_the_world(case.measurements)
     usable = np.flatnonzero(case.used if on_world is None else case.used & ~on_world)
@@ -84,7 +84,7 @@ def _fresh_differences(attribution, model, masses, generator):
     motion = at_rest(robot, masses, (position, drive, *at_end(case)), approach, drive)
     readings = None if case.readings is None else case.readings.of(picks[closed, 0])
     diagnosed, written = (
-        robot.twists(attribution.state.deviations) + effect_twists(attribution, motion),
+        robot.twists(inference.state.deviations) + effect_twists(inference, motion),
         model.twists(motion),
     )
     seen = robot.measured(robot.solve(drive, position, diagnosed), diagnosed, readings)

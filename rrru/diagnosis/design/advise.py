@@ -45,21 +45,21 @@ class Advice:
 NOTHING = Advice(pd.DataFrame(columns=_COLUMNS), pd.DataFrame(columns=_POSE))
 
 
-def advise(attribution, verdict, masses, stated=None, sizes=None):
+def advise(inference, verdict, masses, stated=None, sizes=None):
     """The Advice, empty where no rival answer is left that the library can predict.
 
     stated: StatedLimits of the robot, by default none; sizes: by effect the rms in mm of its part of the gap. Runs that
     decide what matters most come first.
     """
-    contests = contests_of(attribution, verdict, sizes or {})
+    contests = contests_of(inference, verdict, sizes or {})
     if not contests:
         return NOTHING
     stated = stated or StatedLimits()
-    limits, limited = run_limits(attribution.case, masses, stated)
-    result = _runs(attribution, contests, masses, limits)
+    limits, limited = run_limits(inference.case, masses, stated)
+    result = _runs(inference, contests, masses, limits)
     first, listed = [row for row in result if row["contest"] == 0], NOTHING.poses
     if not any(row["gain_nats"] > OPTIONS.decisive_gain_nats for row in first):
-        row, listed = _poses(attribution, contests[0], masses, limits)
+        row, listed = _poses(inference, contests[0], masses, limits)
         result, first = result + row, first + row
     runs = pd.DataFrame(result, columns=["contest", *_COLUMNS])
     runs = runs[runs["gain_nats"] > OPTIONS.min_run_gain_nats]
@@ -76,16 +76,16 @@ def advise(attribution, verdict, masses, stated=None, sizes=None):
     return Advice(runs, listed, undecided, limited or (stated.words if open_still else ""))
 
 
-def _runs(attribution, contests, masses, limits):
+def _runs(inference, contests, masses, limits):
     """Rows of `gap_next_runs` of all candidate runs, with the number of the Contest that each is counted for."""
-    choice, table = candidates(attribution.case.measurements, limits)
+    choice, table = candidates(inference.case.measurements, limits)
     if not choice:
         return []
-    planned, result = _planned(attribution.case, table, masses), []
+    planned, result = _planned(inference.case, table, masses), []
     for number, contest in enumerate(contests):
         if not _tell(planned, contest):
             continue
-        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        now, added = worth(inference, contest.truth, contest.imitator, planned)
         start = now.nats()
         for run, one in zip(choice, added, strict=True):
             about = {"contest": number, "separates": contest.separates, "now_nats": start}
@@ -104,12 +104,12 @@ def _tell(planned, contest):
     return all(term.effect in planned.library for hypothesis, _ in answers for term in hypothesis.terms)
 
 
-def _poses(attribution, contest, masses, limits):
+def _poses(inference, contest, masses, limits):
     """The row of poses of `gap_next_runs` in a list, which is empty where there are none, and `gap_next_poses`.
 
     They are driven as the campaign was, or faster, or with a higher payload, whichever tells most.
     """
-    case, best = attribution.case, ([], NOTHING.poses)
+    case, best = inference.case, ([], NOTHING.poses)
     passes = poses.passes(case.measurements, case.mechanism)
     if not len(passes):
         return best
@@ -129,7 +129,7 @@ def _poses(attribution, contest, masses, limits):
         planned = _planned(case, table, masses)
         if not _tell(planned, contest):
             continue
-        now, added = worth(attribution, contest.truth, contest.imitator, planned)
+        now, added = worth(inference, contest.truth, contest.imitator, planned)
         chosen, _ = greedy(now, added, OPTIONS.max_advised_poses)
         chosen = chosen[: some.within(chosen, speed, limits.seconds)]
         if not chosen:

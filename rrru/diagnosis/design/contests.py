@@ -19,7 +19,7 @@ class Contest:
     imitator: tuple
 
 
-def contests_of(attribution, verdict, sizes):
+def contests_of(inference, verdict, sizes):
     """Up to `OPTIONS.max_advised_rivals` Contests of a Verdict, in the order in which they matter.
 
     First the members of each group, the set with its most probable one against the set with another one in its place;
@@ -28,7 +28,7 @@ def contests_of(attribution, verdict, sizes):
     groups alone: an effect outside of the library makes no data. sizes: by effect the rms in mm of its part of the gap.
     """
     found = {}
-    for pair in _pairs(attribution.posterior, verdict, sizes):
+    for pair in _pairs(inference.posterior, verdict, sizes):
         contest = _contest(*pair) if None not in pair else None
         if contest:
             found.setdefault(frozenset(hypothesis.effects for hypothesis, _ in pair), contest)
@@ -76,9 +76,9 @@ def _doubtful(posterior, verdict, sizes):
     grouped = {name for group in verdict.groups for name in group.names}
     causes = (*verdict.effects, *(name for name in verdict.possible if name not in ("none", "unexplained")))
     low = OPTIONS.min_possible_probability
-    doubts = {name: posterior.marginal(name) for name in dict.fromkeys(causes) if name not in grouped}
-    doubts = {name: p for name, p in doubts.items() if low < p < 1.0 - low}
-    return max(doubts, key=lambda name: (sizes.get(name, 0.0), doubts[name], name), default="")
+    nuisance_sd = {name: posterior.marginal(name) for name in dict.fromkeys(causes) if name not in grouped}
+    nuisance_sd = {name: p for name, p in nuisance_sd.items() if low < p < 1.0 - low}
+    return max(nuisance_sd, key=lambda name: (sizes.get(name, 0.0), nuisance_sd[name], name), default="")
 
 
 def _contest(favoured, other):

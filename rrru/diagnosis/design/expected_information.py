@@ -40,20 +40,20 @@ class Sums:
         return float(0.5 * (self.square - moment @ np.linalg.solve(scaled, moment)))
 
 
-def worth(attribution, truth, imitator, planned):
+def worth(inference, truth, imitator, planned):
     """Sums of the present campaign, the prior among them, and of each run of a planned Case in order of its number.
 
     truth, imitator: the answers, each (hypothesis, level) as `Posterior.best_of` gives it.
     """
     (hypothesis, level), (rival, rival_level) = truth, imitator
-    case, evidence = attribution.case, attribution.evidence
+    case, evidence = inference.case, inference.evidence
     terms = hypothesis.terms + rival.terms
     # what the weight is off by is the same in both answers
     keys = list(dict.fromkeys((t.effect, t.shape) for t in terms))
-    here, planned = (reachable(replace(one, doubts={}), attribution.state) for one in (case, planned))
+    here, planned = (reachable(replace(one, nuisance_sd={}), inference.state) for one in (case, planned))
     # both about one state: the evidence's own linearisation is that of the fit before
-    present, there = (one.linearise(attribution.state, keys) for one in (here, planned))
-    mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.strengths[level], level)
+    present, there = (one.linearise(inference.state, keys) for one in (here, planned))
+    mean, _ = evidence.coefficients(hypothesis.terms, hypothesis.prior_scales[level], level)
     mean = mean[: sum(spread(case.library[t.effect].coordinates, t.legs).shape[1] for t in hypothesis.terms)]
     made, designs = [], []
     for linear in (present, there):
@@ -61,7 +61,7 @@ def worth(attribution, truth, imitator, planned):
         made.append(np.concatenate([none, *signatures(case.library, linear, hypothesis.terms)], axis=-1) @ mean)
         designs.append(np.concatenate([linear.base, *signatures(case.library, linear, rival.terms)], axis=-1))
     penalty = np.zeros(designs[0].shape[-1])
-    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.strengths[rival_level]) ** -2.0
+    penalty[there.base.shape[-1] :] = evidence.scales(rival.terms, rival.prior_scales[rival_level]) ** -2.0
     now = Sums.of(designs[0], made[0], case.noise_mm) + Sums(np.diag(penalty), np.zeros(len(penalty)), 0.0)
     runs = [planned.run == number for number in np.unique(planned.measurements["run"])]
     return now, [Sums.of(designs[1][run], made[1][run], case.noise_mm) for run in runs]

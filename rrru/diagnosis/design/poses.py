@@ -13,7 +13,7 @@ import pandas as pd
 from rrru.campaign import measurements as rows
 from rrru.campaign.speed_profile import Trapezoid
 from rrru.diagnosis.options import OPTIONS
-from rrru.kinematics.inverse import drives_at
+from rrru.kinematics.inverse import inverse_kinematics
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _oriented(start_mm, end_mm, known, mechanism):
     nearest = np.flatnonzero(fine)[cKDTree(position[fine]).query(start_mm)[1]]
     each = np.repeat(nearest, OPTIONS.points_per_pass)
     place = points_of(start_mm, end_mm).reshape(-1, 3), turn[each]
-    reached = drives_at(mechanism, place, (drives[each], position[each]), mechanism.twists(), False)
+    reached = inverse_kinematics(mechanism, place, (drives[each], position[each]), mechanism.twists(), False)
     return turn[nearest], mechanism.in_range(reached)
 
 

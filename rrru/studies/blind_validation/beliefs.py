@@ -27,7 +27,7 @@ def _diagnosis(measurements, known, settings):
     """Verdict, probability by set of effects, all that is unexplained being one set, and share closed."""
     result = diagnose(measurements, known, settings, details=False)
     probabilities = {}
-    for (effects, unexplained), probability in result.attribution.posterior.sets().items():
+    for (effects, unexplained), probability in result.inference.posterior.sets().items():
         name = UNEXPLAINED if unexplained else in_order("+".join(effects)) or NONE
         probabilities[name] = probabilities.get(name, 0.0) + probability
     return result.verdict["effects"], probabilities, result.verdict["share_closed"]

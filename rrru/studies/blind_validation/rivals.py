@@ -41,7 +41,7 @@ _NAMED = ("time_s", "speed_mm_s", "payload_kg")
 @dataclass(frozen=True)
 class Campaign:
     """What all ways are given of n points: the case; over the stated noise the data (3n,), the calibration's columns
-    (3n, p), and those (3n, k) of every Term that the diagnosis tries: effect, shape and legs.
+    (3n, p), and those (3n, k) of every EffectTerm that the diagnosis tries: effect, shape and legs.
     """
 
     case: Case

@@ -11,10 +11,10 @@ def stated(robot, diagnosis):
 
     The probability is that of the posterior, whatever the decision is.
     """
-    attribution, verdict = diagnosis.attribution, diagnosis.decided
+    inference, verdict = diagnosis.inference, diagnosis.decided
     rows = []
-    for name in attribution.case.effects:
+    for name in inference.case.effects:
         group = verdict.group_of(name)
-        probability = min(attribution.posterior.marginal(name), 1.0)
+        probability = min(inference.posterior.marginal(name), 1.0)
         rows.append((robot, name, probability, verdict.decision(name), BETWEEN.join(group.names) if group else ""))
     return pd.DataFrame(rows, columns=["robot", "effect", "probability", "decision", "group"])

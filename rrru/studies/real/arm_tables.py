@@ -9,8 +9,8 @@ import pandas as pd
 
 from rrru.campaign import measurements as rows
 from rrru.diagnosis.drive_spectra import amplitudes
-from rrru.diagnosis.evidence import STRENGTHS, averaged
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.evidence import PRIOR_SCALES, averaged
+from rrru.diagnosis.terms import EffectTerm
 from rrru.studies.real.arms import Studied
 from rrru.studies.real.refusals import named
 from rrru.studies.real.sheets import PLACE
@@ -91,17 +91,17 @@ def _waves(studied: Studied) -> str:
     library, named = studied.case.library, (_FUNCTION[0], _WAVES[0])
     if studied.diagnosis is None or not all(name in library for name in named):
         return ""
-    attribution = studied.diagnosis.attribution
-    hypothesis, level = attribution.hypothesis, attribution.level
+    inference = studied.diagnosis.inference
+    hypothesis, level = inference.hypothesis, inference.level
     rest = tuple(term for term in hypothesis.terms if term.effect not in named)
     fixed = [[strength] for strength in hypothesis.strengths_of(rest, level)]
 
     def told(*names: str) -> float:
         """Log evidence of laws beside the rest."""
-        terms, grids = (*rest, *map(Term, names)), (*fixed, *(STRENGTHS for _ in names))
-        return float(averaged(attribution.evidence.over_strengths(terms, grids, [level])[0], len(names))[0])
+        terms, grids = (*rest, *map(EffectTerm, names)), (*fixed, *(PRIOR_SCALES for _ in names))
+        return float(averaged(inference.evidence.over_strengths(terms, grids, [level])[0], len(names))[0])
 
-    neither, function, waves = told() if rest else attribution.evidence.none[level], *map(told, named)
+    neither, function, waves = told() if rest else inference.evidence.none[level], *map(told, named)
     if function < neither:
         return ""
     count = len(library[_WAVES[0]].coordinates) // 2
@@ -122,11 +122,11 @@ def predicted_share(studied: Studied) -> float:
     """Share of the mean square of the calibrated model's misses that the causes take off, by folds of training rows."""
     if studied.diagnosis is None:
         return np.nan
-    attribution = studied.diagnosis.attribution
-    hypothesis, level = attribution.hypothesis, attribution.level
+    inference = studied.diagnosis.inference
+    hypothesis, level = inference.hypothesis, inference.level
     at = counted(studied.case)
     misses = [
-        (attribution.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[at] ** 2).sum(axis=1).mean()
+        (inference.held_out.predict(terms, strengths, level, uncertain=False).residual_mm[at] ** 2).sum(axis=1).mean()
         for terms, strengths in (((), ()), (hypothesis.terms, hypothesis.strengths[level]))
     ]
     return float(1.0 - misses[1] / misses[0])

@@ -64,7 +64,7 @@ class Studied:
     @property
     def case(self) -> Case:
         """The case of the diagnosis, without one that of the plain models."""
-        return self.diagnosis.attribution.case if self.diagnosis else self.plain
+        return self.diagnosis.inference.case if self.diagnosis else self.plain
 
     @property
     def state(self) -> State:
@@ -126,7 +126,7 @@ def studied(known: Prepared, settings: GapSettings) -> Studied:
     measured = MeasuredRobot(known.robot, NO_MASSES, known.noise[0], known.series.name, known.noise[1])
     try:
         found = diagnose(known.measurements, measured, settings, details=False)
-        left = held_out_mm(found.attribution.case, found.state)
+        left = held_out_mm(found.inference.case, found.state)
     except FitError as error:
         # its calibration still tells something
         found, left = None, next(step for step in made if step.model == "b").held_out_mm

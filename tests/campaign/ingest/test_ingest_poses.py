@@ -233,9 +233,9 @@ def test_joints_that_no_robot_can_take_are_refused(tmp_path):
 
 def test_candidates_of_reflectors_are_shifts_of_the_platforms_frame(arm):
     """A reflector's parameter moves that reflector and nothing else."""
-    from rrru.kinematics.base_parameters import Reads
+    from rrru.kinematics.base_parameters import MeasurementConfig
 
-    robot = arm.reading(Reads(("reflector a", "reflector b"), ("reflector b",)))
+    robot = arm.reading(MeasurementConfig(("reflector a", "reflector b"), ("reflector b",)))
     own = [one for one in robot.candidates if one.name.startswith("reflector")]
     assert [one.name for one in own] == ["reflector_b_x", "reflector_b_y", "reflector_b_z"]
     twist = direction(robot.legs, own[1])

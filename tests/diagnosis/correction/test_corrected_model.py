@@ -118,10 +118,10 @@ def test_a_corrected_file_that_is_no_robot_costs_nothing_but_itself(hexapod, tmp
 
 
 def test_the_corrected_file_alone_stands_where_the_calibrated_robot_does(hexapod):
-    attribution = hexapod.found.attribution
-    robot = attribution.case.mechanism
+    inference = hexapod.found.inference
+    robot = inference.case.mechanism
     actuators = rows.actuators(hexapod.frame, robot)
-    expected = robot.forward(actuators, attribution.state.deviations, rows.command(hexapod.frame))
+    expected = robot.forward(actuators, inference.state.deviations, rows.command(hexapod.frame))
     again = from_mjcf(hexapod.file, "plate").forward(actuators, guess_mm=rows.command(hexapod.frame))
     np.testing.assert_allclose(again, expected, rtol=0.0, atol=1e-6)
 
@@ -174,7 +174,7 @@ def test_a_file_that_cannot_be_corrected_says_why_and_the_verdict_stands(hexapod
 
 
 def test_standard_errors_of_the_calibration_hold_the_truth(hexapod):
-    mechanism, numbers = hexapod.found.attribution.case.mechanism, hexapod.found.tables["gap_parameters"]
+    mechanism, numbers = hexapod.found.inference.case.mechanism, hexapod.found.tables["gap_parameters"]
     own = numbers[numbers["effect"] == "calibration"].set_index("parameter")
     truth = mechanism.identifiable(hexapod.errors)
     off = np.array([own.loc[key, "value"] - value for key, value in truth.items()])
@@ -275,7 +275,7 @@ def test_what_a_corrected_file_leaves_beyond_the_diagnosis_is_said(arm, hexapod,
 def test_a_file_that_is_worse_than_the_calibration_says_so_in_the_headline(attached, tmp_path, monkeypatch):
     """As where shifts between the axes of balls are fitted, which no file holds, and written without them."""
     found, *_, section = attached
-    monkeypatch.setattr(corrected_file, "fitted_in_file", lambda attribution, _: attribution)
+    monkeypatch.setattr(corrected_file, "fitted_in_file", lambda inference, _: inference)
     again = write_corrected(found, section, _MASSES, tmp_path / "corrected.xml").verdict
     assert again["file_error_mm"] > 0.2 < again["file_error_fresh_mm"]
     first, cannot = again["file_headline"].split("; it cannot hold: ")

@@ -7,7 +7,7 @@ from rrru.diagnosis.design.contests import contests_of
 from rrru.diagnosis.hypothesis import Hypothesis
 from rrru.diagnosis.options import OPTIONS
 from rrru.diagnosis.posterior import Posterior
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from rrru.diagnosis.verdict import Group, Verdict
 
 
@@ -15,7 +15,9 @@ class _Attribution:
     """What contests are found from: a posterior of sets of effects with probabilities."""
 
     def __init__(self, sets):
-        hypotheses = tuple(Hypothesis(tuple(map(Term, names)), np.zeros(1), np.ones((1, len(names)))) for names in sets)
+        hypotheses = tuple(
+            Hypothesis(tuple(map(EffectTerm, names)), np.zeros(1), np.ones((1, len(names)))) for names in sets
+        )
         weights = np.log([[p] for p in sets.values()])
         self.posterior = Posterior(hypotheses, weights, np.zeros(weights.shape, dtype=bool))
 

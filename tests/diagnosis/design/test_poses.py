@@ -13,7 +13,7 @@ from rrru.diagnosis.design import poses
 from rrru.diagnosis.design.advise import advise
 from rrru.diagnosis.design.expected_information import Sums, greedy, reachable
 from rrru.diagnosis.design.run_limits import StatedLimits
-from rrru.diagnosis.inference import Attribution
+from rrru.diagnosis.inference import InferenceResult
 from rrru.diagnosis.make_problem import make_case
 from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.model_space import explore
@@ -102,7 +102,7 @@ class LocalCompliance:
 
 @pytest.fixture(scope="module")
 def rivals():
-    """Attribution and verdict of a campaign of two lines, at y = 110 mm and -110 mm, of effects that differ between
+    """InferenceResult and verdict of a campaign of two lines, at y = 110 mm and -110 mm, of effects that differ between
     these alone.
     """
     library = {"drive_compliance": EFFECTS["drive_compliance"], "local_compliance": LocalCompliance()}
@@ -110,7 +110,9 @@ def rivals():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = explore(evidence, Prior())
-    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    found = InferenceResult(
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+    )
     verdict = decide(beliefs, library)
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return found, verdict
@@ -193,7 +195,9 @@ def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
     beliefs = explore(evidence, Prior())
-    found = Attribution(case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best())
+    found = InferenceResult(
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+    )
     rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
     verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
     advice = advise(found, verdict, arms.MASSES)

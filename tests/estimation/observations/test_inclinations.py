@@ -11,7 +11,7 @@ from rrru.estimation.observations.target_positions import TargetPositions
 from rrru.estimation.parameters import Block, Parameters
 from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
-from rrru.kinematics.base_parameters import Reads
+from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.readings import orientation
 from tests.kinematics.test_general_model import GENERAL, _about_home, _clear
 
@@ -22,7 +22,7 @@ _TILT = np.array([0.012, -0.007])
 def _robot(name, **reads):
     """A robot as read, actuator values (n, K) and positions (n, 3)."""
     robot, points, actuators = _about_home(GENERAL[name]) if name in GENERAL else _clear(name)
-    robot = robot.reading(Reads(**reads)).seen_at(actuators, points)
+    robot = robot.reading(MeasurementConfig(**reads)).seen_at(actuators, points)
     return robot, actuators, points
 
 

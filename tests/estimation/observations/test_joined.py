@@ -8,7 +8,7 @@ from rrru.estimation.problem import Problem, WhiteNoise
 from rrru.estimation.solver import solve
 
 
-class Linear:
+class LinearizedProblem:
     """Readings y = A x (n, a)."""
 
     def __init__(self, matrix, read):
@@ -27,8 +27,8 @@ def _parts(generator):
     """Two kinds, of three values and of the last two of them, with noises of 0.5 and 2, and their dense stack."""
     first, second = generator.normal(size=(4, 3, 3)), generator.normal(size=(5, 1, 2))
     parts = (
-        Part(Linear(first, generator.normal(size=(4, 3))), WhiteNoise(0.5)),
-        Part(Linear(second, generator.normal(size=(5, 1))), WhiteNoise(2.0), slice(1, 3)),
+        Part(LinearizedProblem(first, generator.normal(size=(4, 3))), WhiteNoise(0.5)),
+        Part(LinearizedProblem(second, generator.normal(size=(5, 1))), WhiteNoise(2.0), slice(1, 3)),
     )
     dense = np.concatenate([first.reshape(12, 3) / 0.5, np.pad(second.reshape(5, 2), ((0, 0), (1, 0))) / 2.0])
     read = np.concatenate([part.observations._read.ravel() / part.whiten.sd for part in parts])

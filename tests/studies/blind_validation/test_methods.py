@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from rrru.diagnosis.diagnose import MeasuredRobot
 from rrru.diagnosis.settings import GapSettings
-from rrru.diagnosis.terms import Term
+from rrru.diagnosis.terms import EffectTerm
 from rrru.studies.blind_validation import draw, rivals
 from rrru.studies.blind_validation.beliefs import beliefs
 from rrru.studies.blind_validation.chunks import chunks, rivalled
@@ -47,7 +47,7 @@ def _said(campaign, effects, size=8.0):
     generator = np.random.default_rng(1)
     data = generator.standard_normal(len(campaign.data)) + campaign.base @ generator.standard_normal(7)
     for name in effects:
-        columns = campaign.columns[Term(name)]
+        columns = campaign.columns[EffectTerm(name)]
         typical = campaign.case.library[name].coordinates.typical
         part = columns @ (typical * generator.uniform(1.0, 2.0, len(typical)))
         data = data + size * part / np.sqrt((part**2).mean())
@@ -88,7 +88,7 @@ def test_the_spike_and_slab_is_the_sum_over_all_states(campaign, monkeypatch):
     """Of three effects in one shape on all legs with two sizes of their coefficients, by explicit covariances."""
     slabs = np.array([2.0, 8.0])
     monkeypatch.setattr(rivals, "_SLABS", slabs)
-    few = replace(campaign, columns={term: campaign.columns[term] for term in map(Term, _SETTINGS.effects)})
+    few = replace(campaign, columns={term: campaign.columns[term] for term in map(EffectTerm, _SETTINGS.effects)})
     made = _said(few, ["axis_tilt"], 0.12)
     left = null_space(made.base.T).T
     weights = {}

@@ -163,10 +163,10 @@ def test_the_diagnosis_names_compliance_and_foretells_the_held_out_rows(torso):
     # the evidence of correlated non-negative coefficients gives 0.11, a product of independent ones gave 0.04
     assert sure[_CROSS] < 0.2 and _CROSS not in found.verdict["effects"]
     assert {_SPRINGS, _BENDING} <= set(found.verdict["effects"].split("+"))
-    case = found.attribution.case
+    case = found.inference.case
     test = make_case(torso.of(1), case.mechanism, _NO_LOADS, case.noise_mm, case.library)
     before, after = (
-        np.sqrt((test.left(state) ** 2).sum(axis=1).mean()) for state in (found.attribution.calibrated, found.state)
+        np.sqrt((test.left(state) ** 2).sum(axis=1).mean()) for state in (found.inference.calibrated, found.state)
     )
     assert np.linalg.norm(test.left(found.state), axis=1).mean() <= 3.0
     shrink = found.tables["gap_shrink"].query("kind == 'held_out' and trajectory == '*'")["rms_mm"].to_numpy()

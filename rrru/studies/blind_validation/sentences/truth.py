@@ -82,8 +82,8 @@ class Truth:
 
 def truth_of(draw, run, folder, gap):
     """The Truth of a Draw whose Run was made in a folder; gap: the GapSettings."""
-    attribution = run.diagnosis.attribution
-    case, fresh = attribution.case, np.repeat(draw.stops.fresh, len(draw.targets))
+    inference = run.diagnosis.inference
+    case, fresh = inference.case, np.repeat(draw.stops.fresh, len(draw.targets))
     poses, still = draw.poses(), draw.poses(cause=False) if draw.cause else None
     exact = _as_read(draw, run, draw.readings(poses), folder)
     library = gap.library(case.mechanism)
@@ -91,8 +91,8 @@ def truth_of(draw, run, folder, gap):
     whole = make_case(exact, case.mechanism, run.masses, run.noise_mm, library, True, case.arm_mm)
     whole = replace(whole, library=whole.library | case.library)
     count = len(exact)
-    before = whole.left(State(attribution.calibrated.deviations, {}))[:count]
-    after = whole.standing(attribution.state).left(attribution.state)[:count]
+    before = whole.left(State(inference.calibrated.deviations, {}))[:count]
+    after = whole.standing(inference.state).left(inference.state)[:count]
     free = exact if still is None else _as_read(draw, run, draw.readings(still), folder)
     geometry, without = _calibrated(free[~fresh], run)
     _, left = _calibrated(exact[~fresh], run) if still is not None else (None, np.zeros((int((~fresh).sum()), 3)))
@@ -176,7 +176,7 @@ def _seat(draw, own, rotation):
 
 def _calibrated(exact, run):
     """Deviations (p,) of a plain calibration of exact readings, and what it leaves (n, 3) of the positions."""
-    case = run.diagnosis.attribution.case
+    case = run.diagnosis.inference.case
     own = make_case(exact.reset_index(drop=True), case.mechanism, run.masses, run.noise_mm, {}, True, case.arm_mm)
     state = calibrate(own)
     return np.asarray(state.deviations), own.left(state)[: len(exact)]
