@@ -68,13 +68,18 @@ class InferenceResult:
 
 
 def with_arm(case, noise_mm=None, noise_rad=None):
-    """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated."""
+    """The case with orientations at the arm that gives them the positions' noise; what is not given is estimated.
+
+    What no effect of the library makes passes for noise in an estimate of poses in no order, in positions as in
+    orientations. The arm is therefore the ratio of two estimates, or of two given numbers.
+    """
     if not (noise_mm and noise_rad):
         linear, columns = _few(case, calibrate(case))
         both = (case.positions, ~case.positions)
         found, turned = (high_frequency_noise(linear.data, columns, case.series, chosen) for chosen in both)
-        noise_mm = noise_mm or noise.quieter_repeats(case.measurements[case.used], found) or found
-        noise_rad = noise_rad or turned / case.arm_mm
+        if noise_rad:
+            found = noise_mm or noise.quieter_repeats(case.measurements[case.used], found) or found
+        noise_mm, noise_rad = found, noise_rad or turned / case.arm_mm
     return replace(case, arm_mm=noise_mm / noise_rad)
 
 
@@ -153,12 +158,12 @@ def _best_shapes(linear, blocks):
 def _few(case, calibrated):
     """The linearisation about a calibration, and the columns (m, 3, k) of all but laws of many coefficients.
 
-    Too few points to fit everything: what the calibration leaves has to do.
+    Where these would leave less than a third of the numbers free, the calibration's columns alone.
     """
     few = {name: effect for name, effect in case.library.items() if not effect.coordinates.broad}
     linear = replace(case, library=few).linearise(calibrated)
     columns = np.concatenate([linear.base, *linear.columns.values()], axis=-1)
-    return linear, (columns if columns.shape[-1] <= len(case) else linear.base)
+    return linear, (columns if columns.shape[-1] <= 2 * len(case) else linear.base)
 
 
 def infer(case, prior, stated=KNOWN):

@@ -245,6 +245,13 @@ CAUSES = {
         "both ends, or measure the slide's way by a scale.",
         f"{_THERMAL}; Mayr et al., CIRP Annals 61, 2012; {_SLOCUM}",
     ),
+    "lead_error": Cause(
+        "a screw, rack or belt moves its slide by a constant share more or less than commanded",
+        "Compare the slide's way over its whole stroke with a scale or a laser interferometer. Look up the lead or the "
+        "steps per millimetre in the controller. Look for a belt of another pitch or tension.",
+        "Multiply the lead in the controller by 1 + the share found, or divide the steps per millimetre by it.",
+        "ISO 230-2; ISO 3408-3 (travel deviation of ball screws)",
+    ),
     "bar_mismatch": Cause(
         "the two bars of one arm differ in length",
         "Measure all bars between their ball centres on one fixture with two pins.",

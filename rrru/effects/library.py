@@ -19,7 +19,7 @@ from rrru.plugins import load_object
 _ORDER = (
     *("backlash", "drive_compliance", "link_flexure", "joint_clearance", "leg_asymmetry", "axis_tilt", "rail_tilt"),
     *("base_placement", "frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth"),
-    *("screw_growth", "servo_lag", "bar_mismatch", "tool_offset", "joint_axis_error", "cross_compliance"),
+    *("lead_error", "screw_growth", "servo_lag", "bar_mismatch", "tool_offset", "joint_axis_error", "cross_compliance"),
 )
 # a user's effect that names no typical sizes gets this share of its bounds' width
 _TYPICAL_SHARE = 0.1

@@ -59,7 +59,7 @@ def _values(effect, share=1.0, shape=-1):
 def test_robots_with_sliders_have_rails_instead_of_axes():
     turning, sliding = Rrru3(), Ptt3()
     rails, axes = set(library(sliding)), set(library(turning))
-    assert rails - axes == {"rail_tilt", "bar_mismatch", "screw_growth"}
+    assert rails - axes == {"rail_tilt", "bar_mismatch", "screw_growth", "lead_error"}
     of_encoders = {"encoder_eccentricity", "encoder_ovality", "transmission_orders"}
     assert axes - rails == {"axis_tilt", "joint_axis_error"} | of_encoders
     assert find("backlash", sliding).parameters["width1"].unit == "mm"

@@ -1,0 +1,41 @@
+"""Lead error: a screw, rack or belt moves its slide by a constant share more or less than commanded.
+
+A drive that counts revolutions multiplies them by the nominal lead, or by a number of steps per millimetre. With a true
+lead of (1 + s_k) times that, the slide of drive k stands at (1 + s_k) q_k, so that
+
+    dq_k = s_k q_k
+
+It enters at the drive's value. The constant part is the zero offset of the drive, which the calibration finds. It is
+linear, does not depend on time, load or direction, and repeats exactly.
+
+Assumptions: one share over the whole stroke (what bends is `drive_error_function`); the share does not change with
+temperature (`screw_growth`).
+
+Source: ISO 230-2, mean bidirectional positional deviation; ISO 3408-3, travel deviation of ball screws: 23 um per
+300 mm in grade 5, 52 in grade 7 and 210 in grade 10, which are 8e-5, 1.7e-4 and 7e-4.
+"""
+
+import numpy as np
+
+from rrru.effects.harmonic import drives_of
+from rrru.effects.protocol import Effect, leg_parameters, plain_coordinates
+from rrru.parameters import ParameterSet
+
+_TYPICAL, _MOST, _SOURCE = 2e-4, 1e-2, "ISO 3408-3, grades 5 to 10: 8e-5 to 7e-4"
+
+
+def for_robot(robot):
+    """The effect of all drives that slide, None where none does."""
+    sliding = drives_of(robot, "mm")
+    if not len(sliding):
+        return None
+    every = leg_parameters(_SOURCE, ("lead_error", "1", -_MOST, _MOST), count=int(sliding.max()) + 1)
+    parameters = ParameterSet(tuple(parameter for parameter in every if parameter.leg - 1 in sliding))
+
+    def scaled(motion, values):
+        """Changes of the actuator values under shares (k,) of the slides."""
+        change = np.zeros(motion.drive.shape)
+        change[:, sliding] = values * motion.drive[:, sliding]
+        return motion.at_drives(change)
+
+    return Effect("lead_error", parameters, plain_coordinates(parameters, _TYPICAL), scaled, of_drive_value=True)
