@@ -176,24 +176,26 @@ def draw(member, conditions):
     """The robot of a Member, see `rrru.studies.blind_validation.chunks`, and its measurements.
 
     A fault that the plant cannot drive, because a pose is lost or nothing comes to rest, or that nobody's robot has, is
-    drawn again, and with it the trajectories; raises the last of these errors where none can be driven.
+    drawn again, and with it the trajectories; where none of its kind can be driven it is one of the next kind. Raises
+    the last of these errors where there is no such kind.
     """
     generator = stream(conditions.seed, "withheld", "files", conditions.name, member.number)
     offsets = [OFFSET_SD[unit] * generator.standard_normal() for unit in conditions.mechanism.parts.units]
     trajectories = draw_trajectories(generator, conditions)
     robot = FileRobot(member.name, member.file, member.check, trajectories, tuple(offsets))
     kinds = kinds_of(conditions.model, conditions.mechanism)
-    kind = kinds[member.number % len(kinds)]
-    if kind == NONE:
-        return robot, robot.measured(conditions)
-    for _ in range(DRAWS):
-        fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
-        strength = float(np.exp(generator.uniform(*np.log([WEAKEST, STRONGEST]))))
-        try:
-            return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
-        except (SimulationError, UnreachableError) as error:
-            failed = error
-        robot = replace(robot, trajectories=draw_trajectories(generator, conditions))
+    for step in range(len(kinds)):
+        kind = kinds[(member.number + step) % len(kinds)]
+        if kind == NONE:
+            return robot, robot.measured(conditions)
+        for _ in range(DRAWS):
+            fault = draw_fault(kind, conditions.model, conditions.mechanism, generator)
+            strength = float(np.exp(generator.uniform(*np.log([WEAKEST, STRONGEST]))))
+            try:
+                return as_driven(replace(robot, acting=(sized(robot, fault, strength, conditions),)), conditions)
+            except (SimulationError, UnreachableError) as error:
+                failed = error
+            robot = replace(robot, trajectories=draw_trajectories(generator, conditions))
     raise failed
 
 
