@@ -18,7 +18,7 @@ def zero_notes(estimate, robot):
     degrees (95 %: 1.98 to 2.02)".
 
     estimate: of the robot's geometric errors. A zero that is one number with a frame, or with the place of what is
-    read, is off together with that, and one whose variance comes from the priors is not determined.
+    read, has a size only where its drive slides, and one whose variance comes from the priors is not determined.
     """
     block, names = estimate.parameters.places[GEOMETRY], robot.parameters.names
     known = dict(zip(names, range(block.start, block.stop), strict=True))
@@ -34,7 +34,11 @@ def zero_notes(estimate, robot):
         size = _sized(scale * value, scale * estimate.intervals[number], unit)
         if others := _one_with(robot, name, LARGE[drive.unit]):
             both = f"{drive.site}: zero and {others} are not separately identifiable"
-            yield f"{both}, combined they equal a zero offset of {size}"
+            if drive.unit == "rad":
+                # a shift of a frame or of a target across the axis does what a turn does: no number is the zero's alone
+                yield f"{both}; the fitted model holds at what was read, not at other points of the platform"
+            else:
+                yield f"{both}, combined they equal a zero offset of {size}"
         elif estimate.prior_shares[number] > OPTIONS.max_prior_variance_share:
             yield f"{drive.site}: zero is not determined by the readings, its most probable offset is {size}"
         else:

@@ -220,8 +220,8 @@ def _causes(facts):
         small = facts["gap_rms_mm"] <= facts["noise_rms_mm"]
         why = "The gap is too small relative to the noise" if small else "The effects are confounded with each other"
         said.append(f"{why}: their shares of the gap cannot be determined.")
-    elif sum(effect["share"] or 0.0 for effect in facts["effects"]) > 1.0 + OPTIONS.min_mentioned_share:
-        said.append("These shares overlap, since the effects imitate each other in part.")
+    elif _overlap(facts):
+        said.append("These shares overlap: parts of the effects are correlated at these points.")
     if facts["unexplained"]:
         share = share_with_interval(next(part for part in facts["budget"] if part["kind"] == "unexplained"))
         if said:
@@ -387,13 +387,21 @@ def _open(facts):
     return [f"{first}: {', '.join(listed)}."]
 
 
+def _overlap(facts):
+    """Whether shares of several effects add up to more than the whole by more than is mentioned."""
+    shares = [effect["share"] or 0.0 for effect in facts["effects"]]
+    return len(shares) > 1 and sum(shares) > 1.0 + OPTIONS.min_mentioned_share
+
+
 def _next(facts):
     """What to measure next, and what would decide where nothing that can be simulated does."""
     said = [_undecidable(facts)] if facts["undecided"] else []
     if facts["next"]:
         best = facts["next"][0]
         what = f"measure {best['run']} (see gap_next_poses)" if best["kind"] == "poses" else f"drive {best['run']}"
-        return [*said, f"Next: {what}. That decides {_contest(best['separates'])}."]
+        sure = best["gain_nats"] >= OPTIONS.decisive_gain_nats
+        verb = "decides" if sure else "would help to decide"
+        return [*said, f"Next: {what}. That {verb} {_contest(best['separates'])}."]
     if said:
         return said
     if facts["unexplained"]:

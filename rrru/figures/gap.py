@@ -64,7 +64,8 @@ def gap(tables, options):
 @style.printed
 def gap_map(tables, options):
     """Where the robot misses: measured minus calibrated sim at the points, from above and from the side. An arrow
-    points to where the robot really was, magnified as stated; dark is far. The ring is the worst spot.
+    points to where the robot really was, magnified as stated; dark is far. The ring is where the mean over neighbouring
+    points is largest.
     """
     campaign = options["campaign"]
     verdict = choose.of_campaign(tables, "gap_verdicts", campaign, "gap_map").iloc[0]
@@ -84,7 +85,7 @@ def _map(figure, panels, used, verdict, z_down, mark=""):
     """Both views of the gap with the scale of their arrows."""
     worst = verdict[[f"worst_{axis}_mm" for axis in "xyz"]].to_numpy(dtype=float)
     arrows, beyond, factor = gap_arrows.draw(panels, used, worst, z_down)
-    panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst spot")
+    panels["top view"].set_title(f"{mark}gap, magnified {factor:g} times; ring: worst region")
     place = {"location": "bottom", "aspect": 40, "fraction": 0.08, "extend": "max" if beyond else "neither"}
     bar = figure.colorbar(arrows, ax=panels["side view"], ticks=MaxNLocator(_TICKS), **place)
     bar.set_label("measured minus calibrated sim (mm)")
@@ -131,7 +132,7 @@ def _headline(verdict, causes, words):
     sure = _probability(alone.iloc[0] if len(alone) else verdict["probability"], "= ", " ")
     first = f"{name} (p {sure}): {style.number(verdict['gap_rms_mm'])} mm gap, {closed}"
     place = ", ".join(f"{axis} {verdict[f'worst_{axis}_mm']:.0f}" for axis in "xyz").replace("-", "\N{MINUS SIGN}")
-    facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst spot {place} mm"]
+    facts = [f"noise {style.number(verdict['noise_rms_mm'])} mm", f"worst region {place} mm"]
     facts += [f"{verdict['dropped_points']} outliers left out"] if verdict["dropped_points"] else []
     grouped = causes.loc[causes["decision"] == "group", "effect"].tolist()
     others = [one for one in verdict["confusable_with"].split(", ") if one and one not in grouped]

@@ -95,6 +95,8 @@ def _write_bodies(document, changed, nominal):
 
 def _told(error):
     """Standard errors (6,) of a placement in words."""
+    if not error.any():
+        return "with frame and tool, whose errors it has"
     return f"pos +- {sizes(error[:3] / MM)} m, turn about own axes +- {sizes(error[3:])} rad"
 
 

@@ -64,6 +64,8 @@ def _numbers(structure, found, twists):
 
 def _told(error):
     """Standard errors (6,) of a placement in words."""
+    if not error.any():
+        return "with frame and tool, whose errors it has"
     return f"xyz +- {sizes(error[:3] / MM)} m, turn about own axes +- {sizes(error[3:])} rad"
 
 

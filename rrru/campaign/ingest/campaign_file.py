@@ -65,7 +65,8 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         sheet = replace(sheet, frame=sheet.frame.assign(**moved))
         check_measured(at_tool(sheet, mounted), lambda: "rows that belong to each other")
         sheet.problems.refuse()
-        residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most"
+        zeros = ", with the zeros of the drives that were found" if mounted and mounted.zeros_lost else ""
+        residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most{zeros}"
         notes += [
             f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
             "rigid motion that is left is fitted with the calibration"

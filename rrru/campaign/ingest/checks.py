@@ -8,6 +8,8 @@ from rrru.campaign.ingest.sheet import COMMAND, MEASURED
 _LEAST_POINTS = 3
 # stale readings that are left out make at most this share of a file; more are no mishap of an instrument
 _MOST_STALE = 0.1
+# what a point is known by
+_POINT = {"run", "trajectory", "point"}
 # A file that prints coarser than this gives the same position twice by chance.
 _COARSE_MM = 0.005
 
@@ -20,10 +22,10 @@ def number_runs(frame, at_rest=False):
     the run. Stops follow no path that could turn back.
     """
     frame, notes = frame.copy(), []
-    if "target" in frame and "point" in frame:
-        # several reflectors may be read at one point
+    several = "target" in frame and "point" in frame and frame.duplicated([*_POINT.intersection(frame)]).any()
+    if several:
         frame = frame.drop(columns="point")
-        notes.append("points numbered anew, a row each: several reflectors may be read at one")
+        notes.append("points numbered anew, a row each: several reflectors are read at one")
     numbered = "point" in frame
     if "run" not in frame:
         change = (frame["trajectory"] != frame["trajectory"].shift()).to_numpy()
@@ -40,7 +42,8 @@ def number_runs(frame, at_rest=False):
         notes.append(f"no column run: a new run wherever {where}, {int(frame['run'].max())} runs")
     if not numbered:
         frame["point"] = frame.groupby("run").cumcount().astype(float) + 1.0
-        notes.append("no column point: counted within the run")
+        if not several:
+            notes.append("no column point: counted within the run")
     return frame, notes
 
 

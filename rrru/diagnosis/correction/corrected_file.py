@@ -97,6 +97,17 @@ def fitted_in_file(inference, section):
     return replace(inference, case=case, fit=fit)
 
 
+def _with_misfit(inference, spread):
+    """Errors (q, 6) by site of numbers that are fitted without effects that act: as large as what is left asks for.
+
+    Noise alone would make them by the ratio of what the fit leaves to the noise too small (Birge's ratio).
+    """
+    case = inference.case
+    left = case.residual(inference.state)[case.positions]
+    ratio = max(float(np.sqrt(np.nanmean(left**2))) / case.noise_mm, 1.0)
+    return {site: ratio * errors for site, errors in spread.items()}
+
+
 def _of_drives(numbers, effect, stem, count):
     """(value, standard error) of an effect's parameter of every drive by its number from 0 on."""
     own = numbers[numbers["effect"] == effect].set_index("parameter")
@@ -128,7 +139,10 @@ def corrected(inference, section, folder):
     if "urdf" in section:
         lacking += [name for name in effects if name in (_COMPLIANCE[0], _PLAY[0])]
     held = tuple(name for name in effects if name not in lacking)
-    found, _ = found_of(fitted_in_file(with_effects(inference, held) if lacking else inference, section), reflectors)
+    fitted = fitted_in_file(with_effects(inference, held) if lacking else inference, section)
+    found, _ = found_of(fitted, reflectors)
+    if lacking:
+        found = replace(found, spread=_with_misfit(fitted, found.spread))
     if inference.posterior.probability_unexplained > OPTIONS.min_unexplained_probability:
         others.append("unexplained")
     others += weight_notes(inference)

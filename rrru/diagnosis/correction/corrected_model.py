@@ -81,7 +81,8 @@ def _remainder(shrink, more, written, error):
     left, whole = _left_mm(more, "corrected_model"), _left_mm(shrink, "held_out")
     if written.lacking:
         names = ", ".join(map(readable, written.lacking))
-        return f"this {_holds(written)} and not {names}: {error.fresh_mm:.2g} mm rms remain; use corrected_drives"
+        left_mm = np.nanmax([error.measured_mm, error.fresh_mm])
+        return f"this {_holds(written)} and not {names}: {left_mm:.2g} mm rms remain; use corrected_drives"
     if not left > OPTIONS.max_file_remainder_ratio * whole:
         return ""
     return f"this file leaves {left:.2g} mm rms at the readings, the diagnosis {whole:.2g} mm; use corrected_drives"

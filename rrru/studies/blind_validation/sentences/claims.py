@@ -60,7 +60,8 @@ _SENTENCES = {
     "it is random error": rf"(?:{_SHARE}|Some of it) is random error above the stated noise.*",
     "what is left with it": rf"Add (?:it|them) to the simulator and {_X} mm is left on runs .*; the noise is {_Y} mm\.",
     "these data cannot rule out": r"(?:These data cannot rule out|Parts of it could be): (?P<names>.*)\.",
-    "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That decides (?P<contest>.*)\.",
+    "next, a run": r"Next: (?:drive|measure) (?P<run>.*)\. That (?:decides|would help to decide) "
+    r"(?P<contest>.*)\.",
     "next, none is advised": r"Next: no run is advised.*",
     "next, nothing more": r"Next: nothing more needs to be measured for this answer\.",
     "next, nothing would decide": r"Next: nothing that can be simulated(?: within the limits)? would decide "
