@@ -92,6 +92,22 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         assert words in said
 
 
+@pytest.mark.parametrize(("nats", "verb"), [(14.0, "decides"), (1.8, "would help to decide")])
+def test_a_run_decides_only_where_enough_is_expected_of_it(nats, verb):
+    said = answered(runs=((*RUN[:-1], nats),))["sentences"][-1]
+    assert said == f"Next: drive line_1 in reverse. That {verb} whether servo lag acts."
+
+
+@pytest.mark.parametrize(("shares", "overlap"), [((1.2, 0.1), True), ((0.6, 0.2), False), ((1.2, None), False)])
+def test_shares_overlap_only_where_there_are_several(shares, overlap):
+    budget = synthetic_gap.gap_budget(CAMPAIGN)
+    for name, share in zip(("link_flexure", "backlash"), shares, strict=True):
+        budget.loc[budget["part"] == name, "share"] = share or 0.0
+    effects = "link_flexure+backlash" if shares[1] else "link_flexure"
+    said = " ".join(answered(budget=budget, effects=effects)["sentences"])
+    assert ("These shares overlap" in said) == overlap
+
+
 def test_confounded_causes_are_one_sentence_with_their_probabilities():
     causes = synthetic_gap.gap_attribute(CAMPAIGN)
     grouped = causes["effect"].isin(["link_flexure", "servo_lag"])

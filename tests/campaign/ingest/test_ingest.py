@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from rrru.campaign.ingest.campaign_file import IngestSpec, ingest
+from rrru.campaign.ingest.checks import number_runs
 from rrru.errors import ConfigError, IngestError
 from rrru.robots.delta import Delta
 from rrru.robots.ptt3 import Ptt3
@@ -287,3 +288,13 @@ def test_a_damaged_file_is_taken_or_refused_but_never_breaks(data, tmp_path):
         check("measurements", ingest(IngestSpec(str(tmp_path / "f.csv")), ROBOT).measurements)
     except IngestError as error:
         assert all(set(problem) == {"file", "row", "column", "value", "allowed"} for problem in error.problems)
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_points_of_a_file_are_numbered_anew_only_where_several_reflectors_are_read_at_one(several):
+    frame = pd.DataFrame({"trajectory": "a", "run": 1.0, "point": [1.0, 2.0, 3.0, 4.0], "target": "ball"})
+    if several:
+        frame["point"] = [1.0, 1.0, 2.0, 2.0]
+    numbered, notes = number_runs(frame)
+    assert numbered["point"].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert notes == (["points numbered anew, a row each: several reflectors are read at one"] if several else [])

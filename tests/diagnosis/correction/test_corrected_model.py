@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
@@ -314,3 +315,17 @@ def test_the_stated_error_of_a_corrected_file_is_that_from_the_true_robot(name, 
 def _left(found, kind):
     """Root mean square residual in mm of a file."""
     return found.tables["gap_shrink"].query("kind == @kind")["rms_mm"].iloc[-1]
+
+
+def test_errors_of_numbers_that_are_fitted_without_effects_hold_what_is_left(arm):
+    """Noise alone would state them as many times too small as what the file leaves is larger than the noise."""
+    inference, section = arm.found.inference, _SECTIONS["arm"]
+    with_all = corrected_file.found_of(inference)[0]
+    written = corrected_file.corrected(inference, section, Path(section["urdf"]).parent)
+    ratio = _rows(arm, "corrected_model")["rms_mm"] / (np.sqrt(3.0) * inference.case.noise_mm)
+    sizes = [
+        np.sqrt(np.median([np.square(found.spread[site]).sum(axis=0).max() for site in with_all.spread]))
+        for found in (with_all, written.found)
+    ]
+    assert written.lacking and ratio > 3.0
+    assert sizes[1] / sizes[0] == pytest.approx(ratio, rel=0.5)
