@@ -100,11 +100,11 @@ def fitted_in_file(inference, section):
 def _with_misfit(inference, spread):
     """Errors (q, 6) by site of numbers that are fitted without effects that act: as large as what is left asks for.
 
-    Noise alone would make them by the ratio of what the fit leaves to the noise too small (Birge's ratio).
+    They are too small by the ratio of what the fit leaves to the noise and discrepancy that it assumes (R. Birge,
+    Physical Review 40, 1932).
     """
-    case = inference.case
-    left = case.residual(inference.state)[case.positions]
-    ratio = max(float(np.sqrt(np.nanmean(left**2))) / case.noise_mm, 1.0)
+    left = inference.fit.estimate.standardized_residual
+    ratio = max(float(np.sqrt((left**2).mean())), 1.0)
     return {site: ratio * errors for site, errors in spread.items()}
 
 

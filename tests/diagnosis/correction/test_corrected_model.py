@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
@@ -17,6 +16,8 @@ from rrru.diagnosis.correction.corrected_file import corrected
 from rrru.diagnosis.correction.corrected_model import write_corrected
 from rrru.diagnosis.correction.drive_table import at_rest
 from rrru.diagnosis.diagnose import MeasuredRobot, diagnose
+from rrru.diagnosis.inference import with_effects
+from rrru.diagnosis.model_fit import fit_model
 from rrru.diagnosis.schemas import tables_of
 from rrru.diagnosis.settings import GapSettings
 from rrru.effects.library import active_effects
@@ -318,14 +319,14 @@ def _left(found, kind):
 
 
 def test_errors_of_numbers_that_are_fitted_without_effects_hold_what_is_left(arm):
-    """Noise alone would state them as many times too small as what the file leaves is larger than the noise."""
-    inference, section = arm.found.inference, _SECTIONS["arm"]
-    with_all = corrected_file.found_of(inference)[0]
-    written = corrected_file.corrected(inference, section, Path(section["urdf"]).parent)
-    ratio = _rows(arm, "corrected_model")["rms_mm"] / (np.sqrt(3.0) * inference.case.noise_mm)
-    sizes = [
-        np.sqrt(np.median([np.square(found.spread[site]).sum(axis=0).max() for site in with_all.spread]))
-        for found in (with_all, written.found)
-    ]
-    assert written.lacking and ratio > 3.0
-    assert sizes[1] / sizes[0] == pytest.approx(ratio, rel=0.5)
+    """What a fit under white noise leaves is larger than the noise by a ratio, and so are the errors."""
+    fitted = with_effects(arm.found.inference, ())
+    white = replace(fitted, fit=fit_model(fitted.case, [fitted.calibrated]))
+    left = white.case.residual(white.state)[white.case.positions]
+    ratio = np.sqrt((left**2).mean()) / white.case.noise_mm
+    stated = corrected_file.found_of(white)[0].spread
+    errors = corrected_file._with_misfit(white, stated)
+    assert ratio > 3.0
+    for site, steps in stated.items():
+        np.testing.assert_allclose(errors[site], errors[site].max() / steps.max() * steps, rtol=1e-9)
+        assert errors[site].max() / steps.max() == pytest.approx(ratio, rel=0.3)
