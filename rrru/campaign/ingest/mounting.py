@@ -14,6 +14,7 @@ from rrru.campaign.ingest.bodies import strays
 from rrru.campaign.ingest.frames import Frames
 from rrru.campaign.ingest.gross_advice import place_words
 from rrru.campaign.ingest.mastering import LARGE, lost_zeros
+from rrru.campaign.ingest.orientations import other_readings
 from rrru.campaign.ingest.sheet import MEASURED, TURNS, position_text
 from rrru.campaign.target_registration import axes_by_turning
 from rrru.kinematics.readings import Readings
@@ -30,6 +31,10 @@ _ALONG = 0.9999
 _TELLING = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
 _MOST_TURNED_RAD = 0.2
+# ASSUME no robot's platform turns so much otherwise than its nominal model, about 6 degrees in the median
+_MOST_SCATTERED_RAD = 0.1
+# another reading of the orientations is the right one where it leaves less than this share
+_FAR_LESS = 0.2
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,7 @@ def mounting(sheet):
     turn, notes = np.eye(3), notes + (_found(sheet, frames, place, _precision(frames, poses, left_mm)) if named else ())
     if turned:
         turn = _between(poses, rows.turns(frame, "measured"), rotation)
+        _refuse_scattered(sheet, poses, rotation)
         if registered:
             vector = Rotation.from_matrix(turn).as_rotvec()
             notes += (f"orientations are read turned by {np.linalg.norm(vector):.4g} rad from the platform's",)
@@ -182,7 +188,39 @@ def _in_words(sheet, zeros, left_mm):
 def check_turned(sheet):
     """Note orientations in another frame than the robot's, in a sheet that has some and no Mounting."""
     if set(TURNS["measured"]) <= set(sheet.frame):
+        _refuse_scattered(sheet, sheet.poses, np.eye(3))
         _check_turned(sheet, _between(sheet.poses, rows.turns(sheet.frame, "measured"), np.eye(3)))
+
+
+def _refuse_scattered(sheet, poses, rotation):
+    """Raise IngestError where orientations turn otherwise than the platform does, with what reconciles them if known.
+
+    poses: the robot's; rotation (3, 3): from the instrument's frame to the robot's, by the positions.
+    """
+    turns = rows.turns(sheet.frame, "measured")
+    scatter = _scatter(poses, turns, rotation)
+    if not scatter > _MOST_SCATTERED_RAD:
+        return
+    known = np.isfinite(turns).all(axis=(1, 2))
+    others = {}
+    for what, read in other_readings(turns[known], sheet.found).items():
+        made = np.full(turns.shape, np.nan)
+        made[known] = read
+        others[what] = _scatter(poses, made, rotation)
+    best = min(others, key=others.get)
+    value = f"orientations that differ by {scatter:.3g} rad in the median from a fixed turn against the platform's"
+    allowed = f"at most {_MOST_SCATTERED_RAD:g} rad"
+    if others[best] < _FAR_LESS * scatter:
+        allowed += f"; {best} leaves {others[best]:.2g} rad"
+    sheet.refuse_now(TURNS["measured"], value, allowed)
+
+
+def _scatter(poses, turns, rotation):
+    """Median angle between orientations (n, 3, 3) that are read and the platform's, after the best fixed turn."""
+    known = np.isfinite(turns).all(axis=(1, 2)) & poses.closed
+    off = poses.turn[known].transpose(0, 2, 1) @ rotation @ turns[known]
+    mean = Rotation.from_matrix(off).mean()
+    return float(np.median((Rotation.from_matrix(off) * mean.inv()).magnitude()))
 
 
 def _check_turned(sheet, turn):

@@ -44,6 +44,25 @@ def _from_quaternions(frame, columns, quaternion, found, problems):
     return frame.drop(columns=[*quaternion]).assign(**dict(zip(columns, vectors.T, strict=True)))
 
 
+def other_readings(turns, found):
+    """What orientations (n, 3, 3) may be instead, (n, 3, 3), by what to write or to mend.
+
+    found: the file's column by ours, where orientations came as quaternions with those of their parts.
+    """
+    from scipy.spatial.transform import Rotation
+
+    made = Rotation.from_matrix(turns)
+    result = {"the orientation of what is measured in the instrument's frame, not its inverse": made.inv()}
+    names = QUATERNIONS["measured"]
+    if set(names) <= set(found):
+        x, y, z, w = (found[name] for name in names)
+        # the file's first column is the scalar part, the last one its z
+        first = dict(zip(names, (y, z, w, x), strict=True))
+        listed = ", ".join(f"{ours}: {theirs}" for ours, theirs in first.items())
+        result[f"columns: {{{listed}}}"] = Rotation.from_quat(made.as_quat()[:, [1, 2, 3, 0]])
+    return {key: rotation.as_matrix() for key, rotation in result.items()}
+
+
 def _note(problems, frame, i, columns, value, allowed):
     """Note what is wrong with the orientation of row i."""
     problems.add("orientation", row=frame.index[i], column=", ".join(columns), value=value, allowed=allowed)

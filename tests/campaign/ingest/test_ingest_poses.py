@@ -171,6 +171,39 @@ def test_a_rotation_vector_says_the_same_as_a_quaternion(arm, driven, tmp_path):
     pd.testing.assert_frame_equal(one, two, rtol=0.0, atol=1e-9)
 
 
+def _scalar_first(table):
+    return table.rename(
+        columns=dict(zip(_QUATERNION, ["measured_qy", "measured_qz", "measured_qw", "measured_qx"], strict=True))
+    )
+
+
+def _inverse(table):
+    return table.assign(measured_qw=-table["measured_qw"])
+
+
+def _halved(table):
+    vector = 0.5 * Rotation.from_quat(table[_QUATERNION].to_numpy()).as_rotvec()
+    return table.drop(columns=_QUATERNION).assign(**{f"measured_r{x}_rad": vector[:, k] for k, x in enumerate("xyz")})
+
+
+@pytest.mark.parametrize("registered", [True, False])
+@pytest.mark.parametrize(
+    ("change", "advice"),
+    [
+        (_scalar_first, r"columns: \{measured_qx: measured_qy, measured_qy: measured_qz, measured_qz: measured_qw"),
+        (_inverse, "not its inverse leaves"),
+        (_halved, "at most 0.1 rad$"),
+    ],
+)
+def test_orientations_that_turn_otherwise_than_the_platform_are_refused(
+    arm, driven, tmp_path, change, advice, registered
+):
+    """A noise of some degrees was found in their place, and a cause was named with 0.99."""
+    table, options = change(_file(arm, driven, registered=registered)), {} if registered else {"targets": {}}
+    with pytest.raises(IngestError, match=f"in the median from a fixed turn.*{advice}"):
+        _taken(tmp_path, table, arm, frame="register" if registered else "robot", **options)
+
+
 def test_joints_alone_do_for_a_parallel_robot(tmp_path):
     robot = Rrru3()
     point = np.random.default_rng(1).uniform((-300.0, -300.0, 500.0), (300.0, 300.0, 800.0), (30, 3))
