@@ -96,7 +96,7 @@ _NOTES = {
     "how the file was driven": r"corrected model not driven: .*",
     "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
     r"|an effect is found .*|the others are .*",
-    "the file cannot hold play": r"play of (?P<names>.*)",
+    "the file cannot hold play": r"backlash of (?P<names>.*)",
     "the file cannot hold compliance": r"compliance of (?P<names>.*)",
     "the file cannot hold an effect": r"(?P<name>[a-z]+(?:_[a-z]+)*)",
 }
