@@ -1,1 +1,1 @@
-"""Calibration and sim-to-real diagnosis of parallel robots."""
+"""Robot calibration, and diagnosis of the errors that remain after it."""

@@ -1,4 +1,4 @@
-"""Errors that a user can meet; each says what, where, the value and what is allowed."""
+"""Errors for the user; each message states what is wrong, where, the value and what is allowed."""
 
 from collections.abc import Iterable
 
@@ -29,7 +29,7 @@ class UnreachableError(RrruError):
 
 
 class FitError(RrruError):
-    """A fit failed; `result` carries what it had reached."""
+    """A fit failed; `result` has its last state."""
 
     def __init__(self, message: str, result: object = None) -> None:
         super().__init__(message)
@@ -37,7 +37,7 @@ class FitError(RrruError):
 
 
 class SimulationError(RrruError):
-    """A foreign simulator did not come to a pose that may be recorded."""
+    """An independent simulator did not reach a pose that may be recorded."""
 
 
 class TableError(RrruError):

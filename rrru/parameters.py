@@ -14,7 +14,7 @@ LEGS = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a model: name, unit, nominal value, bounds, where these come from, its leg (0: all)."""
+    """One parameter of a model: name, unit, nominal value, bounds, their source, its leg (0: all)."""
 
     name: str
     unit: str
@@ -115,6 +115,6 @@ class ParameterSet:
         return np.clip(vector, self.low + inset, self.high - inset)
 
     def at_bound(self, vector: np.ndarray, share: float = 1e-6) -> np.ndarray:
-        """Flags (p,) of entries that lie at a bound, or beyond it, within a share of the bounds' width."""
+        """Flags (p,) of entries at a bound, or beyond it, within a share of the bounds' width."""
         inset = share * (self.high - self.low)
         return (vector <= self.low + inset) | (vector >= self.high - inset)

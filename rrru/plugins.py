@@ -1,4 +1,4 @@
-"""Objects of the user's own by `module:object`."""
+"""User-defined objects by `module:object`."""
 
 import importlib
 import sys
@@ -16,7 +16,7 @@ def module_file(name: str) -> Path:
 def load_object(whose: str, name: str) -> Any:
     """The object that `module:object` names; the module lies in the working directory or is installed.
 
-    whose: what asks, for messages. Raises ConfigError where there is none.
+    whose: the caller, for messages. Raises ConfigError where there is none.
     """
     module_name, colon, object_name = name.partition(":")
     if not (colon and object_name.isidentifier() and all(part.isidentifier() for part in module_name.split("."))):

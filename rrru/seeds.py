@@ -1,4 +1,4 @@
-"""Independent random streams from one study seed and the names of what they are for."""
+"""Independent random streams from one study seed and labels of their purpose."""
 
 import hashlib
 

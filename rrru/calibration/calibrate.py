@@ -1,8 +1,8 @@
-"""Calibration: a robot's parameters by least squares, with everything that says how far to trust them.
+"""Calibration: a robot's parameters by least squares, with standard errors and identifiability.
 
-Least squares is the limit of maximum a posteriori estimation for vanishing noise: the readings decide whatever they
-determine at all, and the prior decides the rest. The prior is the weak one that the parameters' bounds state, see
-`Block.geometry`.
+Least squares is the limit of maximum a posteriori estimation for vanishing noise: the readings decide all combinations
+of parameters that they determine, and the prior decides the others. The prior is the weak one that the parameters'
+bounds state, see `Block.geometry`.
 """
 
 from dataclasses import dataclass, replace
@@ -45,10 +45,10 @@ _SLOPES = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """Estimated deviations of a robot's parameters and what the readings tell about them.
+    """Estimated deviations of a robot's parameters, their standard errors and identifiability.
 
     estimate: under vanishing noise. standard_errors (p,): NaN for a parameter at a bound, inf for one that the readings
-    do not determine. noise_mm: noise per axis that they assume, from where `noise_from` says ("given", "residuals").
+    do not determine. noise_mm: noise per axis that they assume; noise_from: its source ("given", "residuals").
     """
 
     estimate: Estimate
@@ -58,7 +58,7 @@ class Calibration:
     identifiability: Identifiability
 
     def at(self, deviations: npt.ArrayLike, message: str, observations: Any = None) -> Self:
-        """The same noise and standard errors about other deviations (p,), of which the message says where from.
+        """The same noise and standard errors about other deviations (p,), whose origin the message states.
 
         observations: other readings of the robot, by default its own.
         """
@@ -97,7 +97,7 @@ class Calibration:
 
     @cached_property
     def readings(self) -> Readings | None:
-        """What else than positions of the tool was read; distances, heights and the like have none."""
+        """The Readings besides positions of the tool; distances, heights and the like have none."""
         return getattr(self.observations, "readings", None)
 
     @property
@@ -147,11 +147,11 @@ def estimate_deviations(
 ) -> Estimate:
     """The Estimate of the deviations (p,) of the observed mechanism by least squares, within its bounds.
 
-    Where the readings hardly determine some combinations the search does not end under vanishing noise, as it follows
-    a curved valley; it is begun again under the noise of the best instruments, which leaves these to the prior.
+    Where the readings hardly determine some combinations, the search under vanishing noise follows a curved valley and
+    does not converge. It is then repeated under the noise of the best instruments, which leaves these to the prior.
 
     loss: one of `rrru.estimation.solver.LOSSES`, with the residual `loss_scale_mm` at which a robust loss begins to
-    bend; geometry: Block with the prior of the deviations, by default what their bounds state. Combinations of
+    bend; geometry: Block with the prior of the deviations, by default the one that their bounds state. Combinations of
     parameters that the readings do not determine stay at their prior mean. Raises FitError, with
     the Estimate as its result, where there are fewer equations than parameters or the search does not converge.
     """
@@ -169,7 +169,7 @@ def estimate_deviations(
 
 
 def estimate_deviations_at(observations: Any, deviations: npt.ArrayLike, message: str, evaluations: int) -> Estimate:
-    """The Estimate of deviations (p,) that another search ended at after so many evaluations, as its message says."""
+    """The Estimate of deviations (p,), the result of another search with its message and number of evaluations."""
     return estimate_at(least_squares_problem(observations), deviations, message, evaluations)
 
 

@@ -40,7 +40,7 @@ def select(
 ) -> TargetPositions | None:
     """The usable points on some trajectories, None where the campaign has too few of them to fit.
 
-    arm_mm: length at which a measured orientation counts beside a position.
+    arm_mm: length that makes measured orientations comparable with positions.
     """
     chosen = rows.on_trajectories(measurements, patterns) & rows.usable(measurements, use_near_singularity)
     if not chosen.any():
@@ -73,7 +73,7 @@ def fit_sets(
             fit = calibrate(residuals, noise_mm, settings.loss, settings.loss_scale_mm)
             fits[name, "least_squares"] = fit
             if mechanism.SEARCHED:
-                # what the genetic algorithm searches for is of no use where it is left out
+                # the optimum of the genetic algorithm is not needed where the algorithm is left out
                 fits[name, "least_mean_distance"] = least_mean_distance(residuals, fit.deviations, noise_mm)
     if not fits:
         present = f"the campaign's trajectories ({', '.join(measurements['trajectory'].unique())})"
@@ -86,7 +86,7 @@ def tables(
 ) -> dict[str, pd.DataFrame]:
     """Frames by table name: calibrations, parameters, correlations, observability.
 
-    truth: the virtual robot's true deviations by the mechanism's names, or None where nobody knows them.
+    truth: the virtual robot's true deviations by the mechanism's names, or None where they are unknown.
     """
     names = ("calibrations", "parameters", "correlations", "observability")
     frames: dict[str, list] = {name: [] for name in names}
@@ -147,7 +147,7 @@ def _correlation_rows(fit: Calibration) -> pd.DataFrame:
 
 
 def _observability_rows(fit: Calibration) -> pd.DataFrame:
-    """Rows of `observability`: how each direction of parameter space is seen, and what it is made of."""
+    """Rows of `observability`: singular value of each direction of parameter space, and its entries."""
     ident = fit.identifiability
     count, values = len(ident.names), ident.singular_values
     with np.errstate(divide="ignore"):

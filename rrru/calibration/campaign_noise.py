@@ -1,4 +1,4 @@
-"""The measuring noise of a campaign, given or from what a calibration of all its points leaves."""
+"""The measuring noise of a campaign, given or from the residuals of a calibration of all its points."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from rrru.kinematics.robot import Robot
 
 
 class Noise(NamedTuple):
-    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and where from."""
+    """Noise per axis of positions in mm and of orientations in rad, NaN where none were measured, and its source."""
 
     mm: float
     rad: float
@@ -23,7 +23,7 @@ class Noise(NamedTuple):
 
     @property
     def arm_mm(self) -> float:
-        """Length at which an orientation counts beside a position."""
+        """Length that makes orientations comparable with positions."""
         return self.mm / self.rad if self.mm > 0.0 and self.rad > 0.0 else np.nan
 
 
@@ -33,9 +33,9 @@ def campaign_noise(
     given: tuple[float | None, float | None],
     use_near_singularity: bool = True,
 ) -> Noise:
-    """The Noise of a campaign: of what is not given, see `rrru.estimation.noise_model`.
+    """The Noise of a campaign; where it is not given it is estimated, see `rrru.estimation.noise_model`.
 
-    given: of positions in mm and of orientations in rad, None where nobody states it. Raises ConfigError where there
+    given: of positions in mm and of orientations in rad, None where it is not stated. Raises ConfigError where there
     are too few points to estimate it.
     """
     noise_mm, noise_rad = given

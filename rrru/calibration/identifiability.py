@@ -1,4 +1,4 @@
-"""What points tell about the parameters: rank, condition, standard errors, correlations, observability indices.
+"""Identifiability of parameters at the points: rank, condition, standard errors, correlations, observability indices.
 
 The Jacobian is scaled first: angle errors count as the distance they make at the end of the drive arm, so that all
 parameters are lengths and singular values compare. Indices O1 to O5 as in Joubair and Bonev, "Comparison of the
@@ -12,8 +12,8 @@ import numpy as np
 
 from rrru.kinematics.robot import Robot
 
-# A direction whose singular value is smaller than this share of the largest is not seen: it would need millimetre data
-# true to nanometres.
+# A direction whose singular value is smaller than this share of the largest is not identifiable: it would need
+# millimetre data true to nanometres.
 RANK_TOLERANCE = 1e-6
 
 
@@ -34,7 +34,7 @@ class Identifiability:
 
     @property
     def rank(self) -> int:
-        """Number of parameter combinations that the points see."""
+        """Number of parameter combinations that the points determine."""
         return int((self.singular_values > RANK_TOLERANCE * self.singular_values[0]).sum())
 
     @property
@@ -45,7 +45,7 @@ class Identifiability:
 
     @property
     def unseen(self) -> np.ndarray:
-        """Flags (p,) of parameters that touch a direction which the points do not see."""
+        """Flags (p,) of parameters with a part in a direction that the points do not determine."""
         return (self.directions[self.rank :] ** 2).sum(axis=0) > 1e-8
 
     def covariance(self, noise_mm: float) -> np.ndarray:
@@ -83,7 +83,7 @@ class Identifiability:
             return covariance / np.outer(deviation, deviation)
 
     def indices(self) -> dict[str, float]:
-        """Observability indices O1 to O5 by name; 0 where a direction is not seen."""
+        """Observability indices O1 to O5 by name; 0 where a direction is not determined."""
         s = np.where(self.singular_values > RANK_TOLERANCE * self.singular_values[0], self.singular_values, 0.0)
         full = s[-1] > 0.0
         return {

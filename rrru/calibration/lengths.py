@@ -30,8 +30,7 @@ _COMPARED_ROWS, _COMPARISON = 100, SolverOptions(max_iterations=25, step_toleran
 _NO_SEARCH = SolverOptions(max_iterations=0)
 # Cauchy's loss bends at 2.385 standard deviations: 95 % efficient for normal noise (Rey, 1983)
 _CAUCHY_SD, _CAUCHY_ROUNDS, _MIN_CAUCHY_MM = 2.385, 3, 1e-9
-# where a model is not quite right its own errors reach ten standard deviations of the rest: only what is beyond that
-# is a blunder and left out
+# model discrepancy reaches ten standard deviations of the other readings: only what is beyond that is a gross error
 MAX_STANDARD_RESIDUAL = 12.0
 # more bad readings than this share of all are no outliers, the model is wrong
 _MAX_BAD_SHARE = 0.2
@@ -45,7 +44,7 @@ _MIN_NOISE_MM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class LengthFit:
-    """Least squares estimate of a machine from its Lengths, of 1 mm noise, and how far to trust it.
+    """Least squares estimate of a machine from its Lengths, of 1 mm noise, with its uncertainty.
 
     The noise is that of the residuals, as if all were independent.
     """
@@ -101,7 +100,7 @@ class LengthFit:
 
     @property
     def standard_errors(self) -> FloatArray:
-        """Standard errors (n d + 2 k,) of anchors, start lengths and factors; inf for what is not determined."""
+        """Standard errors (n d + 2 k,) of anchors, start lengths and factors; inf for undetermined ones."""
         unseen = (np.abs(self.lengths.basis) @ np.isinf(np.diag(self.covariance))) > 0.0
         half = self.lengths.basis @ np.where(np.isinf(self.covariance), 0.0, self.covariance)
         return np.where(unseen, np.inf, np.sqrt((half * self.lengths.basis).sum(axis=1)))
@@ -120,14 +119,14 @@ class LengthFit:
 
     @property
     def bad(self) -> npt.NDArray[np.int_]:
-        """Row and reading (b, 2) of what is left out."""
+        """Row and reading (b, 2) of the readings left out."""
         return np.argwhere(~self.used)
 
     def marginals(self, parameters: Parameters) -> tuple[MarginalLikelihood, MarginalLikelihood] | None:
         """Marginal likelihoods under priors, with independent noise and with a smooth discrepancy over the places.
 
         parameters: those of the fit; flat priors are common to all fits that are compared. None where readings and
-        priors do not determine them, or no reading tells the noise.
+        priors do not determine them, or no reading determines the noise.
         """
         if not self.determined or self.freedom < 1:
             return None
@@ -172,9 +171,9 @@ def _fit(lengths: Lengths, starts: Sequence[FloatArray], options: SolverOptions 
 
 
 def _best_start(lengths: Lengths, starts: Iterable[FloatArray], screened: bool) -> FloatArray:
-    """Where (p,) the searches over a few rows end best.
+    """The best end (p,) of searches over a few rows.
 
-    Unless the rows are screened the best leaves the smallest median residual, which bad readings do not draw.
+    Unless the rows are screened the best one has the smallest median residual, which is robust against bad readings.
     """
     few, starts = lengths.rows(np.unique(np.linspace(0, len(lengths) - 1, _COMPARED_ROWS).astype(int))), list(starts)
     if not starts:
@@ -186,9 +185,9 @@ def _best_start(lengths: Lengths, starts: Iterable[FloatArray], screened: bool) 
 
 
 def _screen(lengths: Lengths, robust: FloatArray) -> LengthFit:
-    """The fit without the readings that stand out from a robust one (p,), judged again until no other does."""
+    """The fit without the readings that stand out from a robust one (p,), repeated until no other stands out."""
     fit = _fit(lengths, [robust])
-    # judged first by the robust parameters, which bad readings have not drawn to themselves
+    # judged first by the robust parameters, which bad readings have not biased
     judged = _fit(lengths, [robust], _NO_SEARCH)
     for _ in range(_MAX_SCREENINGS):
         used = ~standing_out(judged, MAX_STANDARD_RESIDUAL)
@@ -203,9 +202,9 @@ def _screen(lengths: Lengths, robust: FloatArray) -> LengthFit:
 def standing_out(fit: LengthFit, limit: float) -> BoolArray:
     """Flags (N, k) of readings beyond a limit in standard deviations.
 
-    They stand out from all others, and from the same reading at the nearest places, since errors of a model that is
-    not quite right are smooth. In a row the worst reading is flagged, or all where another fits about as badly: the row
-    does not tell which is bad. Those left out before are judged afresh.
+    They stand out from all others, and from the same reading at the nearest places, since the model discrepancy is
+    smooth. In a row the worst reading is flagged, or all where another fits about as badly: the row then does not
+    determine the bad one. Readings left out before are judged again.
     """
     used, checked = fit.used, fit.redundancy > _MIN_REDUNDANCY
     standard = np.where(checked, fit.residual_mm, 0.0) / np.sqrt(np.maximum(fit.redundancy, _MIN_REDUNDANCY))
@@ -219,5 +218,5 @@ def standing_out(fit: LengthFit, limit: float) -> BoolArray:
     worst = np.where(used, size, 0.0).max(axis=1, keepdims=True)
     alike = used & (size > _AS_BAD * worst)
     new = (worst > limit) & (alike | (alike.sum(axis=1, keepdims=True) > 1))
-    # no reading predicts a row that is out as a whole
+    # no reading predicts a row without any reading in use
     return np.asarray(new | (~used & ((size > limit) | ~used.any(axis=1, keepdims=True))))

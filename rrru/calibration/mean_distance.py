@@ -13,7 +13,7 @@ from rrru.estimation.observations.target_positions import TargetPositions
 
 _OUT_OF_REACH_MM = 1e6
 _GRADIENT = 1e-9
-# a simplex of more corners crawls; the trust region's end at a kink then has to do
+# a simplex of more corners converges too slowly; the trust region's end at a kink is then the result
 _MOST_FOR_SIMPLEX = 15
 _SIMPLEX = {"maxfev": 20_000, "maxiter": 20_000, "xatol": 1e-8, "fatol": 1e-12, "adaptive": True}
 
@@ -65,7 +65,7 @@ def _objective(
         deviations = start + directions @ np.frombuffer(key)
         residual = residuals.residual(deviations)
         if not np.isfinite(residual).all():
-            # a trial step left the reach: a value that the trust region turns away from
+            # a trial step left the reach: a value that the trust region rejects
             return np.full(len(residuals), _OUT_OF_REACH_MM), np.zeros((len(residuals), rank)), np.zeros((1, 3, rank))
         distance = np.maximum(np.linalg.norm(residual, axis=1), 1e-12)
         jacobian = residuals.jacobian(deviations) @ directions

@@ -20,8 +20,8 @@ turn_rms_rad           float? root mean square angle between measured and model 
     measured
 noise_mm               float  noise per axis that the standard errors assume
 noise_from             str    given: by the configuration or of the whole campaign, see campaigns; residuals: of
-    this fit, where more is left {given, residuals}
-rank                   int    parameter combinations that the points see, of 7
+    this fit, where these are larger {given, residuals}
+rank                   int    parameter combinations that the points determine, of 7
 condition              float  condition number of the scaled Jacobian (angles as arcs at the robot's own length)
 O1_observability       float  geometric mean of the singular values over sqrt(points)
 O2_observability       float  inverse condition
@@ -38,17 +38,18 @@ campaign calibration method
 parameter              str    name of the parameter
 unit                   str    unit of the value {rad, mm}
 value                  float  fitted deviation from the nominal value
-standard_error         float? 1 sigma; null for methods without one and for unseen parameters
+standard_error         float? 1 sigma; null for methods without one and for undetermined parameters
 seen                   bool   false where the points do not determine it; its value is then nominal in part
 at_bound               bool   true where the fit ended at a bound
-true_value             float? the virtual robot's; null where nobody knows
+true_value             float? the virtual robot's; null where it is unknown
 
 ## gauge | tables/gauge.parquet | campaign number
-Numbers of a robot of one's own that the campaign's poses do not tell apart from its parameters; none for built-in ones.
+Geometric parameters of a user's robot that are not identifiable at the campaign's poses, and the combination of
+estimated parameters that replaces each; none for built-in robots.
 --
 campaign
-number                 str    name of a number of the robot that is no parameter
-stands_for             str    combination of parameters that does what one unit of it does; nothing: it is not seen
+number                 str    name of a geometric parameter that is not identifiable
+stands_for             str    combination of parameters that replaces one unit of it; nothing: it has no effect
 
 ## correlations | tables/correlations.parquet | campaign calibration parameter_a parameter_b
 Correlation of the least-squares estimates.
@@ -56,15 +57,15 @@ Correlation of the least-squares estimates.
 campaign calibration
 parameter_a            str    name
 parameter_b            str    name
-correlation            float? -1 to 1; null where a parameter is not seen
+correlation            float? -1 to 1; null where a parameter is not determined
 
 ## observability | tables/observability.parquet | campaign calibration direction parameter
-Directions of parameter space from the best seen to the worst, and what each is made of.
+Directions of parameter space from the best determined to the worst, with their entries.
 --
 campaign calibration
-direction              int    1: best seen
+direction              int    1: best determined
 singular_value         float  mm of the stacked positions per mm along the direction
-standard_error_mm      float? 1 sigma along the direction; null where it is not seen
+standard_error_mm      float? 1 sigma along the direction; null where it is not determined
 parameter              str    name
 weight                 float  entry of the unit direction, angles as arcs at the robot's own length
 """)

@@ -1,4 +1,4 @@
-"""The path behind a measurement table, as far as its columns tell. Lengths in mm, times in s."""
+"""The path behind a measurement table, as far as its columns determine it. Lengths in mm, times in s."""
 
 from itertools import pairwise
 
@@ -10,13 +10,13 @@ from rrru.campaign.stated_motion import rests, stated_motion
 
 # points of the path from one commanded point to the next, and of a transfer between runs with its ends
 STEPS, _TRANSFER_STEPS = 8, 30
-# of splines through points: where a drive turns back has to be known to a fraction of its play
+# of splines through points: where a drive turns back has to be known to a fraction of its backlash
 DEGREE = 5
 # of the drives where the tool hardly moves, both in shares of their extents
 _DRIVES_WAY = 0.1
-# a path through points turns by more than a right angle at fewer of them; of poses in any order it is three of four
+# a path turns by more than a right angle at fewer of its points than this; poses in random order do so at three of four
 _MOST_TURNS = 0.5
-# a path that bends by more than the first beside a part that bends by less than the second goes round a corner, in rad
+# a bend above the first limit next to a bend below the second is a corner, in rad
 _CORNER, _STRAIGHT = 0.2, 0.02
 # an interval at a run's end or a corner that is this much slower than the next leads to rest
 _SLOWER = 0.9
@@ -28,8 +28,8 @@ _STILL_MM, _STILL_RAD = 0.05, 5e-4
 def driven_path(measurements, degree=DEGREE):
     """`_path_through` the rows of a measurement table; several reflectors measured at one pose are one stop."""
     stop = stops(measurements)
-    path, told = _path_through(measurements[np.diff(stop, prepend=-1) > 0], degree)
-    return path, {name: values[stop] for name, values in told.items()}
+    path, course = _path_through(measurements[np.diff(stop, prepend=-1) > 0], degree)
+    return path, {name: values[stop] for name, values in course.items()}
 
 
 def drive_rates(measurements, actuators):
@@ -42,10 +42,10 @@ def drive_rates(measurements, actuators):
 def smooth_drives(measurements, path, path_index, degree=DEGREE):
     """Actuator values (N, K) along the path of `driven_path`: in each run a spline through the measured points.
 
-    path (N, K) is what they are from run to run and where the points follow no path, path_index (n,) its rows at the
+    path (N, K): their values from run to run, and where the points follow no path; path_index (n,): its rows at the
     points; degree: odd, of the splines.
 
-    # ASSUME where the tool passes smoothly through a run's points its drives do so, too.
+    # ASSUME where the tool passes smoothly through a run's points, its drives do so, too.
     """
     if not passes_points(measurements):
         return path
@@ -57,8 +57,8 @@ def smooth_drives(measurements, path, path_index, degree=DEGREE):
     turned = _chords(drives / np.where(span > 0.0, span, 1.0))
     way = np.maximum(_chords(tool), _DRIVES_WAY * reach * turned)
     for piece in _runs(run):
-        own, _ = _through(drives[piece], way[piece.start : piece.stop - 1], _corners(tool[piece]), degree)
-        result[index[piece][0] : index[piece][-1] + 1] = own
+        smooth, _ = _through(drives[piece], way[piece.start : piece.stop - 1], _corners(tool[piece]), degree)
+        result[index[piece][0] : index[piece][-1] + 1] = smooth
     return result
 
 
@@ -72,32 +72,32 @@ def stops(measurements):
         return np.arange(len(measurements))
     names = [name for name in measurements if name.startswith("command_")]
     still = np.array([_STILL_MM if name.endswith("_mm") else _STILL_RAD for name in names]) if at_rest else 0.0
-    told, run = np.nan_to_num(measurements[names].to_numpy(dtype=float)), measurements["run"].to_numpy()
-    moved = (np.abs(np.diff(told, axis=0)) > still).any(axis=1) | (np.diff(run) != 0)
+    commanded, run = np.nan_to_num(measurements[names].to_numpy(dtype=float)), measurements["run"].to_numpy()
+    moved = (np.abs(np.diff(commanded, axis=0)) > still).any(axis=1) | (np.diff(run) != 0)
     return np.cumsum(np.concatenate([[False], moved]))
 
 
 def _path_through(measurements, degree):
-    """The path (N, 3) of everything that is driven, transfers included, and what a robot was told to do on it.
+    """The path (N, 3) of everything that is driven, transfers included, and what the robot was commanded to do on it.
 
-    degree: odd, of the splines through a run's points. What it was told is by name, of the n rows of a measurement
-    table, all of them in the order driven: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg,
-    temperature_c and path_index, their places on the path (n,); NaN where nobody knows.
+    degree: odd, of the splines through a run's points. The commanded course is by name, of the n rows of a measurement
+    table in the order driven: position_mm, velocity_mm_s, acceleration_mm_s2 (n, 3), time_s, payload_kg, temperature_c
+    and path_index, their rows of the path (n,); NaN where unknown.
 
-    # ASSUME the robot passes smoothly through a run's commanded points, but for corners between straight parts, and
+    # ASSUME the robot passes smoothly through a run's commanded points, except at corners between straight parts. It
     rests where it slows down towards an end or a corner. Speeds and accelerations come from the times; where a run has
     no increasing times, or its points follow no path, they are NaN.
     """
     position, run = rows.command(measurements), measurements["run"].to_numpy()
     named = measurements.reindex(columns=("time_s", "payload_kg", "temperature_c"))
-    told = {name: named[name].to_numpy(dtype=float) for name in named}
+    course = {name: named[name].to_numpy(dtype=float) for name in named}
     pieces = _runs(run)
     velocity, acceleration = rates(measurements, position)
     parts = [position[piece] for piece in pieces]
-    smooth = (_through(one, _chords(one), _corners(one), degree) for one in parts)
+    smooth = (_through(part, _chords(part), _corners(part), degree) for part in parts)
     path, index = connect(*zip(*smooth, strict=True), _TRANSFER_STEPS)
-    told |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
-    return path, told | {"path_index": index}
+    course |= {"position_mm": position, "velocity_mm_s": velocity, "acceleration_mm_s2": acceleration}
+    return path, course | {"path_index": index}
 
 
 def rates(measurements, values):
@@ -117,7 +117,7 @@ def rates(measurements, values):
 
 
 def passes_points(measurements):
-    """Whether the robot passes the rows of a measurement table without a stop: stated, else if they `follows_path`."""
+    """Whether the robot passes the rows of a measurement table without a stop: as stated, else by `follows_path`."""
     stated = stated_motion(measurements)
     if stated is not None:
         return not stated.stops
@@ -125,7 +125,7 @@ def passes_points(measurements):
 
 
 def follows_path(position_mm, run):
-    """Whether positions (n, 3) in runs (n,) lie along paths: else each is a stop, arrived at from the one before."""
+    """Whether positions (n, 3) in runs (n,) are along paths; otherwise each is a stop, reached from the one before."""
     moved = np.concatenate([[True], (np.diff(position_mm, axis=0) != 0.0).any(axis=1)])
     position_mm, run = position_mm[moved], np.asarray(run)[moved]
     step, same = np.diff(position_mm, axis=0), run[1:] == run[:-1]
@@ -146,8 +146,8 @@ def starts_of_runs(run):
 def _corners(position_mm):
     """Points (c,) of the path (k, 3) of one run at which it has a corner, after its first and before its last point.
 
-    # ASSUME what is straight at three points stays so between them: a path that bends there leaves it at a corner. One
-    smooth curve through both would swing about the straight part, and drives that hold there would turn back.
+    # ASSUME a path that is straight at three points is straight between them, and a bend next to it is a corner. One
+    smooth curve through both would oscillate about the straight part, and drives that hold there would turn back.
     """
     moved = np.flatnonzero(np.concatenate([[True], _chords(position_mm) > 0.0]))
     step = np.diff(position_mm[moved], axis=0)
@@ -155,9 +155,9 @@ def _corners(position_mm):
         return np.zeros(0, dtype=int)
     step /= np.linalg.norm(step, axis=1)[:, None]
     bend = 2.0 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(step, axis=0), axis=1), 0.0, 1.0))
-    # of an end nobody knows how the path goes on
-    beside = (np.array([np.inf, *bend[:-1]]) < _STRAIGHT) | (np.array([*bend[1:], np.inf]) < _STRAIGHT)
-    return moved[1:-1][(bend > _CORNER) & beside]
+    # the bend beyond an end is unknown
+    next_to_straight = (np.array([np.inf, *bend[:-1]]) < _STRAIGHT) | (np.array([*bend[1:], np.inf]) < _STRAIGHT)
+    return moved[1:-1][(bend > _CORNER) & next_to_straight]
 
 
 def _run_rates(values, time, corners):
@@ -165,9 +165,9 @@ def _run_rates(values, time, corners):
     result = np.full((2, *values.shape), np.nan)
     for first, last in pairwise([0, *corners, len(values) - 1]):
         piece = slice(first, last + 1)
-        before, own = result[:, piece].copy(), np.array(_derivatives(values[piece], time[piece]))
-        both = np.where(np.isnan(own), before, 0.5 * (before + own))
-        result[:, piece] = np.where(np.isnan(before), own, both)
+        before, after = result[:, piece].copy(), np.array(_derivatives(values[piece], time[piece]))
+        mean = np.where(np.isnan(after), before, 0.5 * (before + after))
+        result[:, piece] = np.where(np.isnan(before), after, mean)
     return tuple(result)
 
 
@@ -183,10 +183,10 @@ def _derivatives(points, time):
     if len(points) < 3 or not np.isfinite(time).all() or not (np.diff(time) > 0.0).all():
         return nothing, nothing
     speed = np.linalg.norm(np.diff(points, axis=0), axis=1) / np.diff(time)
-    rest = (speed[0] < _SLOWER * speed[1], speed[-1] < _SLOWER * speed[-2])
-    spline = CubicSpline(time, points, bc_type=tuple("clamped" if still else "not-a-knot" for still in rest))
+    at_rest = (speed[0] < _SLOWER * speed[1], speed[-1] < _SLOWER * speed[-2])
+    spline = CubicSpline(time, points, bc_type=tuple("clamped" if still else "not-a-knot" for still in at_rest))
     acceleration = spline(time, 2)
-    acceleration[[end for end, still in zip((0, -1), rest, strict=True) if still]] = 0.0
+    acceleration[[end for end, still in zip((0, -1), at_rest, strict=True) if still]] = 0.0
     return spline(time, 1), acceleration
 
 

@@ -12,7 +12,7 @@ from rrru.kinematics.base_parameters import MeasurementConfig
 from rrru.kinematics.readings import Readings, place_on_platform
 
 USED = ("ok", "near_singularity")
-# rows kept for a test: no fit uses them, the robot was there nevertheless
+# rows of a held-out test: no fit uses them, but the robot was there
 HELD_OUT = "held_out"
 # what a reflector is fixed to
 ON_PLATFORM, ON_WORLD = "platform", "world"
@@ -61,7 +61,7 @@ def has_turns(measurements: pd.DataFrame) -> bool:
 
 
 def readings(measurements: pd.DataFrame, arm_mm: float = np.nan) -> Readings | None:
-    """What was read at the n rows of a table, None where that are positions of the tool and nothing else.
+    """The Readings at the n rows of a table, None where only positions of the tool were read.
 
     arm_mm: see Readings.
     """
@@ -84,7 +84,7 @@ def on_the_world(measurements: pd.DataFrame) -> np.ndarray | None:
 
 
 def reads(measurements: pd.DataFrame, known: Iterable[str] = (), registered: bool = False) -> MeasurementConfig:
-    """What a campaign's readings leave open; known: reflectors whose places are stated; registered: its frame was."""
+    """The MeasurementConfig of a campaign; known: reflectors with stated places; registered: whether its frame was."""
     names = tuple(pd.unique(sites(measurements["target"]))) if "target" in measurements else ()
     stated = set(sites(pd.Series([*known], dtype=object)))
     fitted = tuple(name for name in names if name not in stated)
@@ -156,7 +156,7 @@ def direction(measurements: pd.DataFrame) -> np.ndarray:
     for (trajectory, _), run in measurements.reset_index(drop=True).groupby(["trajectory", "run"], sort=False):
         rows = run.index.to_numpy()
         tree = first.setdefault(trajectory, cKDTree(position[rows]))
-        # most steps tell, so that a closed path's equal ends or a missing point do not matter
+        # the majority of the steps decides, so that a closed path's equal ends or a missing point do not matter
         steps = np.sign(np.diff(tree.query(position[rows])[1])).sum()
         result[rows] = -1 if steps < 0 else 1
     return result

@@ -1,11 +1,11 @@
-"""The measuring noise of a campaign where nobody has stated it."""
+"""The measuring noise of a campaign where it is not stated."""
 
 import numpy as np
 import numpy.typing as npt
 
 from rrru.campaign import measurements as rows
 
-# degrees of freedom from which on repeated points tell the noise
+# degrees of freedom from which on repeated points determine the noise
 ENOUGH_REPEATS = 30
 
 
@@ -27,13 +27,13 @@ def repeat_noise(measurements):
     """Noise per axis in mm from points measured more than once under the same conditions, and its degrees of freedom.
 
     Repeats share the trajectory, the commanded position, the direction of motion, speed and payload. NaN and 0 where
-    nothing repeats. What moves the robot from pass to pass counts as noise here.
+    nothing repeats. Non-repeatability of the robot from pass to pass counts as noise here.
     """
     frame = measurements.loc[rows.usable(measurements)]
     frame = frame.assign(direction=rows.direction(frame))
     axes, places = ([f"{name}_{axis}_mm" for axis in "xyz"] for name in ("measured", "command"))
-    told = [name for name in frame if name == "target" or name.startswith("command_r")]
-    keys = ["trajectory", "direction", *places, *told, "speed_mm_s", "payload_kg"]
+    pose = [name for name in frame if name == "target" or name.startswith("command_r")]
+    keys = ["trajectory", "direction", *places, *pose, "speed_mm_s", "payload_kg"]
     groups = frame.groupby(keys, dropna=False, sort=False)[axes]
     deviation = (frame[axes] - groups.transform("mean")).to_numpy()
     freedom = 3 * int(len(frame) - groups.ngroups)
@@ -41,9 +41,9 @@ def repeat_noise(measurements):
 
 
 def typical(axes):
-    """One deviation of spreads of single readings, an array of any length per axis: medians, then root mean square.
+    """One standard deviation from those of single readings, an array per axis: medians, then root mean square.
 
-    Single readings may be far worse than the rest.
+    Medians, since single readings may be far worse than all others.
     """
     return float(np.sqrt(np.mean([np.nanmedian(axis) ** 2 for axis in axes])))
 
@@ -51,8 +51,8 @@ def typical(axes):
 def read_noise(measurements):
     """Noise per axis in mm that the instrument stated with its readings, None where it stated none.
 
-    # ASSUME one size for all points: what a model lacks is larger than what the readings' spreads differ by, and
-    weights would hang the fit on the points that the tracker sees best.
+    # ASSUME one size for all points: the model discrepancy is larger than the differences of the readings' standard
+    deviations, and weights would make the fit depend on the few points that the tracker sees best.
     """
     axes = [f"noise_{axis}_mm" for axis in "xyz"]
     if not set(axes) <= set(measurements):
@@ -62,9 +62,9 @@ def read_noise(measurements):
 
 
 def quieter_repeats(measurements, noise_mm, correlation=0.0):
-    """Noise per axis in mm of poses measured again where it is clearly less than an estimate, None where it is not.
+    """Noise per axis in mm of repeated poses where it is clearly less than an estimate, None where it is not.
 
-    correlation: of the noise from reading to reading; what is correlated is worth fewer degrees of freedom.
+    correlation: of the noise from reading to reading; correlated noise has fewer effective degrees of freedom.
     """
     repeated, count = repeat_noise(measurements)
     count *= (1.0 - correlation**2) / (1.0 + correlation**2)
@@ -73,9 +73,9 @@ def quieter_repeats(measurements, noise_mm, correlation=0.0):
 
 
 def reading_series(measurements, readings=None):
-    """Numbers (m,) of what follows one another smoothly in the rows of the readings of n points, by default positions.
+    """Numbers (m,) of the smooth series in the rows of the readings of n points, by default positions.
 
-    Runs, of each reflector apart, and orientations apart from positions.
+    A series is a run, of each reflector separately, with orientations separate from positions.
     """
     number = rows.series(measurements)
     if readings is None:

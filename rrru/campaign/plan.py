@@ -1,4 +1,4 @@
-"""What the robot is told to do: runs along trajectories with times, speed, payload and path. Lengths mm, times s."""
+"""The commanded motion: runs along trajectories with times, speed, payload and path. Lengths mm, times s."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from rrru.campaign.measurements import vector_columns
 from rrru.campaign.speed_profile import Trapezoid
 from rrru.campaign.trajectories import sample
 
-# Points of the path between two sampled points: enough for a drive that turns back between them to be seen by the play.
+# Points of the path between two sampled points: enough for `backlash` to see a drive that turns back between them.
 _PATH_STEPS = 16
 _CURVE_SHARES = np.linspace(0.0, 1.0, 401)
 
@@ -48,8 +48,8 @@ class Plan:
         """
         target, counts = self.targets(), [len(run.points_mm) for run in self.runs]
         runs = [(k, run.trajectory, run.speed_mm_s, run.payload_kg) for k, run in enumerate(self.runs, start=1)]
-        told = pd.DataFrame(runs, columns=["run", "trajectory", "speed_mm_s", "payload_kg"])
-        table = told.loc[np.repeat(told.index, counts)].reset_index(drop=True)
+        by_run = pd.DataFrame(runs, columns=["run", "trajectory", "speed_mm_s", "payload_kg"])
+        table = by_run.loc[np.repeat(by_run.index, counts)].reset_index(drop=True)
         table.insert(2, "point", np.concatenate([np.arange(1, count + 1) for count in counts]))
         values = mechanism.require_reachable(target)
         drives = dict(zip(mechanism.parts.columns, values.T, strict=True))

@@ -15,13 +15,13 @@ command_{xyz}_mm       float  commanded position, robot frame
 measured_{xyz}_mm      float? measured position, robot frame; null where the point was not measured
 speed_mm_s             float? speed of the run; null where the file has none
 payload_kg             float? payload on the platform; null where the file has none
-status                 str    every point is kept; outlier, stale (equal to an earlier reading in every digit), unsolved
-    and held_out (kept for a test) are left out of fits, near_singularity only with use_near_singularity: false {ok,
-    outlier, stale, near_singularity, unsolved, held_out}
+status                 str    the table has every point; outlier, stale (equal to an earlier reading in every digit),
+    unsolved and held_out (of a held-out test) are left out of fits, near_singularity only with use_near_singularity:
+    false {ok, outlier, stale, near_singularity, unsolved, held_out}
 campaign               str    name of the campaign in the configuration
 
 ## measurements | campaigns/{campaign}/measurements.parquet | run point
-One row per commanded point: what was commanded and what the instrument saw. After the commanded position stand the
+One row per commanded point: the command and the reading of the instrument. After the commanded position follow the
 robot's own columns of commanded actuator values, here those of the 3-RRRU. Where orientations were measured there are
 command_rx_rad and measured_rx_rad (rotation vectors, null where none was), where reflectors were target, its name, and
 target_x_mm, its nominal place on the platform, or in the robot's frame where target_on says that it is fixed to the
@@ -35,7 +35,7 @@ theta3_rad             float  commanded drive angle of leg 3; 3-PTT: slider3_mm
 measured_{xyz}_mm speed_mm_s payload_kg status
 
 ## truth | campaigns/{campaign}/truth.parquet | run point
-What only the virtual robot knows, one row per commanded point.
+Ground truth of the virtual robot, one row per commanded point.
 --
 run                    int    as in measurements
 trajectory             str    as in measurements
@@ -72,8 +72,8 @@ constraint_determinant float? as in singularity; null out of reach
 
 ## registration | tables/registration.parquet | campaign number
 The rigid motion from the instrument's frame to the robot's that `frame: register` found, robot = R instrument + t: its
-translation t and the rotation vector of R. What is left of it is fitted with the calibration, as world_ numbers of
-`parameters` or those that stand for them in `gauge`. No rows where the frame was the robot's.
+translation t and the rotation vector of R. The calibration fits the remaining motion, as world_ numbers of
+`parameters` or those that replace them in `gauge`. No rows where the frame was the robot's.
 --
 campaign
 number                 str    translation_x, .. rotation_x, ..
@@ -128,8 +128,9 @@ def measurement_table(robot, names=()):
     """The table `measurements` with a robot's own columns of actuator values, and those of `names` beyond them."""
     table = next(table for table in TABLES if table.name == "measurements")
     first, last = table.names.index("theta1_rad"), table.names.index("theta3_rad") + 1
-    own = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in robot.parts.drives]
-    columns = [*table.columns[:first], *own, *table.columns[last:]]
+    drives = robot.parts.drives
+    values = [Column(drive.column, "float64", f"commanded actuator value {drive.column}") for drive in drives]
+    columns = [*table.columns[:first], *values, *table.columns[last:]]
     more = {after: [] for after, *_ in _MORE}
     for after, name, text in _MORE:
         nullable = not name.startswith("target")

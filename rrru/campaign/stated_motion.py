@@ -18,7 +18,7 @@ KINDS, BETWEEN = (STOP_AND_GO, CONTINUOUS), (TOOL, DRIVES)
 class StatedMotion:
     """kind: "stop_and_go" of a robot that rests at each reading, "continuous" of one that is measured while it moves.
 
-    between: what is straight from stop to stop, "tool" or "drives"; None where nobody states it. Raises ConfigError for
+    between: what is straight from stop to stop, "tool" or "drives"; None where it is not stated. Raises ConfigError for
     other values, and for `between` of a robot that does not stop.
     """
 

@@ -1,4 +1,4 @@
-"""Point to point: what a robot is told when every point is measured at rest. Lengths in mm, times in s."""
+"""Point to point: the commanded motion when every point is measured at rest. Lengths in mm, times in s."""
 
 import numpy as np
 
@@ -36,6 +36,6 @@ def stops(name, points_mm, speed_mm_s, acceleration_mm_s2, settle_s, payload_kg=
     durations = [Trapezoid(float(way), speed_mm_s, acceleration_mm_s2).duration_s if way > 0.0 else 0.0 for way in ways]
     at = np.arange(len(points)) * _STEPS
     path = np.stack([np.interp(np.arange(at[-1] + 1), at, points[:, axis]) for axis in range(3)], axis=-1)
-    rest = np.zeros_like(points)
+    at_rest = np.zeros_like(points)
     time = np.concatenate([[0.0], np.cumsum(np.array(durations) + settle_s)]) + settle_s
-    return Plan((Run(name, points, path, at, time, rest, rest, float(speed_mm_s), float(payload_kg)),), 0.0)
+    return Plan((Run(name, points, path, at, time, at_rest, at_rest, float(speed_mm_s), float(payload_kg)),), 0.0)

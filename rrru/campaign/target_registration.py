@@ -35,7 +35,7 @@ _GRID_ITERATIONS, _MAX_ITERATIONS, _TURN_TOLERANCE_RAD = 25, 60, 1e-12
 _MAX_REWEIGHTINGS, _MOVE_TOLERANCE_MM, _BEND, _MIN_BEND_MM = 50, 1e-6, 1.5 / 0.6745, 1e-3
 # a turn is determined where readings move by this share of their spread per rad
 _MIN_SHARE_OF_SPREAD = 1e-3
-# mean square turn of a body axis from which on a target's place along it is identifiable apart from the frame
+# mean square turn of a body axis from which on a target's place along it is identifiable separately from the frame
 _LEAST_TURNED = 1e-5
 _EYE = np.eye(3)
 
@@ -133,7 +133,7 @@ def register_targets(readings: TargetReadings, mirrored: bool = False, robust: b
 
 
 def affine_rms(readings: TargetReadings) -> float:
-    """Root mean square distance in mm that the best 3 x 3 matrix in place of the rotation leaves.
+    """Residual rms distance in mm of the best 3 x 3 matrix in place of the rotation.
 
     No registration leaves less, whatever the unit of the readings, and mirrored or not.
     """

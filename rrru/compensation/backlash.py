@@ -18,10 +18,10 @@ class Width:
 def measured_width(record, lead_mm):
     """Width from a bench's record (`rrru.simulation.screw.encoder_record`), eq. (19).
 
-    # ASSUME the body of eq. (19) is lost. Our reading: at the same commanded place the carriage stands by the width
-    further back on the way forwards than on the way back, so that e_1 = mean(y_reverse - y_forward_1), e_2 =
+    # ASSUME the body of eq. (19) is lost. Our reading: at the same commanded place the carriage is further back by the
+    width in the forward passes than in the reverse pass, so that e_1 = mean(y_reverse - y_forward_1), e_2 =
     mean(y_reverse - y_forward_2) over the places of the passes, e = (e_1 + e_2) / 2. Places within one turn of a
-    turning point are left out: the play is being taken up there.
+    turning point are left out: the screw is within its backlash there.
     """
     place = record["commanded_mm"].round(6)
     places = record.pivot_table(index=place, columns="pass", values="encoder_mm", aggfunc="first").dropna()
@@ -29,14 +29,15 @@ def measured_width(record, lead_mm):
     inner = places[(at > at.min() + lead_mm) & (at < at.max() - lead_mm)]
     differences = [(inner["reverse"] - inner[name]).to_numpy() for name in ("forward_1", "forward_2")]
     first, second = (float(difference.mean()) for difference in differences)
-    both = 0.5 * (differences[0] + differences[1])
-    return Width(0.5 * (first + second), first, second, float(both.std(ddof=1) / np.sqrt(len(both))))
+    mean = 0.5 * (differences[0] + differences[1])
+    return Width(0.5 * (first + second), first, second, float(mean.std(ddof=1) / np.sqrt(len(mean))))
 
 
 def compensated(values_mm, widths_mm):
-    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: half the play ahead, all at a reversal.
+    """Drive commands (N, 3) for slider positions (N, 3) in the order driven: ahead by half the backlash.
 
-    A slider that stands keeps the side it came from; before its first move, the side of that move.
+    The command changes by the whole width at a reversal. A slider at rest keeps the side that it came from; before its
+    first move it has the side of that move.
     """
     step = np.sign(np.diff(values_mm, axis=0, prepend=values_mm[:1]))
     result = np.array(values_mm, dtype=float)
@@ -50,7 +51,7 @@ def compensated(values_mm, widths_mm):
 
 
 def repeatability(values_mm):
-    """Scatter (3,), 1 sigma, of slider positions (k repeats, n places, 3) about each place's mean, and travel (3,).
+    """Standard deviations (3,) of slider positions (k repeats, n places, 3) about each place's mean, and travel (3,).
 
     # ASSUME eq. (20) and Fig. 8 are lost: sigma is the standard deviation over the repeats pooled over the places, K
     the stretch between the slider's outermost places; the paper's measure is their ratio.

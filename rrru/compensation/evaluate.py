@@ -11,7 +11,7 @@ from rrru.campaign import measurements as rows
 from rrru.errors import SimulationError, UnreachableError
 
 GROUPS = {"all_lines": "line_*", "all": "*"}
-# the standard asks for 30 cycles; below three a spread says nothing
+# the standard asks for 30 cycles; fewer than three do not determine a standard deviation
 _FEWEST_REPEATS = 3
 _CALIBRATION = ["calibration", "method", "mode"]
 _ERROR = ["error_x_mm", "error_y_mm", "error_z_mm"]
@@ -21,9 +21,9 @@ _TANGENT = ["tangent_x", "tangent_y", "tangent_z"]
 def under_calibrations(measurements, mechanism, parameters, drive=None):
     """Rows of `errors` before any calibration and under every one of a `parameters` frame.
 
-    drive: makes measurements with a controller, positions (n, 3) to actuator values; None where the robot is not at
-    hand and every calibration is judged by its model alone. A calibration under whose commands it loses its pose has no
-    rows of that mode, and a line of output says so.
+    drive: makes measurements with a controller, positions (n, 3) to actuator values; None where the robot cannot be
+    driven and every calibration is judged by its model alone. A calibration under whose commands the robot loses its
+    pose has no rows of that mode, and a line of output states this.
     """
     frames = [before(rows.at_tool(measurements, mechanism))]
     for calibration, method in parameters[["calibration", "method"]].drop_duplicates().itertuples(index=False):
@@ -44,7 +44,7 @@ def before(measurements):
 
 
 def model_residual(measurements, mechanism, deviations):
-    """Measured position minus the calibrated model's for the values that were sent: `errors` without names."""
+    """Measured position minus that of the calibrated model for the commanded values: `errors` without names."""
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     if (readings := rows.readings(measurements)) is None:
         return _errors(measurements, mechanism.forward(actuators, deviations, command))
@@ -74,8 +74,8 @@ def summarise(errors, measurements):
     errors: rows of `errors` of one campaign; besides every trajectory the groups "all_lines" and "all" are summed up.
     """
     names = measurements["trajectory"].unique().tolist()
-    # a trajectory that is called as a group stands for itself
-    groups = {group: [one for one in names if fnmatchcase(one, pattern)] for group, pattern in GROUPS.items()}
+    # a trajectory with the name of a group replaces the group
+    groups = {group: [name for name in names if fnmatchcase(name, pattern)] for group, pattern in GROUPS.items()}
     groups = {name: [name] for name in names} | {name: groups[name] for name in groups if name not in names}
     joined = errors.merge(_path_geometry(measurements), on=["run", "point"], how="left", validate="many_to_one")
     judged = _about_barycentres(joined.dropna(subset=_ERROR)).reindex(joined.index).to_numpy()
@@ -101,19 +101,19 @@ def _path_geometry(measurements):
         along = np.gradient(points, axis=0, edge_order=2) if len(run) > 2 else points[-1:] - points[:1]
         length = np.linalg.norm(along, axis=1, keepdims=True)
         tangent[run] = np.divide(along, length, out=np.zeros_like(along), where=length > 0.0)
-    told = [measurements[name].to_numpy() for name in measurements if name == "target" or name.startswith("command_r")]
+    pose = [measurements[name].to_numpy() for name in measurements if name == "target" or name.startswith("command_r")]
     keys = [frame["trajectory"], rows.direction(measurements), frame["speed_mm_s"], frame["payload_kg"]]
-    keys += [*position.T, *told]
+    keys += [*position.T, *pose]
     station = frame.groupby(keys, dropna=False, sort=False).ngroup()
     return frame[["run", "point"]].assign(station=station, **dict(zip(_TANGENT, tangent.T, strict=True)))
 
 
 def _about_barycentres(known):
-    """What ISO 9283 compares, for every row with an error: its size, passes of its station, AP, AT and RP there.
+    """The quantities of ISO 9283 for every row with an error: its size, passes of its station, AP, AT and RP there.
 
     AP: distance between commanded position and barycentre of the attained ones. AT: the same across the path only (the
     standard compares in the plane normal to the commanded path). RP: l + 3 S_l about the barycentre. In mode "model"
-    the model's position stands for the commanded one.
+    the model's position replaces the commanded one.
     """
     keys = [*_CALIBRATION, "station"]
     stations, tangent = known.groupby(keys, sort=False), known[_TANGENT].to_numpy()

@@ -6,7 +6,7 @@ import numpy as np
 def through_inverse(mechanism, position_mm, error_mm, deviations=None):
     """Actuator values (n, 3) of the corrected positions p - dp through the exact inverse kinematics (eq. 11).
 
-    position_mm, error_mm: (n, 3); deviations (p,): those that the controller knows of. NaN where a leg cannot reach.
+    position_mm, error_mm: (n, 3); deviations (p,): those of the controller's model. NaN where a leg cannot reach.
     """
     return mechanism.inverse(np.asarray(position_mm) - error_mm, deviations)
 

@@ -53,9 +53,9 @@ def answers(points_mm, centres_mm, spread_mm):
 def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=None, check_targets=None):
     """Growth on training points (n, 3) and targets (n, q) up to a number of neurons, or until none adds anything.
 
-    new_share: share of a neuron's squared answers that the neurons before it must not give as well. What is hardly new
-    gets a huge weight, which others cancel at the training points and nowhere else. check_mm (m, 3), check_targets (m,
-    q): points that are not trained on, whose error is followed as well; NaN without them.
+    new_share: share of a neuron's squared answers that must be independent of the neurons before it. An almost
+    dependent neuron gets a huge weight, which others cancel at the training points and nowhere else. check_mm (m, 3),
+    check_targets (m, q): validation points, whose error is recorded as well; NaN without them.
     """
     if check_mm is None:
         check_mm, check_targets = points_mm[:0], targets[:0]
@@ -64,17 +64,17 @@ def grow(points_mm, targets, spread_mm, neurons, new_share=ROUNDING, check_mm=No
 
 
 def _grow(every, targets, neurons, new_share):
-    """Growth from the answers (n + m, n) of a neuron at each of the n training points, there and at points to check."""
+    """Growth from the answers (n + m, n) of neurons at the n training points, at these and at m validation points."""
     train = every.shape[1]
     least = new_share * (every[:train] ** 2).sum(axis=0)
     every = every - every[:train].mean(axis=0)
-    rest = targets - targets[:train].mean(axis=0)
+    residual = targets - targets[:train].mean(axis=0)
     basis = every[:train]
-    # what of every neuron's answers is new beside those taken, squared
+    # squared part of every neuron's answers that is orthogonal to the neurons taken
     new, taken = (basis**2).sum(axis=0), np.empty((neurons, len(every)))
-    order, errors = [], [_split_mse(rest, train)]
+    order, errors = [], [_split_mse(residual, train)]
     while len(order) < neurons:
-        left = rest[:train].T @ basis
+        left = residual[:train].T @ basis
         gain = np.divide((left * left).sum(axis=0), new, out=np.full(train, -1.0), where=new > least)
         chosen = int(gain.argmax())
         if gain[chosen] < 0.0:
@@ -86,10 +86,10 @@ def _grow(every, targets, neurons, new_share):
         direction /= np.sqrt(direction[:train] @ direction[:train])
         taken[len(order)] = direction
         new -= (direction[:train] @ basis) ** 2
-        rest -= direction[:, None] * (direction[:train] @ rest[:train])
+        residual -= direction[:, None] * (direction[:train] @ residual[:train])
         least[chosen] = np.inf
         order.append(chosen)
-        errors.append(_split_mse(rest, train))
+        errors.append(_split_mse(residual, train))
     return Growth(np.array(order, dtype=int), *np.array(errors).T)
 
 
@@ -105,7 +105,7 @@ def fit(points_mm, targets, spread_mm, order):
 def validation_mse(points_mm, targets, spread_mm, neurons, folds, new_share=ROUNDING):
     """Cross-validated mean squared error (neurons + 1,) after every neuron.
 
-    folds (n,): the fold that holds each point back; one that runs out of neurons keeps its last error.
+    folds (n,): number of the fold in which each point is held out; a fold without further neurons keeps its last error.
     """
     every, result = answers(points_mm, points_mm, spread_mm), np.zeros(neurons + 1)
     for fold in np.unique(folds):
@@ -127,7 +127,7 @@ class Choice:
 
 def choose(points_mm, targets, spreads_mm, neurons, folds, new_share=ROUNDING):
     """The Choice of least cross-validated error among spreads (s,), see `validation_mse`."""
-    curves = np.array([validation_mse(points_mm, targets, one, neurons, folds, new_share) for one in spreads_mm])
+    curves = np.array([validation_mse(points_mm, targets, s, neurons, folds, new_share) for s in spreads_mm])
     best, count = np.unravel_index(curves.argmin(), curves.shape)
     return Choice(float(spreads_mm[best]), int(count), curves)
 
@@ -137,6 +137,6 @@ def make_folds(count, folds, generator):
     return generator.permutation(np.arange(count) % folds)
 
 
-def _split_mse(rest, train):
-    """Mean squared rest of the first `train` rows and of the others, NaN without others."""
-    return [np.vdot(part, part) / part.size if part.size else np.nan for part in (rest[:train], rest[train:])]
+def _split_mse(residual, train):
+    """Mean squared residual of the first `train` rows and of the others, NaN without others."""
+    return [np.vdot(part, part) / part.size if part.size else np.nan for part in (residual[:train], residual[train:])]

@@ -28,7 +28,7 @@ _TILTS = (("tilt_x", "rad", -0.03, 0.03), ("tilt_z", "rad", -0.03, 0.03))
 
 
 def for_robot(robot):
-    """The law for legs whose drives turn about an axis on the base, None without such."""
+    """The effect model for legs whose drives turn about an axis on the base, None without such."""
     feet = robot.parts.feet
     if not feet or "mm" in robot.parts.units:
         return None

@@ -22,7 +22,7 @@ from rrru.parameters import ParameterSet
 
 
 def for_robot(robot):
-    """The law for arms of two bars, None for robots without."""
+    """The effect model for arms of two bars, None for robots without."""
     members = robot.parts.members
     if not members or any(len(group) != 2 for group in members):
         return None

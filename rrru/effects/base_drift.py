@@ -1,14 +1,14 @@
 """Base drift: robot and instrument creep against each other while a campaign lasts.
 
-A tracker's stand settles, a floor warms, a base gives way: the world of the instrument shifts and turns against that of
-the robot, steadily with the time:
+A tracker's stand settles, a floor warms, a base creeps. The world of the instrument then shifts and turns against that
+of the robot, steadily with the time:
 
     v = s (t - t_0),   w = r (t - t_0)
 
 with three speeds s and three rates r. It enters at the world. `thermal_growth` changes the robot's own lengths and ends
-at a limit; this law changes none.
+at a limit; this effect changes none.
 
-Assumptions: a constant speed, no temperature. Where a file has no times, the order of its rows has to stand for them.
+Assumptions: a constant speed, no temperature. Where a file has no times, the order of its rows replaces them.
 
 Source: ISO/TR 230-2 and ISO 9283 ask for a warmed-up robot and instrument for this reason; the size is assumed: some
 hundredths of a millimetre and microradians in an hour.
@@ -25,7 +25,7 @@ _TYPICAL = np.repeat([1e-5, 1e-8], 3)
 
 
 def for_robot(_robot):
-    """The law, for every robot."""
+    """The effect model, for every robot."""
     named = [(f"{kind}_{axis}", unit, most) for kind, unit, most in _KINDS for axis in "xyz"]
     parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, -most, most, "assumed") for name, unit, most in named))
     return Effect("base_drift", parameters, plain_coordinates(parameters, _TYPICAL), _creep, ("time_s",))

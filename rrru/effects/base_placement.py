@@ -29,7 +29,7 @@ _KINDS = (("azimuth", "rad", -0.03, 0.03), ("radius", "mm", -30.0, 30.0), ("heig
 
 
 def for_robot(robot):
-    """The law for all legs with a foot on the base, None without such."""
+    """The effect model for all legs with a foot on the base, None without such."""
     feet = robot.parts.feet
     if not feet:
         return None

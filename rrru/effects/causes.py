@@ -1,7 +1,7 @@
-"""What every effect of the library means on a machine, what to inspect there and what to do about it: one table.
+"""Table of the library's effects: what each means on a machine, what to inspect there and what to do about it.
 
-Texts about drives depend on their kind, see `rrru.robots.drive_words`; "{moved}" is what a turning drive moves. An
-effect of a user's own has no entry. Sources are standards and textbooks; NO_SOURCE marks a rule of the trade.
+Texts about drives depend on their kind, see `rrru.robots.drive_words`; "{moved}" is what a turning drive moves. A
+user-defined effect has no entry. Sources are standards and textbooks; NO_SOURCE marks a rule of the trade.
 """
 
 from dataclasses import dataclass
@@ -35,9 +35,9 @@ class Cause:
 CAUSES = {
     "backlash": Cause(
         {
-            TURNING: "play between motor and {moved}",
-            SLIDING: "play between motor and slide, as in a nut, a rack or a belt",
-            LENGTH: "play between motor and leg, as in a nut, or slack of a cable",
+            TURNING: "backlash between motor and {moved}",
+            SLIDING: "backlash between motor and slide, as in a nut, a rack or a belt",
+            LENGTH: "backlash between motor and leg, as in a nut, or slack of a cable",
         },
         {
             TURNING: "Block the motor and turn the {moved} by hand to and fro with a dial gauge at its end: gearbox, "
@@ -49,11 +49,11 @@ CAUSES = {
         },
         {
             TURNING: "Set the gear's mesh or preload, or replace the gearbox. Until then come to every pose from the "
-            "same side, or command the play found at each reversal.",
+            "same side, or command the backlash found at each reversal.",
             SLIDING: "Renew or preload the nut and the thrust bearing, tighten rack or belt. Until then come to every "
-            "pose from the same side, or set the play found as the axis' backlash compensation.",
+            "pose from the same side, or set the width found as the axis' backlash compensation.",
             LENGTH: "Renew or preload nut and thrust bearing; raise the cables' pretension. Until then come to every "
-            "pose from the same side, or command the play found at each reversal.",
+            "pose from the same side, or command the backlash found at each reversal.",
         },
         _REVERSAL,
     ),
@@ -305,7 +305,7 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class CauseTexts:
-    """Texts of one effect on one robot, empty for an effect of a user's own."""
+    """Texts of one effect on one robot, empty for a user-defined effect."""
 
     meaning: str = ""
     inspect: str = ""
@@ -316,8 +316,8 @@ class CauseTexts:
 def cause_texts(name: str, words: DriveWords | None = None, numbers: tuple[int, ...] = ()) -> CauseTexts:
     """The CauseTexts of an effect, for the kinds of the drives at which it acts.
 
-    words: of the robot, by default of one with turning drives and a leg for each; numbers: of the drives, from 1 on;
-    all where empty.
+    words: DriveWords of the robot, by default of one with turning drives and a leg for each; numbers: drives at which
+    the effect acts, from 1 on, all where empty.
     """
     if name not in CAUSES:
         return CauseTexts()

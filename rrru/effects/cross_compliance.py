@@ -7,18 +7,18 @@ gears, the load on one moves the other as well:
     dq = C tau,   C = C^T,   dq_a = c_ab tau_b,   dq_b = c_ab tau_a
 
 with the torques tau of the loads about drives and followers as `drive_compliance` has them, a drive's together with all
-that follows it. The diagonal of C is `drive_compliance`; this law is the rest. A linear elastic structure gives way
-alike in both directions (Maxwell's and Betti's theorem), so that every pair of joints has one number, which may be
-negative: |c_ab| <= sqrt(c_aa c_bb), since no load gains work. It enters at the joints' values and is linear in c.
+that follows it. The diagonal of C is `drive_compliance`; this effect has the elements off the diagonal. C of a linear
+elastic structure is symmetric (Maxwell's and Betti's theorem), so that every pair of joints has one parameter. It may
+be negative: |c_ab| <= sqrt(c_aa c_bb), since no load gains work. It enters at the joints' values and is linear in c.
 
-Which joints: those of the trunk that arms with several hands share, each pair of turning ones, neighbours or not: rods
-may span several joints, and the loads of both arms are large there. A single arm has no such law: its joints wind up
-one behind the other, and pairs of a chain with one hand are hard to tell from its other springs.
+Which joints: each pair of turning joints of the trunk that several arms share, neighbours or not. Rods may span several
+joints, and the loads of both arms are large there. A single arm has no such effect: its joints wind up one behind the
+other, and pairs of joints in a chain with one end effector are hard to separate from its other springs.
 
 A joint that is described as following drives already passes its torque on to them: its spring gives C = J K J^T in the
-joints' own values, with terms between joints. So this law tells a robot whose passive joint was described as a drive of
-its own from one whose joint is carried by rods: of a chest with the value -(q_1 + q_2) it finds c_13 = -k_1 and
-c_23 = -k_2 beside c_33 = k_1 + k_2 + k_3.
+joints' own values, with terms between joints. So this effect separates a robot whose passive joint was described as a
+drive of its own from one whose joint is carried by rods. For a chest with the value -(q_1 + q_2) the estimates are
+c_13 = -k_1 and c_23 = -k_2 together with c_33 = k_1 + k_2 + k_3.
 
 Assumptions: linear springs.
 
@@ -38,30 +38,29 @@ _HIGHEST, _TYPICAL = 1e-6, 1e-8
 
 
 def for_robot(robot):
-    """The law for the turning joints of a trunk that several arms share, None where there are fewer than two."""
+    """The effect model for the turning joints of a trunk that several arms share, None for fewer than two joints."""
     springs = (*robot.parts.drives, *robot.parts.followers)
-    shared = [{joint.name for joint in leg.joints} for leg in robot.legs.legs] if robot.legs.hands else []
-    own = [
-        k for k, one in enumerate(springs) if one.unit == "rad" and shared and all(one.site in leg for leg in shared)
-    ]
-    pairs = np.array(list(combinations(own, 2))).reshape(-1, 2)
+    chains = [{joint.name for joint in leg.joints} for leg in robot.legs.legs] if robot.legs.hands else []
+    trunk = [k for k, spring in enumerate(springs) if spring.unit == "rad" and chains]
+    trunk = [k for k in trunk if all(springs[k].site in chain for chain in chains)]
+    pairs = np.array(list(combinations(trunk, 2))).reshape(-1, 2)
     if not len(pairs):
         return None
-    parameters = ParameterSet(tuple(_parameter(springs[one], springs[other]) for one, other in pairs))
+    parameters = ParameterSet(tuple(_parameter(springs[a], springs[b]) for a, b in pairs))
 
     def deflected(motion, values):
         """Changes of the values of drives and followers under cross compliances (pairs,) in rad/(N mm)."""
         load = np.concatenate([motion.drive_load, motion.follower_load], axis=1)
         changes, drives = np.zeros_like(load), len(robot.parts.drives)
-        for (one, other), value in zip(pairs, values, strict=True):
-            changes[:, one] += value * load[:, other]
-            changes[:, other] += value * load[:, one]
+        for (a, b), value in zip(pairs, values, strict=True):
+            changes[:, a] += value * load[:, b]
+            changes[:, b] += value * load[:, a]
         return motion.at_drives(changes[:, :drives]) + motion.at_followers(changes[:, drives:])
 
     return Effect("cross_compliance", parameters, plain_coordinates(parameters, _TYPICAL), deflected, ("drive_load",))
 
 
-def _parameter(one, other):
+def _parameter(first, second):
     """The parameter of a pair of springs, named by their sites."""
-    name = "_".join(["cross", *(spring.site.replace(" ", "_") for spring in (one, other))])
+    name = "_".join(["cross", *(spring.site.replace(" ", "_") for spring in (first, second))])
     return Parameter(name, "rad/(N mm)", 0.0, -_HIGHEST, _HIGHEST, _SOURCE)

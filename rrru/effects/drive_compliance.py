@@ -1,4 +1,4 @@
-"""Drive compliance: between motor and arm the drive gives way to the torque of the loads.
+"""Drive compliance: between motor and arm the drive deflects under the torque of the loads.
 
 Gear teeth, shafts and a harmonic drive's flexspline act as a torsion spring of compliance k_i. The encoder on the
 motor's side does not see its wind-up, so that the arm errs by
@@ -12,15 +12,15 @@ where tau_i is the torque of all loads about drive axis i, positive in the sense
 
 with W the weight and inertia force of platform, payload and half of the forearms. It enters at the drive angle, one
 compliance per leg, and is linear in k. With theta > 0 lowering the arm, gravity lowers the platform. Most of its static
-part looks like errors of lengths and drives; a second payload shows it plainly, since nothing else but `link_flexure`
-grows with it.
+part is confounded with errors of lengths and drives. A second payload separates it, since nothing else but
+`link_flexure` grows with the payload.
 
 Assumptions: linear spring (harmonic drives stiffen with torque by a factor of about two over their range), no lost
 motion (that is `backlash`), no vibration (a motion slow against the drive's resonance).
 
-A joint that a rod or belt makes follow drives gives way to the loads about itself, beside what its drives do.
+A joint that a rod or belt makes follow drives deflects under the loads about itself, in addition to what its drives do.
 
-A carriage on a screw or belt gives way likewise: b_i errs by k_i F_i with the force F_i of all loads along its rail.
+A carriage on a screw or belt deflects likewise: b_i errs by k_i F_i with the force F_i of all loads along its rail.
 
 Source: Tsai, Robot Analysis, 1999, chapter 10 (loads); Spong, Modeling and control of elastic joint robots, ASME
 Journal of Dynamic Systems, Measurement, and Control 109, 1987 (joint as a torsion spring). The size is assumed: 15 N m
@@ -39,7 +39,7 @@ _TYPICAL = {"rad": 2e-8, "mm": 1e-3}
 
 
 def for_robot(robot):
-    """The law for all drives, and after them all joints that follow some."""
+    """The effect model for all drives, and after them all joints that follow some."""
     springs = (*robot.parts.drives, *robot.parts.followers)
     parameters = ParameterSet(drive_parameters(springs, _SOURCE, ("compliance", _HIGHEST)))
     coordinates = plain_coordinates(parameters, of_drives(springs, _TYPICAL))

@@ -7,13 +7,13 @@ drive but follows no single wave:
 
 u_i is the angle of a drive that turns, and pi q_i / L_i of one that slides: L_i is its stroke, of which the waves make
 any function, 1 m where none is stated. It enters at the drive's value. The coefficients of order n are independent and
-normal with a standard deviation in proportion to 1 / sqrt(1 + (n / b)^4): a Gaussian process on the circle, of waves up
-to about b per turn, rougher ones ever weaker. Of some b the likelihood chooses. The spectrum of what is found is the
-finding. A gear's sharp orders are `transmission_error` and `transmission_orders`: where few waves do, these need fewer
-numbers and win. A campaign of few readings has the lower orders only.
+normal with a standard deviation in proportion to 1 / sqrt(1 + (n / b)^4). This is a Gaussian process on the circle with
+waves up to about b per turn; higher orders are ever weaker. The likelihood chooses b among some values. The result is
+the spectrum of the error. A gear's sharp orders are `transmission_error` and `transmission_orders`: where few waves
+suffice, these have fewer coefficients and a higher evidence. With few readings only the lower orders are fitted.
 
-Assumptions: it depends on the drive's value only, not on load or sense of motion; one size for all drives of a kind
-that err.
+Assumptions: it depends on the drive's value only, not on load or sense of motion; all drives of a kind that err have
+errors of one size.
 
 Source: MacKay, Introduction to Gaussian processes, 1998 (periodic kernels). The sizes are assumed: 20 arc seconds are
 1e-4 rad, and a slide of ordinary precision is within 0.02 mm.
@@ -34,12 +34,12 @@ _STROKE_MM = 1000.0
 
 
 def for_robot(robot):
-    """The law for all drives."""
+    """The effect model for all drives."""
     return _of_orders(robot, ORDERS)
 
 
 def _of_orders(robot, orders):
-    """The law with waves of orders (k,)."""
+    """The effect model with waves of orders (k,)."""
     units = robot.parts.units
     parameters = ParameterSet(
         tuple(
@@ -70,11 +70,11 @@ def _of_orders(robot, orders):
 
     def err(motion, values):
         """Changes of the actuator values under coefficients (K times 2 orders,) in their units."""
-        own = np.reshape(values, (len(units), -1))
-        return motion.at_drives(np.stack([f @ one for f, one in zip(functions(motion), own, strict=True)], axis=1))
+        by_drive = np.reshape(values, (len(units), -1))
+        return motion.at_drives(np.stack([f @ c for f, c in zip(functions(motion), by_drive, strict=True)], axis=1))
 
-    laws = {"along_drives": functions, "coarser": partial(_coarser, robot), "of_drive_value": True}
-    return Effect("drive_error_function", parameters, coordinates, err, **laws)
+    structure = {"along_drives": functions, "coarser": partial(_coarser, robot), "of_drive_value": True}
+    return Effect("drive_error_function", parameters, coordinates, err, **structure)
 
 
 def _per_unit(robot):
@@ -84,6 +84,6 @@ def _per_unit(robot):
 
 
 def _coarser(robot, most):
-    """The law with no more coefficients than that, None where too few orders are left."""
+    """The effect model with at most so many coefficients, None where too few orders are left."""
     count = int(most) // (2 * len(robot.parts.units))
     return _of_orders(robot, ORDERS[:count]) if count >= _FEWEST else None

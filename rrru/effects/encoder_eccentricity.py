@@ -11,9 +11,9 @@ It enters at the drive angle, three times two numbers. With s_i = a_i cos(p_i) a
     dtheta_i = s_i sin(theta_i) + c_i cos(theta_i)
 
 Assumptions: one reading head per encoder (two opposite heads cancel it), the encoder on the arm's own axis (behind a
-gear the error is that of `transmission_error`), higher harmonics small; the commanded angle stands for the true one, an
-error of second order. Over the part of a turn that an arm swings through, a constant drive error imitates most of the
-cosine; only the curvature tells them apart.
+gear the error is that of `transmission_error`), higher harmonics small; the commanded angle replaces the true one, an
+error of second order. Over the part of a turn that an arm swings through, most of the cosine is confounded with a
+constant drive error; only the curvature separates them.
 
 Source: geometry of an eccentric circle; Fraden, Handbook of Modern Sensors, 2010, on optical encoders. The size is
 assumed: 10 um off at a grating radius of 20 mm make 5e-4 rad.
@@ -25,5 +25,5 @@ _SOURCE = "eccentricity over grating radius; up to some arc minutes, assumed"
 
 
 def for_robot(robot):
-    """The law for the drives that turn, None for robots without any."""
+    """The effect model for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_eccentricity", 1.0, _SOURCE, 3e-4)

@@ -12,9 +12,9 @@ It enters at the drive angle. With s_i = a_i cos(p_i) and c_i = a_i sin(p_i) it 
     dtheta_i = s_i sin(2 theta_i) + c_i cos(2 theta_i)
 
 Assumptions: the encoder on the arm's own axis; one reading head or two opposite ones, which cancel the first harmonic,
-`encoder_eccentricity`, but not this one; the commanded angle stands for the true one, an error of second order. Over
-the part of a turn that an arm swings through the first harmonic imitates much of the second: they are told apart where
-a drive swings through half a turn or so.
+`encoder_eccentricity`, but not this one; the commanded angle replaces the true one, an error of second order. Over the
+part of a turn that an arm swings through, much of the second harmonic is confounded with the first. They are separable
+where a drive swings through half a turn or so.
 
 Source: geometry of the projected circle; Lu, Graetz, Amin-Shahidi and Smeds, On-axis self-calibration of angle
 encoders, CIRP Annals 59, 2010, on harmonics of encoders. The size is assumed: a ring of 40 mm whose diameters differ by
@@ -27,5 +27,5 @@ _SOURCE = "difference of diameters over four of them, or tilt squared over four,
 
 
 def for_robot(robot):
-    """The law for the drives that turn, None for robots without any."""
+    """The effect model for the drives that turn, None for robots without any."""
     return of_encoders(robot, "encoder_ovality", 2.0, _SOURCE, 2e-4)

@@ -7,11 +7,11 @@ at
 
 with the shift s = (shift_x, shift_y, shift_z) and the rotation Q of the rotation vector w = (turn_x, turn_y, turn_z)
 about the robot frame's origin, the centre of the base. It enters at the frame, six numbers; to first order p' = p + s +
-w x p. The robot itself does nothing wrong, and no compensation by the controller is right for it: the registration is
-to be done anew.
+w x p. The robot itself has no error, and no compensation by the controller is right for it: the registration has to be
+done anew.
 
-Part of it can be imitated by the calibration (a shift along z by the drives, a turn about z hardly at all), the rest is
-a gap that looks the same in every run, direction, speed and payload.
+The calibration absorbs part of it (a shift along z by the drives, a turn about z hardly at all). The remainder is the
+same in every run, direction, speed and payload.
 
 Assumptions: the frame does not move during the campaign, and the tracker's scale is right.
 
@@ -42,5 +42,5 @@ def _moved(motion, values):
 
 
 def for_robot(_robot):
-    """The law, the same for every robot."""
+    """The effect model, the same for every robot."""
     return Effect("frame_misregistration", _PARAMETERS, _COORDINATES, _moved)

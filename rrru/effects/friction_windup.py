@@ -12,19 +12,19 @@ which is solved exactly along any path, however it is sampled:
 
 After a reversal the error changes by 2 a, 63 % of it over the travel s, 95 % over 3 s, and then stays. It enters at the
 drive angle and is linear in the amplitudes, one per drive; the travel is one for all drives of a kind. Friction that
-came at once would hold the arm until the spring has turned by 2 a: that is `backlash` of this width, which this law
-goes over into as s gets small. The two differ at points within some s of a reversal alone: where a campaign has none
-there, `backlash` and this stand in for each other.
+builds up at once would hold the arm until the spring has turned by 2 a. That is `backlash` of this width, the limit of
+this effect for small s. The two differ only at points within some s of a reversal: in a campaign without such points
+they are confounded.
 
-Assumptions: a is small beside s, so that the travel of the drive is that of the contacts; Coulomb friction of one size,
-whatever load and speed; the train starts at rest without tension; path as commanded. Points of the path at which the
-angle is unknown are passed over. Of small loops within a larger one the model lets the error creep; they are rare.
+Assumptions: a is small compared with s, so that the travel of the drive is that of the contacts; Coulomb friction of
+one size, whatever load and speed; the train starts at rest without tension; path as commanded. Points of the path at
+which the angle is unknown are skipped. In small loops within a larger one the error of the model creeps; they are rare.
 
 Source: Dahl, A solid friction model, Aerospace Corporation, 1968; Armstrong-Helouvry, Dupont and Canudas de Wit, A
 survey of models, analysis tools and compensation methods for the control of machines with friction, Automatica 30,
 1994; Seyfferth, Maghzal and Angeles, Nonlinear modeling and parameter identification of harmonic drive robotic
 transmissions, IEEE International Conference on Robotics and Automation, 1995, on wind-up with hysteresis. Sizes
-assumed: as large as the play of a worn drive, over some degrees or millimetres.
+assumed: as large as the backlash of a worn drive, over some degrees or millimetres.
 """
 
 import numba
@@ -40,8 +40,8 @@ _TRAVEL = {
     "rad": Parameter("travel_rad", "rad", 0.05, 0.001, 1.0, "pre-sliding travel of bearings and gears, size assumed"),
     "mm": Parameter("travel_mm", "mm", 5.0, 0.1, 100.0, "pre-sliding travel of screws and rails, size assumed"),
 }
-# travels that are tried, over their nominal values
-_TRIED = (0.5, 2.0)
+# travels of the hyperparameter grid, over their nominal values
+_TRAVEL_SHARES = (0.5, 2.0)
 
 
 @numba.njit(cache=True)
@@ -62,12 +62,12 @@ def wound(path, travel):
 
 
 def for_robot(robot):
-    """The law for all drives."""
+    """The effect model for all drives."""
     drives, units = robot.parts.drives, robot.parts.units
     travels = {unit: _TRAVEL[unit] for unit in dict.fromkeys(units)}
     amplitudes = drive_parameters(drives, _SOURCE, ("amplitude", _HIGHEST))
     parameters = ParameterSet((*amplitudes, *travels.values()))
-    shapes = tuple({travel.name: share * travel.nominal for travel in travels.values()} for share in _TRIED)
+    shapes = tuple({travel.name: share * travel.nominal for travel in travels.values()} for share in _TRAVEL_SHARES)
     which = [list(travels).index(unit) for unit in units]
 
     def wound_up(motion, values):

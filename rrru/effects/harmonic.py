@@ -1,6 +1,6 @@
-"""What periodic drive errors share: amplitude and phase of each drive as parameters, sine and cosine as coordinates.
+"""Common parts of periodic drive errors: amplitude and phase of each drive as parameters, sine and cosine fitted.
 
-They act at the drives of one unit: of a robot with turning and sliding drives not at all of them.
+They act at the drives of one unit. In a robot with turning and sliding drives these are not all of them.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from rrru.parameters import ParameterSet
 
 def drives_of(robot, unit):
     """Numbers (k,) from 0 on of a robot's drives of a unit, "rad" or "mm"."""
-    return np.flatnonzero([own == unit for own in robot.parts.units])
+    return np.flatnonzero([drive_unit == unit for drive_unit in robot.parts.units])
 
 
 def harmonic_parameters(drives, source, unit="rad", highest=0.01):
@@ -19,14 +19,14 @@ def harmonic_parameters(drives, source, unit="rad", highest=0.01):
     count = drives.max() + 1
     amplitudes = leg_parameters(source, ("amplitude", unit, 0.0, highest), count=count)
     phases = leg_parameters("free", ("phase", "rad", -np.pi, np.pi), count=count)
-    return tuple(one for one in (*amplitudes, *phases) if one.leg - 1 in drives)
+    return tuple(parameter for parameter in (*amplitudes, *phases) if parameter.leg - 1 in drives)
 
 
 def at_harmonic(motion, drives, periods, values):
     """Contribution of errors a_i sin(N theta_i + p_i) of drives (k,); values: amplitudes, phases; N periods a turn."""
     count, change = len(drives), np.zeros_like(motion.drive)
-    own = np.sin(periods * motion.drive[:, drives] + values[count : 2 * count])
-    change[:, drives] = values[:count] * own
+    wave = np.sin(periods * motion.drive[:, drives] + values[count : 2 * count])
+    change[:, drives] = values[:count] * wave
     return motion.at_drives(change)
 
 
@@ -54,16 +54,17 @@ def harmonic_coordinates(parameters, typical, shapes=({},)):
 
 
 def of_encoders(robot, name, periods, source, typical_rad):
-    """The Effect of errors with so many periods a turn of every turning drive, None for robots without any."""
+    """Effect of errors with `periods` waves per turn of every turning drive, None for robots without any."""
     turning = drives_of(robot, "rad")
     if not len(turning):
         return None
     parameters = ParameterSet(harmonic_parameters(turning, source))
 
-    def law(motion, values):
+    def harmonic_error(motion, values):
         return at_harmonic(motion, turning, periods, values)
 
-    return Effect(name, parameters, harmonic_coordinates(parameters, typical_rad), law, of_drive_value=True)
+    coordinates = harmonic_coordinates(parameters, typical_rad)
+    return Effect(name, parameters, coordinates, harmonic_error, of_drive_value=True)
 
 
 def waves(angle, orders):

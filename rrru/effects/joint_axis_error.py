@@ -5,8 +5,8 @@ The axis of a joint along the unit vector a of its own frame is shifted and tilt
     shift = s_1 e_1 + s_2 e_2,    w = t_1 e_1 + t_2 e_2,    e_1, e_2 perpendicular to a
 
 four numbers a joint; a slide has no place across itself and only tilts. They enter at the joints' seats and are linear.
-A shift or a turn along the axis itself is an offset of the joint's value: of a driven one the calibration's, of a
-passive one nothing that is seen. A calibration that has these numbers itself takes them up.
+A shift or a turn along the axis itself is an offset of the joint's value: a parameter of the calibration for a driven
+joint, not observable for a passive one. A calibration with these parameters absorbs this effect.
 
 Assumptions: rigid links, constant over the campaign.
 
@@ -24,7 +24,7 @@ _BOUNDS, _TYPICAL = {"mm": 5.0, "rad": 0.03}, {"mm": 0.1, "rad": 5e-4}
 
 
 def for_robot(robot):
-    """The law for all joints that move, None for a robot of bars alone or on rails: what these have is `rail_tilt`."""
+    """The effect model for all joints that move, None for a robot of bars alone or on rails (there `rail_tilt`)."""
     moving = [joint for joint in robot.legs.joints if joint.kind != "fixed"]
     if not moving or (robot.parts.feet and all(joint.kind == "P" for joint in moving)):
         return None
@@ -43,7 +43,7 @@ def for_robot(robot):
 
 
 def _across(joint):
-    """Unit twists (6,) across the axis of a joint: two shifts, but for a slide, and two tilts."""
+    """Unit twists (6,) across the axis of a joint: two shifts, none for a slide, and two tilts."""
     first = np.cross(joint.axis, np.eye(3)[np.abs(joint.axis).argmin()])
     first = first / np.linalg.norm(first)
     across = (first, np.cross(joint.axis, first))

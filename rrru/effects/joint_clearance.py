@@ -11,14 +11,14 @@ elasticity do. As in `link_flexure`, `held` says whether f_i is the force with j
 
 It enters as a shift of the platform's U-joint centre against the forearm, one clearance per leg, and is linear in c. It
 flips with the sign of the force and vanishes where the leg transmits none. While the force keeps its sign it is a
-change of L3 by c_i, which a calibration with three free forearm lengths takes up, and one with tied lengths in part; it
-shows itself by the jump where the force changes sign.
+change of L3 by c_i: a calibration with three free forearm lengths absorbs it, one with tied lengths in part. The jump
+where the force changes sign makes it identifiable.
 
 Assumptions: massless contact (the pin is always at the bore's wall, and passes from one side to the other in no time);
 the contact lies on the forearm's line; the pin's radius left out.
 
 Source: Parenti-Castelli and Venanzi, Clearance influence analysis on mechanisms, Mechanism and Machine Theory 40, 2005.
-Paper A, section 3.3, blames it for what calibration leaves; its size is assumed.
+Paper A, section 3.3, names it as the cause of the error after calibration; its size is assumed.
 """
 
 import numpy as np
@@ -34,7 +34,7 @@ _SHAPE = (
 
 
 def for_robot(robot):
-    """The law for robots whose platform is pushed by links, None for others."""
+    """The effect model for robots whose platform is pushed by links, None for others."""
     members = robot.parts.members
     if not members:
         return None

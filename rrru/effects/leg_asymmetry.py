@@ -4,13 +4,13 @@ Leg i has its own arm, offset and forearm,
 
     L1_i = L1 + dL1_i,    L2_i = L2 + dL2_i,    L3_i = L3 + dL3_i
 
-where the calibration of paper A knows one number per link for all legs (its 14 errors, tied to 8; 7 of them can be
-identified). It enters at the lengths, nine numbers, and is linear in them; the position follows from eq. (8) leg by
+where the calibration of paper A has one parameter per link for all legs (its 14 errors, tied to 8; 7 of them can be
+identified). It enters at the lengths, nine parameters, and is linear in them; the position follows from eq. (8) leg by
 leg, and the platform does not turn.
 
-The part common to the legs, (dLk_1 + dLk_2 + dLk_3) / 3, is the calibration's own dLk: a gauge, so that two of the
-three numbers per link are new. L2 and L3 of one leg act nearly alike, since rho = L2 + sqrt(L3^2 - v^2) tells them
-apart only where the tangential offset v of the platform is large.
+The part common to the legs, (dLk_1 + dLk_2 + dLk_3) / 3, is the calibration's own dLk and not identifiable from it, so
+that two of the three parameters per link are new. L2 and L3 of one leg act nearly alike: rho = L2 + sqrt(L3^2 - v^2)
+separates them only where the tangential offset v of the platform is large.
 
 A robot with one link per leg has the three dL3_i only.
 
@@ -27,7 +27,7 @@ _SOURCE = "paper A, section 2.2, and workshop tolerance; bounds assumed"
 
 
 def for_robot(robot):
-    """The law for robots whose legs have links, None for others."""
+    """The effect model for robots whose legs have links, None for others."""
     links = robot.parts.links
     if not links:
         return None

@@ -1,6 +1,6 @@
-"""The library of effects by name, read from the files of this folder, and effects of one's own by `module:object`.
+"""The library of effects by name, read from the files of this folder, and user-defined effects by `module:object`.
 
-A file of the library has a function `for_robot`, from a robot to its Effect, None where it has no site for it.
+A file of the library has a function `for_robot`, from a robot to its Effect, None where the robot has no site for it.
 """
 
 import importlib
@@ -15,7 +15,7 @@ from rrru.errors import ConfigError
 from rrru.parameters import ParameterSet
 from rrru.plugins import load_object
 
-# the order of tables and draws; what is not named here follows by its file's name
+# the order of tables and draws; effects that are not listed here follow by their files' names
 _ORDER = (
     *("backlash", "drive_compliance", "link_flexure", "joint_clearance", "leg_asymmetry", "axis_tilt", "rail_tilt"),
     *("base_placement", "frame_misregistration", "encoder_eccentricity", "transmission_error", "thermal_growth"),
@@ -38,7 +38,7 @@ def _module(name):
 
 
 NAMES = _names()
-# effects that hold others as special cases: what they are told apart by is how few numbers do
+# effects that contain others as special cases: the number of parameters alone separates them (Occam factor)
 HOLDS = {
     "joint_axis_error": ("leg_asymmetry", "axis_tilt", "rail_tilt", "base_placement"),
     "friction_windup": ("backlash",),
@@ -90,7 +90,7 @@ def active_effects(section, robot):
 
 
 def _load(name):
-    """The object that `module:object` stands for, an instance where it is a class."""
+    """The object named by `module:object`, an instance where it is a class."""
     named = load_object(f"effect {name!r}", name)
     if not isinstance(named, type):
         return named
@@ -101,20 +101,20 @@ def _load(name):
         raise ConfigError(f"effect {name!r}: cannot make one: {error}; allowed: {allowed}") from error
 
 
-def _complete(name, own):
+def _complete(name, users):
     """The user's effect with its contributions checked and with defaults for what it may leave out."""
-    missing = [part for part in ("name", "parameters", "contribute") if not hasattr(own, part)]
+    missing = [part for part in ("name", "parameters", "contribute") if not hasattr(users, part)]
     if missing:
         raise ConfigError(f"effect {name!r} lacks {', '.join(missing)}; needed: name, parameters, contribute")
-    if not isinstance(own.parameters, ParameterSet) or not callable(own.contribute):
+    if not isinstance(users.parameters, ParameterSet) or not callable(users.contribute):
         raise ConfigError(f"effect {name!r}: parameters is no rrru.parameters.ParameterSet or contribute no function")
-    if own.name in NAMES:
-        raise ConfigError(f"effect {name!r}: its name {own.name!r} belongs to the library; allowed: another one")
-    coordinates = getattr(own, "coordinates", None)
+    if users.name in NAMES:
+        raise ConfigError(f"effect {name!r}: its name {users.name!r} belongs to the library; allowed: another one")
+    coordinates = getattr(users, "coordinates", None)
     if coordinates is None:
-        coordinates = _default_coordinates(name, own.parameters)
-    law = partial(_checked, name, own.contribute)
-    return Effect(own.name, own.parameters, coordinates, law, tuple(getattr(own, "needs", ())))
+        coordinates = _default_coordinates(name, users.parameters)
+    checked = partial(_checked, name, users.contribute)
+    return Effect(users.name, users.parameters, coordinates, checked, tuple(getattr(users, "needs", ())))
 
 
 def _checked(name, contribute, motion, values):

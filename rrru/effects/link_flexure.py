@@ -1,4 +1,4 @@
-"""Link flexure: links that push a platform give way along their length, links and bearings of an arm across its joints.
+"""Link flexure: links that push a platform deflect along their length, links and bearings of an arm across its joints.
 
 Forearm i pushes the platform with the force f_i along its own direction g_i (compression positive,
 `rrru.kinematics.dynamics.loads`). With its end fittings and U-joint it is a spring of compliance k_i; compression
@@ -7,15 +7,15 @@ shortens it:
     dL3_i = -k_i f_i
 
 It enters at the length L3, one compliance per leg, and is linear in k. The platform follows its load: it sinks under
-its weight, and further in proportion to a payload, which tells it from errors of the lengths; `drive_compliance` does
-so too, but with the drive's torque, so that the pattern over the workspace differs.
+its weight, and further in proportion to a payload, which separates it from errors of the lengths. `drive_compliance`
+does so too, but with the drive's torque, so that the pattern over the workspace differs.
 
-A member that is itself driven, as a hexapod's leg, is no forearm: a spring along it does what its drive's does,
-whatever of the leg it is, and both are `drive_compliance`.
+A member that is itself driven, as a hexapod's leg, is no forearm: a spring along it acts like the spring of its drive,
+whatever part of the leg it is, and both are `drive_compliance`.
 
 Which force the forearm carries depends on joint 3: free, it is the component along the forearm; held by friction, the
-leg is one two-force member from elbow to U-joint (`held_n` of `rrru.kinematics.dynamics.Loads`). Both are tried; `held`
-is 0 or 1, or a share between.
+leg is one two-force member from elbow to U-joint (`held_n` of `rrru.kinematics.dynamics.Loads`). Both are fitted;
+`held` is 0 or 1, or a share between.
 
 An arm has no such members: its links bend, and its bearings tilt. At every turning joint all that it carries turns by
 
@@ -44,7 +44,7 @@ _HELD = Parameter("held", "1", 0.0, 0.0, 1.0, "0 where joint 3 is free, 1 where 
 
 
 def for_robot(robot):
-    """The law for robots whose platform is pushed by links, and for arms; None for others."""
+    """The effect model for robots whose platform is pushed by links, and for arms; None for others."""
     members = robot.parts.members
     if not members:
         return _across_joints(robot.legs.arm_joints)
@@ -74,7 +74,7 @@ def _shortened(motion, values):
 
 
 def _across_joints(joints):
-    """The law for an arm with these turning joints, None where there are none."""
+    """The effect model for an arm with these turning joints, None where there are none."""
     if not joints:
         return None
     parameters = ParameterSet(

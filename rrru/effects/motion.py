@@ -1,4 +1,4 @@
-"""The motion that the effects see, from what the platform is told to do. Lengths mm, angles rad, forces N, times s."""
+"""The motion that the effects depend on, from the commanded course. Lengths mm, angles rad, forces N, times s."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -11,12 +11,13 @@ from rrru.kinematics.dynamics import drive_rates, load_slopes, loads
 
 @dataclass(frozen=True)
 class Course:
-    """What a robot is told to do at n points, NaN where nobody knows.
+    """What a robot is commanded to do at n points, NaN where it is unknown.
 
     position_mm, velocity_mm_s, acceleration_mm_s2: (n, 3), drive (n, K); path_drive (N, K): actuator values along
     everything that is driven, with rows path_index (n,); time_s, payload_kg: (n,); drive_motion: first and second
-    derivatives (n, K) of the actuator values, None where the positions tell them; stops: whether the robot stopped at
-    every point; temperature_c: (n,) or one for all; approach: (n, K) or one for all, of `rrru.effects.protocol.Motion`.
+    derivatives (n, K) of the actuator values, None where the positions determine them; stops: whether the robot stopped
+    at every point; temperature_c: (n,) or one for all; approach: (n, K) or one for all, see
+    `rrru.effects.protocol.Motion`.
     """
 
     position_mm: np.ndarray
@@ -46,7 +47,7 @@ def make_motion(robot, masses, course, stands=None):
     )
     rate, drive_acceleration = course.drive_motion or drive_rates(robot, position, velocity, acceleration)
     known = (np.isfinite(velocity) & np.isfinite(acceleration)).all(axis=1, keepdims=True)
-    # where the platform's orientation is free, the values that were sent tell the pose
+    # where the platform's orientation is free, only the commanded actuator values determine the pose
     nominal, carried = course.drive if robot.orients else robot.inverse(position), np.nan_to_num(payload)
     inertial = np.where(known, acceleration, 0.0)
     turning = tuple(np.where(known, values, 0.0) for values in (rate, drive_acceleration))
@@ -62,7 +63,7 @@ def make_motion(robot, masses, course, stands=None):
         path_index=np.asarray(course.path_index),
         time_s=np.asarray(course.time_s, dtype=float),
         payload_kg=payload,
-        **{name: getattr(load, own) for name, own in LOADS.items()},
+        **{name: getattr(load, attribute) for name, attribute in LOADS.items()},
         load_slopes=partial(load_slopes, robot, masses, at, nominal, inertial, carried),
         last_move=last_move(course.drive, course.path_index) if course.stops else np.full_like(rate, np.nan),
         temperature_c=np.broadcast_to(np.asarray(course.temperature_c, dtype=float), len(position)),
@@ -73,9 +74,9 @@ def make_motion(robot, masses, course, stands=None):
 def standing(robot, sent, posed, turned=True):
     """Drive values (n, K) that bring the nominal robot next to where one stands, and its TwistMap there.
 
-    sent: actuator values (n, K) and positions (n, 3); posed: Poses and the twists (n or 1, sites, 6) of all that is off
-    in them; turned: whether the poses' orientations count, or the tool's position alone. Of an arm what is off in its
-    drives alone counts, of others the poses, by one linear step.
+    sent: actuator values (n, K) and positions (n, 3); posed: Poses and the twists (n or 1, sites, 6) of all their
+    errors; turned: whether the poses' orientations count, or the tool's position alone. For an arm the errors of its
+    drives alone count, for other robots the poses, by one linear step.
     """
     (actuators, position), (poses, twists) = sent, posed
     if not robot.legs.parallel:

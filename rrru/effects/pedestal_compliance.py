@@ -1,4 +1,4 @@
-"""Pedestal compliance: what the robot stands on gives way to the moment of its weight.
+"""Pedestal compliance: what the robot stands on deflects under the moment of its weight.
 
 A floor plate, a table or a pedestal is a beam that the weight of links, platform and payload bends. About the robot's
 origin it bears the moment m of these loads; at its top it then turns and, the turn being about some place further
@@ -7,9 +7,9 @@ down, shifts by
     w_k = c_k m_k,    v = sum_k s_k m_k (e_k x up)
 
 about and along the horizontal axes e_k of the robot's frame: a tilt c_k and a shift s_k per moment for each. The robot
-and everything that stands on the same body move as one, so that it is a twist of the world as an instrument on the
-floor sees it: reflectors on the table beside the robot show it plainly, together with those on the tool. Without them
-it is told from `drive_compliance` of the first joints by its pattern alone.
+and everything that stands on the same body move as one. The effect is therefore a twist of the world as an instrument
+on the floor sees it. Reflectors on the table next to the robot, together with those on the tool, make it identifiable.
+Without them only its pattern separates it from `drive_compliance` of the first joints.
 
 Assumptions: linear spring; loads at rest; the weight itself, which does not change, is part of where the robot stands.
 
@@ -31,7 +31,7 @@ _TYPICAL = np.repeat([1e-9, 3e-7], 2)
 
 
 def for_robot(robot):
-    """The law, about the two axes of the robot's frame that are the most level."""
+    """The effect model, about the two axes of the robot's frame that are the most level."""
     axes = level_axes(robot)
     names = [(f"{kind}_{'xyz'[k]}", unit, low, high) for kind, unit, low, high in _KINDS for k in axes]
     parameters = ParameterSet(tuple(Parameter(name, unit, 0.0, *ends, _SOURCE) for name, unit, *ends in names))

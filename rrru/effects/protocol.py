@@ -1,4 +1,4 @@
-"""What an effect is: a physical law that knows the motion and says what it changes, and where. mm, rad, N, s."""
+"""Effect models: functions of the motion that give the changes of the geometry and where they act. mm, rad, N, s."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ LOADS = {
     "across": "across",
     "base_moment": "base",
 }
-# field of a Motion that tells from which side each drive comes to a reading, where `Motion.approach` is NaN
+# field of a Motion that determines from which side each drive approaches a reading, where `Motion.approach` is NaN
 PATH = "path_drive"
 
 
@@ -42,7 +42,7 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Motion:
-    """What a robot does at the n sampled points, as far as an effect may need it; NaN where nobody knows it.
+    """What a robot does at the n sampled points, as far as an effect may need it; NaN where it is unknown.
 
     robot: with its sites and parts; position_mm (n, 3): commanded positions; drive, drive_rate, drive_acceleration (n,
     K): commanded actuator values, angles in rad or lengths in mm, and their derivatives by the time; path_drive (N, K):
@@ -54,7 +54,7 @@ class Motion:
     joints' frames; base_moment (n, 3): of all loads on the base, in N mm about the robot's origin; last_move (n, K):
     how far the drives went from the stop before to this one, NaN where the robot does not stop at its points;
     temperature_c (n,): of the robot; load_slopes: derivatives of the loads, see `rrru.kinematics.dynamics`; approach
-    (n, K): where the path does not determine from which side a drive comes to a reading, the expected sense of its
+    (n, K): where the path does not determine from which side a drive approaches a reading, the expected sense of its
     approach (-1 from above, 1 from below, 0 for even odds), NaN where the path determines it.
     """
 
@@ -83,30 +83,30 @@ class Motion:
 
     @cached_property
     def slopes(self) -> tuple[Any, ...]:
-        """What `load_slopes` tells, made once."""
+        """The result of `load_slopes`, computed once."""
         return self.load_slopes()
 
     @cached_property
     def cache(self) -> dict[Any, Any]:
-        """What laws have made of this motion alone, so that it is made once."""
+        """Results that effect models compute from this motion alone, so that each is computed once."""
         return {}
 
     def under(self, extra_kg: float, *lean_rad: float) -> "Motion":
-        """The motion with so much more at the platform, of a base that leans about its level axes."""
-        weights = np.array([extra_kg, *lean_rad, *(extra_kg * lean for lean in lean_rad)])
-        if not weights.any():
+        """The motion with an additional payload and a base that is tilted about its level axes."""
+        factors = np.array([extra_kg, *lean_rad, *(extra_kg * lean for lean in lean_rad)])
+        if not factors.any():
             return self
         changed = {
             name: getattr(self, name)
-            + sum(weight * getattr(slope, own) for weight, slope in zip(weights, self.slopes, strict=True))
-            for name, own in LOADS.items()
+            + sum(factor * getattr(slope, attribute) for factor, slope in zip(factors, self.slopes, strict=True))
+            for name, attribute in LOADS.items()
         }
         return replace(self, **changed)
 
     def with_approach(self, changes: np.ndarray, from_below: np.ndarray) -> np.ndarray:
         """Changes (n, K) of the actuator values with their expected values where the path does not determine them.
 
-        from_below (K,): change of each drive that comes from below; it has the other sign from above.
+        from_below (K,): change of each drive that approaches from below; it has the other sign from above.
         """
         return np.where(np.isnan(self.approach), changes, self.approach * from_below)
 
@@ -142,19 +142,19 @@ class Motion:
     def at(self, twists: Mapping[str, np.ndarray]) -> Contribution:
         """Contribution of twists (n or 1, 6) by the site's name."""
         numbers = self.robot.legs.site_numbers
-        rows = max((len(one) for one in twists.values()), default=1)
+        rows = max((len(twist) for twist in twists.values()), default=1)
         result = np.zeros((rows, len(numbers), 6))
-        for site, one in twists.items():
-            result[:, numbers[site]] += one
+        for site, twist in twists.items():
+            result[:, numbers[site]] += twist
         return Contribution(result)
 
 
 @dataclass(frozen=True)
 class Search:
-    """A parameter of a law's shape that may have any value: waves per turn of a drive, up to the highest order.
+    """A continuous hyperparameter of an effect model: waves per turn of a drive, up to the highest order.
 
-    name: of the parameter; unit: of the drives that have it; value: order to the parameter's value; order: the other
-    way.
+    name: of the hyperparameter; unit: of the drives that have it; value: from the order to the hyperparameter; order:
+    the inverse of `value`.
     """
 
     name: str
@@ -166,18 +166,18 @@ class Search:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """How the diagnosis fits a law: c coordinates in which its contribution is linear, or nearly so.
+    """How the diagnosis fits an effect model: c coordinates in which its contribution is linear, or nearly so.
 
-    typical (c,): sizes that a worn or badly assembled robot may have, they set the fit's prior; most (c,): largest
-    sizes that the law allows; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all;
-    positive (c,): whether it cannot be negative; alike: whether legs are of one design, so that one value may hold for
-    all; shapes: values of the parameters that are no coordinates, each a variant of the law to be tried; to_values:
-    coordinates (c,) and a shape to parameter values (p,); weights: prior probabilities of the shapes, None where all
-    are alike; searched: what is searched beside the listed shapes, of which the first so many are stated; doubt: share
-    that a shape's parameter may be off by, 1 sigma, of what is searched the order itself; broad: so many coordinates
-    that they are averaged over before anything else is tried; spectra: sizes (c,) of the coordinates, of which the
-    campaign chooses; sized: whether it has, and the typical sizes are its own; log_prior: of a choice that has been
-    made otherwise.
+    typical (c,): prior s.d., the sizes that a worn or badly assembled robot may have; most (c,): upper bounds of the
+    sizes; legs (c,): number of the leg or drive from 1 on, 0 where the coordinate acts on all; positive (c,): whether
+    it cannot be negative; alike: whether legs are of one design, so that one value may hold for all; shapes: grid of
+    the hyperparameters, the parameters that are no coordinates; to_values: from coordinates (c,) and a shape to
+    parameter values (p,); weights: prior probabilities of the shapes, None where all are equal; searched: continuous
+    hyperparameter in addition to the listed shapes; stated: number of shapes, from the first on, that the user has
+    stated; doubt: relative s.d. of a hyperparameter, or s.d. of the order of a searched one; broad: whether the
+    coordinates are so many that they are marginalised before the other effects are fitted; spectra: prior s.d. (c,)
+    of the coordinates, among which the campaign chooses; sized: whether it has chosen, and `typical` is its choice;
+    log_prior: log prior probability of a choice that was made outside of the fit.
     """
 
     typical: np.ndarray
@@ -212,7 +212,7 @@ def leg_parameters(source: str, *kinds: tuple[str, str, float, float], count: in
 
 
 def drive_parameters(drives: Iterable[Any], source: Mapping[str, str], *kinds: tuple) -> tuple[Parameter, ...]:
-    """Parameters of each Drive; kinds: (name, {drive's unit: (unit, low, high)}), source by drive's unit."""
+    """Parameters of each Drive; kinds: (name, {drive's unit: (unit, low, high)}); source: by the drive's unit."""
     return tuple(
         Parameter(f"{name}{number}", unit, 0.0, low, high, source[drive.unit], number)
         for number, drive in enumerate(drives, 1)
@@ -229,9 +229,9 @@ def of_drives(drives: Iterable[Any], by_unit: Mapping[str, float]) -> np.ndarray
 def plain_coordinates(
     parameters: ParameterSet, typical: npt.ArrayLike, shapes: tuple[Mapping[str, float], ...] = ({},)
 ) -> Coordinates:
-    """Coordinates that are the parameters themselves, but for those that the shapes fix; a low of zero makes positive.
+    """Coordinates that are the parameters themselves, except those of the shapes; positive where the low bound is zero.
 
-    typical: one size for all coordinates or one each.
+    typical: one prior s.d. for all coordinates, or one for each.
     """
     free = [p for p in parameters if p.name not in shapes[0]]
 
@@ -252,15 +252,14 @@ def plain_coordinates(
 class Effect:
     """One physical effect: law(motion, values) gives the Contribution of parameter values (p,) at a Motion's points.
 
-    needs: fields of Motion without which the law says nothing, "path_drive" of a law that depends on the sense in which
-    a drive comes to a reading; along_drives: of a law that changes nothing but actuator
-    values, and is linear in its coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k);
-    of_drive_value: whether the law changes actuator values alone, each by a function of itself;
-    with_waves: of a law whose waves are to be found, from pairs (drive, order) and the log prior of just these to the
-    law that has them; waves: these pairs; spoils: of a law about the measuring and not about the robot, why a
-    calibration that leaves it out is wrong; switches: whether the law knows no more of a load than its sign; coarser:
-    of a law of so many coefficients that few readings do not tell them, from the most that they may be to the law that
-    has no more, or None.
+    needs: fields of Motion without which the effect model contributes nothing, "path_drive" where it depends on the
+    sense in which a drive approaches a reading; along_drives: where only actuator values change, linearly in the
+    coordinates, the functions of each drive in turn, from a Motion to arrays (n, c_k); of_drive_value: whether only
+    actuator values change, each by a function of itself; with_waves: where harmonic orders are searched, from pairs
+    (drive, order) and their log prior to the effect with these orders; waves: these pairs; spoils: where the effect is
+    one of the measurement and not of the robot, why a calibration without it is wrong; switches: whether the effect
+    depends on the sign of a load alone; coarser: where few readings do not determine the coefficients, from their
+    largest allowed number to an effect with no more, or None.
     """
 
     name: str
@@ -277,12 +276,12 @@ class Effect:
     coarser: Callable[[float], "Effect | None"] | None = None
 
     def doubted(self, name: str, value: float) -> float:
-        """A value of a shape's parameter as far off as it may be, 1 sigma."""
-        search, doubt = self.coordinates.searched, self.coordinates.doubt
+        """A value of a hyperparameter, displaced by one standard deviation."""
+        search, deviation = self.coordinates.searched, self.coordinates.doubt
         if search is not None:
-            return search.value(search.order(value) + doubt)
-        stepped = value * (1.0 + doubt)
-        return stepped if stepped <= self.parameters[name].high else value * (1.0 - doubt)
+            return search.value(search.order(value) + deviation)
+        stepped = value * (1.0 + deviation)
+        return stepped if stepped <= self.parameters[name].high else value * (1.0 - deviation)
 
     def contribute(self, motion: Motion, values: npt.ArrayLike) -> Contribution:
         """Changes at the points of a motion under parameter values (p,)."""
@@ -302,7 +301,7 @@ class ActiveEffect:
 
 
 def lacks_values(effect: Any, motion: Motion) -> np.ndarray:
-    """Rows (n,) at which a value that an effect, or an unknown function, needs is NaN."""
+    """Rows (n,) at which a value that an effect, or the discrepancy basis, needs is NaN."""
     needs = [getattr(motion, need) for need in effect.needs if need != PATH]
     return ~np.all([np.ones(len(motion), dtype=bool), *(known_values(values) for values in needs)], axis=0)
 
@@ -313,7 +312,7 @@ def known_values(values: np.ndarray) -> np.ndarray:
 
 
 def complete_rows(effect: Any, motion: Motion) -> np.ndarray:
-    """Rows (n,) at which a motion has all that an effect needs, the sense in which the drives arrive included."""
+    """Rows (n,) at which a motion has all that an effect needs, including the sense in which the drives approach."""
     result = ~lacks_values(effect, motion)
     if PATH in effect.needs:
         result &= np.isnan(np.broadcast_to(motion.approach, motion.drive.shape)).all(axis=1)
@@ -321,12 +320,12 @@ def complete_rows(effect: Any, motion: Motion) -> np.ndarray:
 
 
 def bears_load(effect: Any) -> bool:
-    """Whether an effect, or an unknown function, changes with the loads."""
+    """Whether an effect, or the discrepancy basis, depends on the loads."""
     return not LOADS.keys().isdisjoint(effect.needs)
 
 
 def gives_way(effect: Any) -> bool:
-    """Whether an effect, or an unknown function, grows with the loads, so that it tells the weight."""
+    """Whether an effect, or the discrepancy basis, grows with the loads, so that payload and tilt matter."""
     return bears_load(effect) and not getattr(effect, "switches", False)
 
 

@@ -7,8 +7,8 @@ vector
 
 rise lifts a horizontal rail's outer end or leans an upright one inwards, swing turns a horizontal rail about the
 vertical, lean an upright one to the side. The carriage at the distance b_k from the zero mark is off by w_k x b_k d_k,
-which grows along the rail: what tells it from the zero error of a slider. It enters as a twist at the legs'
-feet, nine numbers of which six do something, and is linear in them.
+which grows along the rail; this separates it from the zero offset of a slider. It enters as a twist at the legs'
+feet, nine numbers of which six have an effect, and is linear in them.
 
 Assumptions: straight rail, true at its zero mark; joints on the carriage that lean with it, so that the platform turns;
 constant over the campaign.
@@ -26,7 +26,7 @@ _TURNS = tuple((kind, "rad", -0.05, 0.05) for kind in ("lean", "rise", "swing"))
 
 
 def for_robot(robot):
-    """The law for legs whose drives slide on rails on the base, None without such."""
+    """The effect model for legs whose drives slide on rails on the base, None without such."""
     feet = robot.parts.feet
     if not feet or "rad" in robot.parts.units:
         return None

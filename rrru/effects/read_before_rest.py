@@ -1,4 +1,4 @@
-"""Read before rest: the drives were read, or told, before the arm stood still; the point was measured when it did.
+"""Read before rest: the drives were read, or stated, before the arm stood still; the point was measured when it did.
 
 At a stop that a drive has reached by a move m_i from the one before, the value in the file is short of the one at the
 measurement by a share of that move:
@@ -12,12 +12,12 @@ as M where its speed is limited, p = 1, and as the root of M where its accelerat
 starts. k_i > 0 where the values were read too early, k_i < 0 where it was the point that was measured before the arm
 had reached the values that were sent, or where the arm overshoots.
 
-`backlash` turns its sign with the last move as well, but does not grow with it; `servo_lag` needs a speed and is about
-points that are passed. Which one is told apart by moves of many sizes: poses in no order have them.
+`backlash` turns its sign with the last move as well, but does not grow with it; `servo_lag` needs a speed and acts at
+points that are passed. Moves of many sizes, as between poses in random order, separate them.
 
 Assumptions: rows in the order driven, every stop among them (a row that is held out of the fits remains one); one time
 between reading and measuring for all rows, its mean where it varies; a slide of 500 mm takes as long as a turn of
-1 rad. Where the robot does not stop at its points, or at the first one, the law says nothing.
+1 rad. Where the robot does not stop at its points, or at the first one, the contribution is zero.
 
 Source: settling of a first-order system and trapezoidal profiles: Siciliano, Sciavicco, Villani and Oriolo, Robotics:
 Modelling, Planning and Control, 2009, sections 4.2 and 8.3. Sizes assumed: 1 mrad is left of a move of 1 rad.
@@ -31,17 +31,17 @@ from rrru.parameters import Parameter, ParameterSet
 _SHARE = ("1", -0.05, 0.05)
 _SOURCE = "share of a move that is left, size assumed"
 _EXPONENT = Parameter("exponent", "1", 0.0, 0.0, 1.0, "how a move comes to rest: 0 settling, 1 limited speed")
-_SPOILS = "the drives were read, or told, before the arm stood still"
+_SPOILS = "the drives were read, or stated, before the arm stood still"
 _STARTS = (0.0, 0.5, 1.0)
 _TYPICAL = 1e-3
 # a move of each unit that takes as long as one of 1 rad
 _AS_LONG = {"rad": 1.0, "mm": 500.0}
-# nearer moves than this count as that: nothing is left of no move
+# shorter moves are scaled as if they were this long, so that the share stays finite at a move of zero
 _SHORTEST = 1e-3
 
 
 def for_robot(robot):
-    """The law for all drives."""
+    """The effect model for all drives."""
     shares = leg_parameters(_SOURCE, ("share", *_SHARE), count=len(robot.parts.drives))
     parameters = ParameterSet((*shares, _EXPONENT))
     shapes = tuple({"exponent": start} for start in _STARTS)

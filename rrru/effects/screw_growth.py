@@ -7,8 +7,8 @@ as in `thermal_growth`,
     dq_k(t) = [a_k (q_k - l_k) + b_k (q_k - u_k)] (1 - exp(-t / tau))
 
 It enters at the drive's value. Both together are a screw that is held at a point between the ends, where the bracket
-vanishes, with the strain a + b. Where nobody knows the range of a drive its screw is held at the value 0 and has the
-first strain alone. The law is linear in the strains; tau is tried on a grid of time constants.
+vanishes, with the strain a + b. Where the range of a drive is unknown, its screw is held at the value 0 and has the
+first strain alone. The effect is linear in the strains; tau is fitted on a grid of time constants.
 
 Assumptions: one temperature along each screw, one time constant for all; the structure that carries the screws stays
 as it is (`thermal_growth` is about that); constant power over the campaign.
@@ -27,8 +27,8 @@ _TYPICAL, _MOST, _SOURCE = 1e-4, 5e-3, "steel 1.2e-5 per kelvin; temperature ass
 
 
 def for_robot(robot):
-    """The law for all drives that slide, None where none does."""
-    held = [one for k, unit in enumerate(robot.parts.units) if unit == "mm" for one in _held(robot, k)]
+    """The effect model for all drives that slide, None where none does."""
+    held = [strain for k, unit in enumerate(robot.parts.units) if unit == "mm" for strain in _held(robot, k)]
     if not held:
         return None
     parameters = ParameterSet((*(parameter for parameter, *_ in held), TIME_CONSTANT))

@@ -6,13 +6,13 @@ as if it were late by T = 1 / K_v; so do delays in the controller. With the dela
     dtheta_i(t) = theta_i(t - T_i) - theta_i(t) = -T_i theta_i'(t) + T_i^2 theta_i''(t) / 2 + ...
 
 It enters at the drive angle, one delay per leg. The terms left out, T^3 theta''' / 6, are below 1e-8 rad for some
-milliseconds at speeds of 100 mm/s, and the quadratic one is small as well, so that the law is nearly linear in T. It
+milliseconds at speeds of 100 mm/s, and the quadratic one is small as well, so that the effect is nearly linear in T. It
 vanishes at rest, grows with the speed, and turns its sign with the direction of motion. `backlash` turns its sign too,
 but does not grow with the speed.
 
 Assumptions: the motion has lasted longer than T (a point at which it just starts gets T^2 theta'' / 2 too much); the
 tracker samples in time with the command (an offset of its clock is a delay common to all drives); no overshoot. Where
-the speed is unknown the law says nothing, and the contribution is zero.
+the speed is unknown the contribution is zero.
 
 Source: velocity lag of a type-1 servo: Franklin, Powell and Emami-Naeini, Feedback Control of Dynamic Systems, on
 system type and steady-state error. Sizes assumed: position-loop gains of machine tools and robots are 20 to 300 per
@@ -29,7 +29,7 @@ _SOURCE = "inverse of the position loop's gain, assumed"
 
 
 def for_robot(robot):
-    """The law for all drives."""
+    """The effect model for all drives."""
     lags = leg_parameters(_SOURCE, ("lag", *_LAG), count=len(robot.parts.drives))
     parameters = ParameterSet(lags)
     return Effect("servo_lag", parameters, plain_coordinates(parameters, 0.003), _late, ("drive_rate",))

@@ -4,8 +4,8 @@ With its coefficient of expansion a every length l of the drawing, which holds a
 
     l (1 + a (T - 20 C))
 
-It enters at the lengths. `thermal_growth` is about a robot that warms up by itself and has a limit; this law follows
-what a file states, up and down. Which of the two a campaign shows the evidence tells.
+It enters at the lengths. `thermal_growth` is about a robot that warms up by itself and has a limit; this effect follows
+the temperatures of a file, up and down. The evidence decides between the two.
 
 Assumptions: the robot has the temperature of the probe: one that sits on it, or in air that changes slowly; one
 material, no drift of the tracker.
@@ -25,7 +25,7 @@ _TYPICAL, _DRAWN_C = 2e-5, 20.0
 
 
 def for_robot(_robot):
-    """The law, the same for every robot."""
+    """The effect model, the same for every robot."""
     coordinates = plain_coordinates(_PARAMETERS, _TYPICAL)
     return Effect("thermal_expansion", _PARAMETERS, coordinates, _grown, ("temperature_c",))
 

@@ -1,8 +1,7 @@
 """Thermal growth: all links grow with time towards a limit while the robot warms up.
 
-A body of heat capacity C that takes up a constant power and loses heat in proportion to its excess temperature warms up
-as 1 - exp(-t / tau) (Newton's law of cooling). With its coefficient of expansion every length l of R, L1, L2, L3, r
-grows by
+A body of heat capacity C that absorbs a constant power and loses heat in proportion to its excess temperature warms up
+as 1 - exp(-t / tau) (Newtonian cooling). With its coefficient of expansion every length l of R, L1, L2, L3, r grows by
 
     dl(t) = l e (1 - exp(-t / tau))
 
@@ -10,8 +9,8 @@ where e is the final strain and t the time since the campaign's start, when the 
 drawing. It enters at the lengths. It is linear in e; tau, which is not, is tried on a grid of time constants.
 
 A grown 3-RRRU is similar to the nominal one: since all angles stay, the platform moves along the ray from the base's
-centre by the strain itself, p' = (1 + e(t)) p. What tells it from errors of the lengths is only that the same pass,
-driven later, ends elsewhere.
+centre by the strain itself, p' = (1 + e(t)) p. Only repeated passes separate it from errors of the lengths: the same
+pass, driven later, ends elsewhere.
 
 Assumptions: one temperature for base, links and platform, one material, constant power over the campaign whether it
 moves or rests; no drift of the tracker.
@@ -59,5 +58,5 @@ def lengths(legs):
 
 
 def for_robot(_robot):
-    """The law, the same for every robot."""
+    """The effect model, the same for every robot."""
     return Effect("thermal_growth", _PARAMETERS, plain_coordinates(_PARAMETERS, 2e-4, SHAPES), _grown, ("time_s",))

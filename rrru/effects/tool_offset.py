@@ -27,7 +27,7 @@ _POSITION_ONLY = 3
 
 
 def for_robot(robot):
-    """The law for robots whose drives turn the platform, None for others."""
+    """The effect model for robots whose drives turn the platform, None for others."""
     if len(robot.parts.drives) <= _POSITION_ONLY:
         return None
     return Effect("tool_offset", _PARAMETERS, plain_coordinates(_PARAMETERS, 0.5), _seated)

@@ -8,12 +8,12 @@ all measured distances too long by one factor. A point at p in the robot's frame
 It enters at the world, one number. About another point than the frame's origin the same scale comes with a shift of the
 frame. The robot itself does nothing wrong; a calibration puts the scale into its lengths, which then are wrong by it.
 
-Where the calibration has all lengths of the robot it takes the scale up entirely: positions alone cannot tell a larger
-robot from a smaller millimetre. A robot with slides, whose drives have a millimetre of their own, or one whose lengths
-are not calibrated can be told.
+A calibration of all lengths of the robot absorbs the scale entirely: positions alone do not separate a larger robot
+from a smaller millimetre. The scale is identifiable for a robot with slides, whose drives have a millimetre of their
+own, or for one whose lengths are not calibrated.
 
 Assumptions: one factor for all directions and all of the campaign; the measured point lies at the tool, so that
-reflectors far from it, or beside the robot, are moved a little wrongly.
+reflectors far from it, or next to the robot, are moved a little wrongly.
 
 Source: refraction: Ciddor, Refractive index of air, Applied Optics 35, 1996: 1e-6 per kelvin and 0.27e-6 per hPa, so
 that a weather station that is off makes 1e-5; scale bars and thermal growth of the base (2.3e-5 per kelvin for
@@ -37,5 +37,5 @@ def _scaled(motion, values):
 
 
 def for_robot(_robot):
-    """The law, the same for every robot."""
+    """The effect model, the same for every robot."""
     return Effect("tracker_scale", _PARAMETERS, _COORDINATES, _scaled)

@@ -16,9 +16,9 @@ A screw of lead h, or a drum of circumference h, leads and lags once per turn as
 In robots with drives of both kinds it acts at those that turn.
 
 Assumptions: one harmonic, the same ratio in all drives; the error depends on the angle only, not on load or direction
-of motion. The ratio is a number of the drive's data sheet; where nobody states it, it is searched beside that of the
-data sheet, see `rrru.diagnosis.harmonic_orders`. With N = 50 the error repeats every 7.2 degrees of the arm, and a
-campaign must sample more densely than every 3.6 degrees to see it as what it is.
+of motion. The ratio is a number of the drive's data sheet. Where it is not stated, it is searched in addition to the
+default, see `rrru.diagnosis.harmonic_orders`. With N = 50 the error repeats every 7.2 degrees of the arm; a campaign
+must sample more densely than every 3.6 degrees, or the error is aliased.
 
 Source: Litvin and Fuentes, Gear Geometry and Applied Theory, 2004, on functions of transmission errors; the ratio of 50
 is a common ratio of harmonic drives. The size is assumed: one arc minute is 3e-4 rad.
@@ -48,31 +48,31 @@ _LEADS = Search("lead", "mm", _inverse(_LEAD.low), _inverse, _inverse)
 
 
 def for_robot(robot):
-    """The law for the drives that turn, or for all where none does."""
+    """The effect model for the drives that turn, or for all where none does."""
     turning = drives_of(robot, "rad")
     return _of_gears(turning) if len(turning) else _of_screws(drives_of(robot, "mm"))
 
 
 def _of_gears(drives):
-    """The law for turning drives (k,)."""
+    """The effect model for turning drives (k,)."""
 
-    def law(motion, values):
+    def gear_error(motion, values):
         return at_harmonic(motion, drives, values[-1], values)
 
-    return _effect(harmonic_parameters(drives, _GEAR), _RATIO, _RATIOS, 3e-4, law)
+    return _effect(harmonic_parameters(drives, _GEAR), _RATIO, _RATIOS, 3e-4, gear_error)
 
 
 def _of_screws(drives):
-    """The law for sliding drives (k,)."""
+    """The effect model for sliding drives (k,)."""
 
-    def law(motion, values):
+    def screw_error(motion, values):
         return at_harmonic(motion, drives, _inverse(values[-1]), values)
 
-    return _effect(harmonic_parameters(drives, _SCREW, "mm", 1.0), _LEAD, _LEADS, 0.01, law)
+    return _effect(harmonic_parameters(drives, _SCREW, "mm", 1.0), _LEAD, _LEADS, 0.01, screw_error)
 
 
-def _effect(sizes, known, search, typical, law):
-    """The Effect of amplitudes and phases, and of a ratio or lead that is known or searched."""
+def _effect(sizes, known, search, typical, error):
+    """The Effect of amplitudes and phases, and of a ratio or lead that is known or searched; error: its function."""
     parameters = ParameterSet((*sizes, known))
     coordinates = harmonic_coordinates(parameters, typical, ({known.name: known.nominal},))
-    return Effect("transmission_error", parameters, replace(coordinates, searched=search), law, of_drive_value=True)
+    return Effect("transmission_error", parameters, replace(coordinates, searched=search), error, of_drive_value=True)

@@ -4,9 +4,9 @@ A drive of several stages, or drives of unlike gears, err at several orders N_k,
 
     dtheta_i = sum over k with i_k = i of s_k sin(N_k theta_i) + c_k cos(N_k theta_i)
 
-`transmission_error` is the special case of one ratio that all drives share. Which orders, on which drives, is searched
-one after another in what the calibration leaves, see `rrru.diagnosis.drive_spectra`; each has to earn its choice among
-many.
+`transmission_error` is the special case of one ratio that all drives share. Orders and drives are searched one after
+another in the residuals of the calibration, see `rrru.diagnosis.drive_spectra`. The prior of each order accounts for
+the choice among many.
 
 Assumptions: the error depends on the angle only, not on load or direction of motion.
 
@@ -24,12 +24,12 @@ _TYPICAL, _MOST = 3e-4, 0.01
 
 
 def for_robot(robot):
-    """The law, whose waves are still to be found, for robots whose drives all turn, None for others."""
+    """The effect model, whose waves are still to be found, for robots whose drives all turn, None for others."""
     return _with_waves(()) if set(robot.parts.units) == {"rad"} else None
 
 
 def _with_waves(pairs, log_prior=0.0):
-    """The law with waves (drive, order), drives counted from 0 on; log_prior: of having chosen just these."""
+    """The effect model with waves (drive, order), drives counted from 0 on; log_prior: of having chosen just these."""
     parameters = ParameterSet(
         tuple(
             Parameter(f"{part}_{drive + 1}_{order:.4g}", "rad", 0.0, -_MOST, _MOST, "some arc minutes", drive + 1)
@@ -57,5 +57,5 @@ def _with_waves(pairs, log_prior=0.0):
             changes[:, drive] = waves(motion.drive[:, drive], orders[its]) @ np.reshape(values, (-1, 2))[its].ravel()
         return motion.at_drives(changes)
 
-    own = {"of_drive_value": True, "with_waves": _with_waves, "waves": tuple(pairs)}
-    return Effect("transmission_orders", parameters, coordinates, err, **own)
+    structure = {"of_drive_value": True, "with_waves": _with_waves, "waves": tuple(pairs)}
+    return Effect("transmission_orders", parameters, coordinates, err, **structure)

@@ -17,11 +17,11 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 # every combination of parameters keeps at least this share of its information when a fold is left out: with less the
-# fold is extrapolated, which says nothing about the model
+# fold is extrapolated, which does not test the model
 MIN_SHARE_IN_COMPLEMENT = 0.05
-# a combination of which the readings tell less than this share of what they tell of the best one is determined by none
+# a combination with less than this share of the best one's information is not determined
 _UNDETERMINED = 1e-12
-# added to the scaled precision, far below what any reading tells: a flat prior leaves it singular
+# added to the scaled precision, far below the information of any reading: a flat prior leaves it singular
 _RIDGE = 1e-14
 
 
@@ -34,15 +34,15 @@ def complement_sums(sums: dict[int, FloatArray]) -> dict[int, FloatArray]:
         before.append(before[-1] + sums[number])
     for number in numbers[:0:-1]:
         after.append(after[-1] + sums[number])
-    return {number: one + two for number, one, two in zip(numbers, before, reversed(after), strict=True)}
+    return {number: a + b for number, a, b in zip(numbers, before, reversed(after), strict=True)}
 
 
 def fold_sums(columns: FloatArray, fold: IntArray) -> dict[int, FloatArray]:
     """Sums of squares and products (k, k) of the rows (m, a, k) of each fold (m,)."""
     result = {}
     for number in np.unique(fold).tolist():
-        own = columns[fold == number].reshape(-1, columns.shape[-1])
-        result[number] = own.T @ own
+        rows = columns[fold == number].reshape(-1, columns.shape[-1])
+        result[number] = rows.T @ rows
     return result
 
 
@@ -58,7 +58,7 @@ def least_share_in_complement(columns: FloatArray, fold: IntArray) -> float:
     size, turned = np.linalg.eigh(unit[:, None] * total * unit)
     seen = size > _UNDETERMINED * size[-1]
     half = unit[:, None] * turned[:, seen] / np.sqrt(size[seen])
-    return float(min(np.linalg.eigvalsh(half.T @ one @ half)[0] for one in complement_sums(sums).values()))
+    return float(min(np.linalg.eigvalsh(half.T @ part @ half)[0] for part in complement_sums(sums).values()))
 
 
 def choose_folds(candidates: Iterable[IntArray], columns: FloatArray) -> IntArray:

@@ -1,4 +1,4 @@
-"""A smooth discrepancy: what the model lacks, alike at neighbouring places.
+"""A smooth model discrepancy, correlated between neighbouring places.
 
     delta(x) = size sum_m a_m(length) w_m phi_m(x),   w_m ~ N(0, 1)
 
@@ -21,7 +21,7 @@ _COSINES, _HALF_WAVES = 40, 12
 # standard deviation of the discrepancy over that of the noise, and its length scale over the span of the places
 _SIZES = np.geomspace(0.5, 16.0, 6)
 _LENGTH_SCALES = (0.1, 0.2, 0.4)
-# cosines have no slope at the ends of their box: the places keep off by this share of their span
+# cosines have no slope at the ends of their box: the margin to the places is this share of their span
 _MARGIN = 0.1
 
 

@@ -1,4 +1,4 @@
-"""What an estimation found: values, covariance by name, residuals, rank and null space."""
+"""Result of an estimation: values, covariance by name, residuals, rank and null space."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -17,9 +17,9 @@ from rrru.estimation.problem import Problem
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# a parameter with a flat prior counts as one whose prior is so many times wider than what one column alone tells
+# a flat prior counts as a prior this many times wider than the uncertainty that the parameter's column alone leaves
 _FLAT = 1e9
-# a direction is determined where the readings tell as much of it as the prior
+# a direction is determined where the readings have at least as much information on it as the prior
 _AS_PRIOR = 1.0
 # more columns than this are factored by their products, many times faster, with half the digits of the least seen ones
 _MANY = 200
@@ -61,7 +61,7 @@ class Estimate:
     def at(cls, problem: Problem, values: FloatArray, white: FloatArray, free: BoolArray, end: SearchEnd) -> Self:
         """The Estimate at values (p,) from whitened derivative and residual (n, p + 1) there.
 
-        free (p,): what no bound holds.
+        free (p,): parameters that no bound holds.
 
         Where a prior is a mixture the values move to the mean over its components, each weighted by its evidence on
         the linearisation, and the covariance is that of the mixture.
@@ -92,7 +92,7 @@ class Estimate:
 
     @property
     def parameters(self) -> Parameters:
-        """What was estimated."""
+        """The parameters that were estimated."""
         return self.problem.parameters
 
     @property
@@ -107,12 +107,12 @@ class Estimate:
 
     @cached_property
     def standard_errors(self) -> FloatArray:
-        """Standard errors (p,); NaN at a bound, inf for what neither readings nor prior determine."""
+        """Standard errors (p,); NaN at a bound, inf for a parameter that neither readings nor prior determine."""
         return np.where(self.at_bound, np.nan, np.sqrt(np.diag(self.covariance)))
 
     @cached_property
     def prior_shares(self) -> FloatArray:
-        """Shares (p,) of the variances that the priors leave and not the noise: diag(C P C) over diag(C).
+        """Shares (p,) of the variances that come from the priors and not from the noise: diag(C P C) over diag(C).
 
         P: precisions of the priors. Next to 1 for a parameter whose unit vector the readings do not determine; NaN
         where there is no variance.
@@ -120,17 +120,17 @@ class Estimate:
         precision = self.parameters.prior_precision(self.values)
         variance = np.diag(self.covariance)
         known = (variance > 0.0) & np.isfinite(variance)
-        own = self.covariance[np.ix_(known, known)]
+        covariance = self.covariance[np.ix_(known, known)]
         result = np.where(np.isinf(variance), 1.0, np.nan)
-        result[known] = (own**2 @ precision[known]) / variance[known]
+        result[known] = (covariance**2 @ precision[known]) / variance[known]
         return result
 
     @cached_property
     def intervals(self) -> FloatArray:
         """Credible intervals (p, 2) of 95 %: the shortest ones of the linearised posterior between the bounds.
 
-        Of a parameter at a bound: of what its posterior would be without the bound, cut off there. From -inf to inf
-        for what neither readings nor prior determine.
+        For a parameter at a bound: that of its posterior without the bound, truncated there. From -inf to inf for a
+        parameter that neither readings nor prior determine.
         """
         half = QUANTILE_95 * np.sqrt(np.diag(self.covariance))
         result, parameters = np.stack([self.values - half, self.values + half], axis=1), self.parameters
@@ -147,8 +147,8 @@ class Estimate:
             *_, found = _over_mixtures(self.readings_triangle, parameters, self.values, free)
             for k in chosen[np.isfinite(found.sd[:, chosen]).all(axis=0)]:
                 bounds = parameters.low[k], parameters.high[k]
-                own = NormalMixture(found.share, self.values[k] + found.step[:, k], found.sd[:, k])
-                result[k] = own.interval(*bounds)
+                marginal = NormalMixture(found.share, self.values[k] + found.step[:, k], found.sd[:, k])
+                result[k] = marginal.interval(*bounds)
         return result
 
     @cached_property
@@ -262,13 +262,13 @@ def _over_mixtures(
     sds = np.sqrt(np.diag(covariance))
     if not len(mixed):
         return np.zeros(len(values)), covariance, _Components(np.ones(1), step[None], sds[None])
-    own, off = covariance[np.ix_(mixed, mixed)], (parameters.mean - values - step)[mixed]
+    among_mixed, off = covariance[np.ix_(mixed, mixed)], (parameters.mean - values - step)[mixed]
     change = parameters.sd[mixed] ** -2.0 - parameters.wide_sd[mixed] ** -2.0
     ratio = np.log(parameters.wide_sd / parameters.sd)[mixed]
     logs, means, gains = [], [], []
     for narrow in product((False, True), repeat=len(mixed)):
         chosen = np.flatnonzero(narrow)
-        inverse = np.linalg.inv(np.diag(1.0 / change[chosen]) + own[np.ix_(chosen, chosen)])
+        inverse = np.linalg.inv(np.diag(1.0 / change[chosen]) + among_mixed[np.ix_(chosen, chosen)])
         gain = covariance[:, mixed[chosen]] @ inverse
         log_determinant = -np.linalg.slogdet(inverse)[1] + np.log(change[chosen]).sum()
         logs.append(-0.5 * off[chosen] @ inverse @ off[chosen] - 0.5 * log_determinant + ratio[chosen].sum())
@@ -279,8 +279,8 @@ def _over_mixtures(
     mean = share @ np.array(means)
     apart = np.array(means) - mean
     taken = np.einsum("c,cij->ij", share, np.array(gains))
-    each = np.sqrt([np.maximum(np.diag(covariance - gain), 0.0) for gain in gains])
-    components = _Components(share, np.array(means), each)
+    component_sds = np.sqrt([np.maximum(np.diag(covariance - gain), 0.0) for gain in gains])
+    components = _Components(share, np.array(means), component_sds)
     return mean, covariance - taken + np.einsum("c,ci,cj->ij", share, apart, apart), components
 
 
@@ -303,7 +303,7 @@ def _posterior(white: FloatArray, sd: FloatArray, mean: FloatArray, free: BoolAr
         half = unit[:, None] * solve_triangular(scaled, np.eye(len(scaled)))
         step[free], covariance[np.ix_(free, free)] = -half @ target, half @ half.T
         return step, covariance
-    # what neither readings nor priors determine
+    # directions that neither readings nor priors determine
     left, size, right = np.linalg.svd(scaled)
     seen = size > size.max(initial=0.0) / _FLAT
     half = unit[:, None] * right[seen].T / size[seen]

@@ -1,4 +1,4 @@
-"""How well a problem predicts its readings, its parameters integrated out: the marginal likelihood.
+"""Marginal likelihood (evidence) of a problem: the density of its readings with the parameters integrated out.
 
 About an estimate the whitened readings are linear in the parameters x, and the integral over them has a closed form
 (Laplace's approximation with the Gauss-Newton Hessian; MacKay, Bayesian interpolation, Neural Computation 4, 1992):
@@ -33,7 +33,7 @@ from rrru.estimation.problem import log_determinant
 FloatArray = npt.NDArray[np.float64]
 
 _LOG_2PI = float(np.log(2.0 * np.pi))
-# a parameter whose own part of its column is a smaller share is determined by nothing
+# a parameter is not determined where a smaller share of its column is independent of the others
 _MIN_SHARE = 1e-9
 # a bound that is so many standard deviations off holds no probability that matters: below 1e-15
 _MAX_SD_TO_BOUND = 8.0
@@ -87,7 +87,7 @@ def marginalize(
 
     common: as of `log_evidence`. Where the noise's size is unknown, a probability between bounds is that at its
     estimate. Raises FitError where a parameter that is not common has a flat prior, readings and prior do not determine
-    one, the noise's determinant is not known, the loss is robust, or no reading is left to tell an unknown noise.
+    one, the noise's determinant is not known, the loss is robust, or no reading is left to determine an unknown noise.
     """
     model = _LinearModel(estimate, tuple(common), noise_known)
     found = [model.integrate(sd, *grid) for sd in model.prior_components() for grid in model.grid(discrepancy)]
@@ -115,7 +115,8 @@ class _LinearModel:
             self._count = observations.residual(self._values).size
             self._constant = log_determinant(self._problem.whiten)
         if not noise_known and self._count - len(flat) < 1:
-            raise FitError(f"{self._count} readings, {len(flat)} parameters without a prior: nothing tells the noise")
+            text = f"{self._count} readings for {len(flat)} parameters without a prior do not determine the noise"
+            raise FitError(f"{text}; allowed: more readings than such parameters, or a known noise")
 
     @cached_property
     def _rows(self) -> FloatArray:
@@ -130,7 +131,7 @@ class _LinearModel:
         mixed = np.flatnonzero(np.isfinite(parameters.wide_sd))
         for case in product((parameters.sd, parameters.wide_sd), repeat=len(mixed)):
             sd = parameters.sd.copy()
-            sd[mixed] = [one[place] for one, place in zip(case, mixed, strict=True)]
+            sd[mixed] = [sds[place] for sds, place in zip(case, mixed, strict=True)]
             yield sd
 
     def grid(self, discrepancy: Discrepancy | None) -> Iterator[tuple[FloatArray, float, float]]:
@@ -165,19 +166,19 @@ class _LinearModel:
         flat = np.isinf(sd)
         root = np.where(flat, 0.0, 1.0 / sd)
         triangle = with_prior(readings, root, root * (self._values - parameters.mean))
-        upper, rest = triangle[:-1, :-1], float(triangle[-1, -1] ** 2)
-        own = np.abs(np.diag(upper))
-        if not (known := own > _MIN_SHARE * np.linalg.norm(upper, axis=0)).all():
+        upper, square = triangle[:-1, :-1], float(triangle[-1, -1] ** 2)
+        diagonal = np.abs(np.diag(upper))
+        if not (known := diagonal > _MIN_SHARE * np.linalg.norm(upper, axis=0)).all():
             raise FitError(f"neither readings nor prior determine {np.array(parameters.names)[~known].tolist()}")
         freedom = self._count - int(flat.sum())
-        log = self._constant - half_determinant - float(np.log(own).sum()) + float(np.log(root[~flat]).sum())
+        log = self._constant - half_determinant - float(np.log(diagonal).sum()) + float(np.log(root[~flat]).sum())
         scale = 1.0
         if self._noise_known:
-            log -= 0.5 * (freedom * _LOG_2PI + rest)
+            log -= 0.5 * (freedom * _LOG_2PI + square)
         else:
-            rest = max(rest, 1e-300)
-            scale = float(np.sqrt(rest / freedom))
-            log += float(gammaln(0.5 * freedom)) - 0.5 * freedom * float(np.log(np.pi * rest))
+            square = max(square, 1e-300)
+            scale = float(np.sqrt(square / freedom))
+            log += float(gammaln(0.5 * freedom)) - 0.5 * freedom * float(np.log(np.pi * square))
         half = solve_triangular(upper, np.eye(len(upper)))
         covariance = scale**2 * half @ half.T
         mean = self._values - half @ triangle[:-1, -1]

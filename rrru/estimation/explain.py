@@ -1,12 +1,12 @@
-"""What a search that did not end well says to its user: which parameters are not determined, and what to do."""
+"""Messages for a search that did not converge: which parameters are not determined, and what to do."""
 
 import numpy as np
 
 from rrru.estimation.estimate import Estimate
 
-# a parameter has run away where it is so many standard deviations of its prior from the prior's mean
+# a parameter has diverged where it is so many standard deviations of its prior from the prior's mean
 _MAX_PRIOR_SDS = 5.0
-# a parameter is not determined where directions that the readings do not see hold this share of it
+# a parameter is not determined where this share of it is in directions that the readings do not determine
 _MIN_SHARE_UNSEEN = 0.5
 _MAX_NAMED = 4
 _ADVICE = (
@@ -19,7 +19,7 @@ _ADVICE = (
 def explain_end(estimate: Estimate, what: str) -> str:
     """A message for an Estimate of `what` whose search did not converge.
 
-    Which parameters ran away, are at a bound or are not determined, what is allowed, and what to do about them.
+    It names parameters that diverged, are at a bound or are not determined, what is allowed, and what to do.
     """
     suspects = suspicious(estimate)
     found = ", ".join(f"{name} {reason}" for name, reason in list(suspects.items())[:_MAX_NAMED])

@@ -1,4 +1,4 @@
-"""Whether further columns explain more of the readings than noise does: the F test of a linearised problem.
+"""F test of a linearised problem: whether further columns explain more of the readings than noise does.
 
 About an estimate the whitened residual r is linear in the parameters x and in the coefficients c of further columns,
 
@@ -12,11 +12,12 @@ follows Fisher's distribution of k and f degrees of freedom where c is 0 (Cook a
 Regression, 1982, 2.2). Priors of x and c do not count.
 
 Where the proportions of the readings' noises are unknown there is one test for each of several. The largest p value of
-them holds the level whichever is true. The mean of them, weighted by the marginal likelihoods of r under flat priors,
+them keeps the significance level whichever is true. Their mean, weighted by the marginal likelihoods of r under flat
+priors,
 
     log p(r) = log |W| - 1/2 log |[A C]' [A C]| - f/2 log (|M r|^2 - |P r|^2) + constant,
 
-holds it on the average (partial predictive p: Bayarri and Berger, Journal of the American Statistical Association 95,
+keeps it on the average (partial predictive p: Bayarri and Berger, Journal of the American Statistical Association 95,
 2000; restricted likelihood: Harville, ibid. 72, 1977).
 """
 
@@ -33,16 +34,16 @@ from rrru.estimation.problem import Whiten, log_determinant
 
 FloatArray = npt.NDArray[np.float64]
 
-# a direction of the columns, in units of their lengths, of which the parameters leave less is theirs
+# a direction of the columns, in units of their lengths, of which a smaller share remains is absorbed by the parameters
 _RANK_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class LinearizedModel:
-    """What a problem's parameters explain of its N whitened readings, to first order about an estimate.
+    """A problem linearised about an estimate: the part of its N whitened readings that the parameters explain.
 
-    basis (N, r): orthonormal, of all that the parameters can change; residual (N,): what they leave of the estimate's
-    whitened one; log_density: log |W| - 1/2 log |A' A|.
+    basis (N, r): orthonormal basis of the column space of A; residual (N,): the estimate's whitened residual projected
+    off it; log_density: log |W| - 1/2 log |A' A|.
     """
 
     whiten: Whiten
@@ -61,7 +62,7 @@ class LinearizedModel:
         return cls(whiten, np.zeros((white.size, 0)), white, log_determinant(whiten)).with_columns(estimate.jacobian)
 
     def remainder(self, readings: FloatArray) -> FloatArray:
-        """Whitened readings (n, a, ...) less what the parameters explain of them, (N, ...)."""
+        """Whitened readings (n, a, ...) projected off the parameters' columns, (N, ...)."""
         white = self.whiten(readings).reshape(len(self.basis), *readings.shape[2:])
         return white - np.tensordot(self.basis, np.tensordot(self.basis.T, white, axes=1), axes=1)
 
@@ -90,7 +91,7 @@ class LinearizedModel:
 class AddedColumns:
     """Blocks of c columns that are added to a model's parameters one block at a time.
 
-    basis (b, N, k): orthonormal, of what the parameters leave of each block, zeros where its rank is below another's;
+    basis (b, N, k): orthonormal, of each block projected off the parameters, zeros where its rank is below another's;
     inverse (b, c, N): from whitened readings to the coefficients; log_volume (b,): 1/2 log |C' M C|.
     """
 
@@ -106,7 +107,7 @@ class AddedColumns:
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom that parameters and block leave."""
+        """Residual degrees of freedom after parameters and block."""
         return len(self.model.basis) - int(self.model.basis.shape[1]) - self.rank
 
     def explained(self, white: FloatArray) -> FloatArray:
@@ -119,7 +120,7 @@ class AddedColumns:
         return np.asarray(((self.model.residual - taken[..., 0]) ** 2).sum(axis=1))
 
     def estimates(self, noise: float | None = None) -> tuple[FloatArray, FloatArray]:
-        """Coefficients (b, c) of least squares and their standard errors; noise: by default that of what is left."""
+        """Coefficients (b, c) of least squares and their standard errors; noise: by default that of the residuals."""
         sd = np.sqrt(self.unexplained() / self.freedom)[:, None] if noise is None else noise
         return self.inverse @ self.model.residual, sd * np.linalg.norm(self.inverse, axis=-1)
 
@@ -132,10 +133,11 @@ class AddedColumns:
         explained = self.explained(white)
         if not self.rank or self.freedom < 1:
             return np.full(explained.shape, np.nan), np.zeros(explained.shape)
-        rest = (white**2).sum(axis=0) - explained
-        volume = self.log_volume.reshape(-1, *[1] * (rest.ndim - 1))
-        log_likelihood = self.model.log_density - volume - 0.5 * self.freedom * np.log(rest)
-        return special.fdtrc(self.rank, self.freedom, explained / self.rank * self.freedom / rest), log_likelihood
+        unexplained = (white**2).sum(axis=0) - explained
+        volume = self.log_volume.reshape(-1, *[1] * (unexplained.ndim - 1))
+        log_likelihood = self.model.log_density - volume - 0.5 * self.freedom * np.log(unexplained)
+        ratio = explained / self.rank * self.freedom / unexplained
+        return special.fdtrc(self.rank, self.freedom, ratio), log_likelihood
 
     def power(self, limit: float, effects: FloatArray, noise: float) -> FloatArray:
         """Probabilities (...) that p is below a limit for effects (n, a, ...) in the span of a single block."""

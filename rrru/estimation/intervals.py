@@ -1,4 +1,4 @@
-"""Credible intervals of posteriors that are no normal distribution: at bounds, and under priors of two widths."""
+"""Credible intervals of posteriors that are not normal: at bounds, and under priors of two widths."""
 
 from dataclasses import dataclass
 
@@ -24,9 +24,9 @@ class NormalMixture:
     sd: FloatArray
 
     def interval(self, low: float = -np.inf, high: float = np.inf, mass: float = 0.95) -> tuple[float, float]:
-        """Ends of the shortest interval that holds a share of the distribution's part between two bounds.
+        """Ends of the shortest interval with a share of the distribution's mass between two bounds.
 
-        Of several separate stretches of high density: from the first to the last. Source: Box and Tiao, Bayesian
+        For several separate stretches of high density: from the first to the last. Source: Box and Tiao, Bayesian
         Inference in Statistical Analysis, 1973, section 2.8 (highest posterior density).
         """
         at = self._nodes(low, high)

@@ -3,19 +3,19 @@
 Along each series (a run, of one reflector) the noise e of axis a is
 
     e = n + s + o,   n the instrument's: a first-order autoregression of correlation phi,
-                     s what does not repeat: white,   o the run's offset: constant per series
+                     s the non-repeatability: white,   o the run's offset: constant per series
 
 In the cosine basis of a series of k points it is independent to good approximation, with the variance
 
     sigma_a^2 (1 - f_a + f_a S(w) + k rho [w = 0])
 
-at half-wave number w, n being the share f_a of it and S its spectrum, of mean 1. Scatter may have any size. What is
-smooth along a run may be no larger than the instrument's stated noise allows (30 % above it; offsets, the noise
-itself), or where nobody states it than what the highest frequencies show: what is smooth and larger no noise explains.
-The numbers maximise the restricted likelihood: that of what is left when all that calibration and effects may fit has
+at half-wave number w, n being the share f_a of it and S its spectrum, of mean 1. Non-repeatability may have any size.
+The smooth parts are limited by the instrument's stated noise: correlated noise to 30 % above it, offsets to the noise
+itself. Without a stated noise the highest frequencies set this limit: larger smooth errors are not noise. The
+parameters maximise the restricted likelihood, that of the residuals after all columns of calibration and effects have
 been projected out (Patterson and Thompson, Recovery of inter-block information when block sizes are unequal, Biometrika
-58, 1971), times their prior. Where the readings may also hold a smooth discrepancy, its size is one of the numbers,
-and no part of the noise: a noise that had to account for it would be too large and too little correlated.
+58, 1971), times their prior. Where the readings may also have a smooth discrepancy, its size is one of the parameters
+and not part of the noise: a noise that had to account for it would be too large and too little correlated.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,9 +40,9 @@ _OFFSETS = np.array([0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2])
 _STATED = 5.6
 # share of the mean variance that no axis is below
 _LEAST_AXIS = 1e-4
-# a stated noise is this factor off at most: 1 sigma of what is believed of it; beyond, it is contradicted
+# a stated noise is wrong by at most this factor: 1 sigma of its prior; beyond, it is contradicted
 CONTRADICTED = 1.3
-# numbers that have to be left when everything that may be fitted is, for the noise to be estimated within some 20 %
+# residual degrees of freedom after all that may be fitted, for the noise to be estimated within some 20 %
 MIN_FREE_NUMBERS = 15.0
 # free means of series, of three numbers each, for offsets between them to show: those of two series
 MIN_FREE_MEANS = 6.0
@@ -53,11 +53,11 @@ _SOME_DISCREPANCY = 0.1
 _OCTAVES = 0.1
 # offsets of a smaller share of the noise's variance are none
 _NO_OFFSET = 0.05
-# prior probability of no correlation, and of no offsets: many campaigns have neither, and readings that cannot tell
+# prior probability of no correlation, and of no offsets: many campaigns have neither, and readings that do not decide
 # must not widen every interval
 _NONE = 0.5
 _ROUNDS, _LEAST_LEFT, _RANK = 4, 0.02, 1e-9
-# of more columns than this the squares tell the rank, to fewer digits
+# with more columns than this the rank comes from their squares, to fewer digits
 _MANY, _RANK_OF_SQUARES = 400, 1e-12
 # rows of these that are taken at a time
 _AT_ONCE = 4000
@@ -112,7 +112,7 @@ class NoiseModel:
     ) -> "Whitening":
         """The Whitening of readings in series (m,) under this noise.
 
-        discrepancy: from half-wave numbers (m,) to variances (m,) in mm^2 of what else is smooth along the series.
+        discrepancy: from half-wave numbers (m,) to variances (m,) in mm^2 of a smooth discrepancy along the series.
         """
         series = np.asarray(series)
         waves, length = half_waves(series), lengths(series)
@@ -164,7 +164,7 @@ def lengths(series: npt.NDArray[np.generic]) -> npt.NDArray[np.int_]:
 
 
 def _spike_and_slab(density: FloatArray) -> FloatArray:
-    """Prior probabilities (g,) over a grid that begins with none: half of them on it, the rest by a density (g,)."""
+    """Prior probabilities (g,) over a grid that begins with none: half for none, the others by a density (g,)."""
     slab = density[1:] / max(density[1:].sum(), 1e-300)
     return np.concatenate([[_NONE if len(slab) else 1.0], (1.0 - _NONE) * slab])
 
@@ -177,12 +177,12 @@ def fit_noise(
     repeats: tuple[float, int] | None = None,
     discrepancy: Callable[[FloatArray], FloatArray] | None = None,
 ) -> NoiseModel:
-    """NoiseModel of data (m, 3) of which columns (m, 3, k) may fit whatever they can; series (m,).
+    """NoiseModel of data (m, 3) after columns (m, 3, k) are projected out; series (m,).
 
-    stated_mm: deviation per axis that is stated, None where none is; repeats: deviation per axis of poses that were
-    measured several times and its degrees of freedom, which count where the columns leave few numbers, None for none;
-    discrepancy: from half-wave numbers (m,) to variances (m,), 1 on average, of what may be smooth along the series
-    and is no noise, None where nothing is.
+    stated_mm: stated s.d. per axis, None where none is; repeats: s.d. per axis of poses that were measured several
+    times and its degrees of freedom, which count where the columns leave few degrees of freedom, None for none;
+    discrepancy: from half-wave numbers (m,) to variances (m,), 1 on average, of a smooth discrepancy along the series
+    that is not noise, None for none.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     length, model, instrument_mm = lengths(series), NoiseModel.white(stated_mm or 1.0), stated_mm
@@ -198,7 +198,7 @@ def fit_noise(
             instrument_mm = instrument_mm or repeats[0]
         instrument_mm = instrument_mm or float(np.nan_to_num(seen.rough()))
         last, model = model, seen.most_likely(instrument_mm, known)
-        new, old = ([*one.axis_mm, one.correlation, one.offset, one.discrepancy] for one in (model, last))
+        new, old = ([*m.axis_mm, m.correlation, m.offset, m.discrepancy] for m in (model, last))
         if np.allclose(new, old, rtol=1e-2, atol=1e-2 * model.mean_mm):
             break
     return model
@@ -209,8 +209,8 @@ def high_frequency_noise(
 ) -> float:
     """Standard deviation per axis of chosen rows (m,) by the upper half of the frequencies along each series (m,).
 
-    data (m, 3) of which columns (m, 3, k) may fit whatever they can. What is smooth along a path and has no column, as
-    the effects that a calibration lacks, leaves these frequencies alone. NaN where less than one number is free there.
+    data (m, 3), of which columns (m, 3, k) are projected out. Smooth errors along a path without a column, such as
+    effects that a calibration lacks, do not reach these frequencies. NaN for less than one degree of freedom there.
     """
     together, wave = along_runs(np.concatenate([columns, data[..., None]], axis=-1), series)
     flat = together.reshape(-1, together.shape[-1])
@@ -220,10 +220,10 @@ def high_frequency_noise(
 
 
 def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kind: npt.NDArray[np.int_]) -> float:
-    """Factor by which readings at one stop count as fewer: 1 + (t - 1) r, t of them at a stop, of correlation r.
+    """Design effect of several readings at one stop: 1 + (t - 1) r, t readings at a stop, of correlation r.
 
-    data (m, 3) of which columns (m, 3, k) may fit whatever they can; stop (m,): where each row was read; kind (m,): of
-    what, odd for orientations, which do not count. Source: Kish, Survey Sampling, 1965, section 5.4 (design effect).
+    data (m, 3), of which columns (m, 3, k) are projected out; stop (m,): of each row; kind (m,): of reading, odd for
+    orientations, which do not count. Source: Kish, Survey Sampling, 1965, section 5.4 (design effect).
     """
     counted = kind % 2 == 0
     count = np.bincount(stop[counted], minlength=stop.max() + 1).astype(float)
@@ -235,7 +235,7 @@ def alike(data: FloatArray, columns: FloatArray, stop: npt.NDArray[np.int_], kin
     unit = left[counted] / np.maximum(size, 1e-300)[kind[counted], None]
     sums = np.stack([np.bincount(stop[counted], axis, len(count)) for axis in unit.T], axis=1)
     squares = np.bincount(stop[counted], (unit**2).sum(axis=1), len(count))
-    # dot products of pairs over what they were if all readings of a stop were one
+    # dot products of pairs over their value for identical readings of a stop
     pairs = ((sums**2).sum(axis=1) - squares).sum()
     share = pairs / max(((count - 1.0) * squares).sum(), 1e-300)
     mean = (count**2).sum() / count.sum()
@@ -262,15 +262,15 @@ def _spectrum(correlation: float, count: int) -> FloatArray:
 
 
 def _left(data: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What columns (n, k) leave of data (n,), and the share (n,) of each row's variance that they leave."""
+    """Data (n,) projected off columns (n, k), and the share (n,) of each row's variance that remains."""
     if not columns.size:
         return data, np.ones(len(data))
     size = np.linalg.norm(columns, axis=0)
     unit = columns / np.where(size > 0.0, size, 1.0)
     if columns.shape[1] > _MANY:
         value, turned = np.linalg.eigh(unit.T @ unit)
-        kept = value > _RANK_OF_SQUARES * value[-1]
-        root = turned[:, kept] / np.sqrt(value[kept])
+        independent = value > _RANK_OF_SQUARES * value[-1]
+        root = turned[:, independent] / np.sqrt(value[independent])
         parts = np.array_split(unit, len(unit) // _AT_ONCE + 1)
         taken = np.concatenate([((part @ root) ** 2).sum(axis=1) for part in parts])
         return data - unit @ (root @ (root.T @ (unit.T @ data))), np.clip(1.0 - taken, 0.0, 1.0)
@@ -299,7 +299,7 @@ class _Grid:
 
 
 class _Seen:
-    """What is seen of the noise: squares (m, 3) in the cosine basis, each the sum of so many degrees of freedom.
+    """Data on the noise: squares (m, 3) in the cosine basis, each with its degrees of freedom.
 
     smooth: variances (m, 1), 1 on average, of a smooth discrepancy along a series, or 0.
     """
@@ -325,7 +325,7 @@ class _Seen:
 
     @property
     def free(self) -> float:
-        """Numbers that are left of the readings when everything that may be fitted is."""
+        """Residual degrees of freedom of the readings after all that may be fitted."""
         return float(self.freedom.sum())
 
     @property
@@ -371,7 +371,7 @@ class _Seen:
         white = self._axes(self._shapes(none, none, size, 1.0), known)[0][0]
         # a discrepancy that explains a part of the squares leaves less noise, of which more may be correlated
         correlated = np.minimum(1.0, largest / white)
-        # what few numbers cannot show is taken as none
+        # parameters that few degrees of freedom do not determine are set to none
         offsets = _OFFSETS[_OFFSETS * white.mean() <= largest] if self._shows_offsets else _OFFSETS[:1]
         correlations = _CORRELATIONS if self.free >= MIN_FREE_NUMBERS else _CORRELATIONS[:1]
         pairs = np.array([(correlation, offset) for correlation in correlations for offset in offsets])
@@ -399,9 +399,9 @@ class _Seen:
         """Variances (g, u, 3) over those of the axes at g correlations and offsets and a size of the discrepancy."""
         _, _, wave, length, smooth = self._by_wave
         result = np.empty((len(correlation), len(wave), 3))
-        densities = {one: _densities(one, wave, length) for one in np.unique(correlation).tolist()}
-        for row, (one, its_offset) in enumerate(zip(correlation.tolist(), offset, strict=True)):
-            along, run = densities[one]
+        densities = {phi: _densities(phi, wave, length) for phi in np.unique(correlation).tolist()}
+        for row, (phi, its_offset) in enumerate(zip(correlation.tolist(), offset, strict=True)):
+            along, run = densities[phi]
             result[row] = 1.0 + correlated * (along - 1.0) + its_offset * run + size**2 * smooth
         return result
 
@@ -416,13 +416,13 @@ class _Seen:
         stated = sum(worth for _, worth in known)
         total = sums.sum(axis=1) + sum(worth * variance for variance, worth in known)
         pooled = (total / (freedom.sum() + stated))[:, None]
-        own = np.where(freedom > 0.0, sums / np.maximum(freedom, 1e-9), pooled)
-        own = np.maximum(own, _LEAST_AXIS * pooled)
+        by_axis = np.where(freedom > 0.0, sums / np.maximum(freedom, 1e-9), pooled)
+        by_axis = np.maximum(by_axis, _LEAST_AXIS * pooled)
         equal = -0.5 * (freedom * np.log(pooled) + sums / pooled).sum(axis=1)
-        # axes of their own have two numbers more (Schwarz, Annals of Statistics 6, 1978)
-        apart = -0.5 * (freedom * np.log(own) + sums / own).sum(axis=1) - np.log(max(freedom.sum(), 1.0))
+        # a variance of each axis has two parameters more (Schwarz, Annals of Statistics 6, 1978)
+        apart = -0.5 * (freedom * np.log(by_axis) + sums / by_axis).sum(axis=1) - np.log(max(freedom.sum(), 1.0))
         share = expit(apart - equal)[:, None]
         value = np.logaddexp(equal, apart)
         for variance, worth in known:
             value -= 0.5 * worth * (np.log(pooled / variance) + variance / pooled - 1.0)[:, 0]
-        return share * own + (1.0 - share) * pooled, value
+        return share * by_axis + (1.0 - share) * pooled, value

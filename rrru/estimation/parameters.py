@@ -1,4 +1,4 @@
-"""What is estimated: named blocks of parameters, each parameter with its unit, prior and bounds."""
+"""Parameters of an estimation: named blocks, each parameter with its unit, prior and bounds."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -46,10 +46,10 @@ class Block:
         bounds: tuple[npt.ArrayLike, npt.ArrayLike] = (-np.inf, np.inf),
         wide_sd: npt.ArrayLike = np.nan,
     ) -> Self:
-        """Block whose numbers are given once for all parameters or one each."""
-        names = tuple(names)
-        each = (np.broadcast_to(np.asarray(one, dtype=float), len(names)) for one in (mean, sd, *bounds, wide_sd))
-        return cls(name, names, tuple(units), *each)
+        """Block whose numbers are given once for all parameters or one for each."""
+        names, given = tuple(names), (mean, sd, *bounds, wide_sd)
+        arrays = (np.broadcast_to(np.asarray(values, dtype=float), len(names)) for values in given)
+        return cls(name, names, tuple(units), *arrays)
 
     @classmethod
     def geometry(cls, parameters: ParameterSet, name: str = "geometry") -> Self:
@@ -120,7 +120,7 @@ class Parameters:
     def prior_precision(self, values: FloatArray) -> FloatArray:
         """Precisions (p,) of the normal priors that touch the priors from above at values (p,), 0 for a flat one.
 
-        Of a mixture of normal distributions with one mean: its components' precisions, weighted by their
+        For a mixture of normal distributions with one mean: its components' precisions, weighted by their
         responsibilities (the expectation step of Dempster, Laird and Rubin, 1977).
         """
         with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""What the solver is handed: readings that a parameter vector predicts, their whitening, and the parameters' priors."""
+"""Input of the solver: readings that a parameter vector predicts, their whitening, and the parameters' priors."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ Whiten = Callable[[FloatArray], FloatArray]
 
 
 class Observations(Protocol):
-    """Readings of one kind or of several: each of n rows holds a numbers in mm."""
+    """Readings of one kind or of several: each of n rows has `a` numbers in mm."""
 
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Readings minus prediction (n, a) at parameter values (p,); NaN where the model predicts nothing."""

@@ -1,13 +1,13 @@
-"""The one solver: maximum a posteriori estimates of a `Problem` by damped Gauss-Newton steps.
+"""The solver: maximum a posteriori estimates of a `Problem` by damped Gauss-Newton steps.
 
 Step, acceptance, convergence and covariance come from the same penalised, whitened objective
 
     F(x) = 1/2 sum rho(r_i^2) + 1/2 sum ((x_j - m_j) / s_j)^2,    r = W (y - h(x))
 
 The steps are Levenberg's and Marquardt's with the damping rule of Nielsen (Damping parameter in Marquardt's method,
-IMM-REP-1999-05), in units of the priors' standard deviations: a damped step keeps what the readings do not determine
-near the prior mean, so that no search creeps along a curved valley. Parameters at a bound that the gradient presses
-against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
+IMM-REP-1999-05), in units of the priors' standard deviations. A damped step keeps combinations that the readings do not
+determine near the prior mean, so that no search creeps along a curved valley. Parameters at a bound that the gradient
+presses against are held (Kanzow, Yamashita and Fukushima, Journal of Computational and Applied Mathematics 172, 2004).
 """
 
 from collections.abc import Callable, Iterable
@@ -28,12 +28,13 @@ FloatArray = npt.NDArray[np.float64]
 class SolverOptions:
     """When a search ends.
 
-    max_iterations: a well-scaled problem needs some ten, one with lost zeros or frames some fifty; step_tolerance: the
-    search has ended where a full step would change no parameter by more than this share of its standard error, far
-    below what any reading tells; cost_tolerance: or lower the objective by less than this share, about the rounding of
-    a sum of squares; rounding: a step that should lower it by less than this share and does not is lost in the rounding
-    of the model, such as that of closed loops, which ends the search too; first_damping: of the first step, in units of
-    the priors, small since starts are mostly near; max_damping: beyond it no step lowers the objective.
+    max_iterations: a well-scaled problem needs some ten, one with lost zero offsets or frames some fifty;
+    step_tolerance: the search ends where a full step would change no parameter by more than this share of its standard
+    error, far below the resolution of any reading; cost_tolerance: or where it would lower the objective by less than
+    this share, about the rounding of a sum of squares; rounding: the search also ends where a step should lower the
+    objective by less than this share and does not, since it is below the rounding of the model, such as that of closed
+    loops; first_damping: of the first step, in units of the priors, small since starts are mostly near; max_damping:
+    beyond it no step lowers the objective.
     """
 
     max_iterations: int = 200
@@ -44,7 +45,7 @@ class SolverOptions:
     max_damping: float = 1e24
 
 
-# damping that keeps directions which nothing determines where they are
+# damping that holds directions that neither readings nor priors determine
 _LEAST_DAMPING = 1e-13
 # damping, times two, after the first step that does not lower the objective
 _RETRY_DAMPING = 1e-3
@@ -84,7 +85,7 @@ def solve(
 
 
 def estimate_at(problem: Problem, values: npt.ArrayLike, message: str, evaluations: int = 1) -> Estimate:
-    """The Estimate linearised at values (p,) that another search ended at, as its message says.
+    """The Estimate linearised at values (p,), the result of another search with its message.
 
     Raises FitError where the model predicts nothing there.
     """
@@ -117,7 +118,7 @@ class _Search:
         return white, cost + self._problem.parameters.prior_cost(values)
 
     def _linearized(self) -> FloatArray:
-        """Derivative and residual (n a, p + 1) of the whitened readings where the search stands.
+        """Derivative and residual (n a, p + 1) of the whitened readings at the current values.
 
         Readings under a robust loss have the weight rho' (iteratively reweighted least squares).
         """
@@ -141,32 +142,32 @@ class _Search:
         for _ in range(options.max_iterations):
             triangle = self._penalized(self._linearized())
             free = np.flatnonzero(self._free(triangle))
-            own = _Linearized(
+            linearized = _Linearized(
                 triangle if len(free) == len(self.values) else triangle_of(triangle[:, [*free, len(self.values)]]),
                 self._problem.parameters.sd[free],
                 (self._problem.parameters.low - self.values)[free],
                 (self._problem.parameters.high - self.values)[free],
             )
             least = max(0.25 * options.step_tolerance**2, options.cost_tolerance * self.cost)
-            if own.step(_LEAST_DAMPING)[1] <= least:
+            if linearized.step(_LEAST_DAMPING)[1] <= least:
                 self._end()
                 return
             while True:
-                change, foreseen = own.step(damping)
+                change, predicted = linearized.step(damping)
                 step = np.zeros(len(self.values))
                 step[free] = change
                 trial = self._problem.parameters.clipped(self.values + step)
                 residual, cost = self._evaluate(trial)
                 if cost < self.cost:
                     break
-                if foreseen <= max(least, options.rounding * self.cost):
+                if predicted <= max(least, options.rounding * self.cost):
                     self._end()
                     return
                 damping, growth, self.straight = max(damping, _RETRY_DAMPING) * growth, 2.0 * growth, False
                 if damping > options.max_damping:
                     self.message = "no step lowers the objective"
                     return
-            ratio = (self.cost - cost) / max(foreseen, 1e-300)
+            ratio = (self.cost - cost) / max(predicted, 1e-300)
             damping, growth = damping * max(1.0 / 30.0, 1.0 - (2.0 * min(ratio, 1.0) - 1.0) ** 3), 2.0
             if ratio < 0.5:
                 self.straight = False
@@ -211,10 +212,10 @@ class _Linearized:
         unit = np.where(np.isfinite(self.sd), self.sd, 1.0 / np.where(length > 0.0, length, 1.0))
         free, step = np.ones(count, dtype=bool), np.zeros(count)
         while free.any():
-            rest = target + columns[:, ~free] @ step[~free]
-            own = np.column_stack([columns[:, free] * unit[free], rest])
+            remaining = target + columns[:, ~free] @ step[~free]
+            scaled = np.column_stack([columns[:, free] * unit[free], remaining])
             brake = np.column_stack([np.sqrt(damping) * np.eye(int(free.sum())), np.zeros(int(free.sum()))])
-            damped = triangle_of(np.concatenate([own, brake]))
+            damped = triangle_of(np.concatenate([scaled, brake]))
             step[free] = -unit[free] * solve_triangular(damped[:-1, :-1], damped[:-1, -1])
             beyond = free & ((step < self.low) | (step > self.high))
             if not beyond.any():

@@ -1,10 +1,10 @@
 """Starting values: the frame and the targets in closed form, then a robot's stages, then everything at once.
 
-A search that starts far from the truth ends in another minimum or nowhere. Where the nominal robot predicts the
-readings well no start is needed. Where it does not, `rrru.campaign.target_registration` finds the instrument's frame
-and the targets' places whatever the turn, and the readings are expressed in the robot's frame: deviations stay small
-there, and their priors and bounds keep their meaning. Drives whose zeros are lost are found by the robot's `stages`.
-Lengths in mm, angles in rad.
+A search that starts far from the truth ends in another minimum or does not converge. Where the nominal robot predicts
+the readings well no start is needed. Where it does not, `rrru.campaign.target_registration` finds the instrument's
+frame and the targets' places for any rotation. The readings are then expressed in the robot's frame: deviations stay
+small there, and their priors and bounds keep their meaning. Lost zero offsets of drives are found by the robot's
+`stages`. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -28,14 +28,14 @@ from rrru.kinematics.readings import Readings, lacking, place_on_platform
 
 FloatArray = npt.NDArray[np.float64]
 
-# a median residual above this share of the robot's size is none that the errors of its geometry make
+# a median residual above this share of the robot's size is not due to errors of its geometry
 FAR_SHARE_OF_SIZE = 2e-3
 # a median residual above this share of the robot's size is that of a frame in which no search can begin
 LOST_SHARE_OF_SIZE = 0.05
-# an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zeros of drives, which
-# `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
+# an instrument's own frame is off by metres, of which a registration leaves thousandths; lost zero offsets of drives,
+# which `rrru.campaign.ingest.mastering` finds with the frame, leave more than this share
 _MAX_SHARE_AFTER = 0.02
-# residual at which a reading begins to count less while zeros of drives are far off
+# residual at which a reading begins to count less while zero offsets of drives are far off
 _BEND_MM = 5.0
 _MIN_READINGS = 3
 _AXES = "xyz"
@@ -76,10 +76,10 @@ def _targets(robot: Any, twists: FloatArray, readings: Readings) -> tuple[list[s
 
 
 def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings) -> dict[str, float]:
-    """What has to be added to twists (1, sites, 6) for readings to fit, by name of the robot's open numbers.
+    """Changes of twists (1, sites, 6) that make readings fit, by name of the robot's open numbers.
 
     The exact registration of Readings at Poses, in the names of `rrru.kinematics.base_parameters.open_numbers`. Raises
-    FitError where nothing determines it.
+    FitError where the readings do not determine it.
     """
     found, numbers = register_poses(robot, poses, twists, readings), robot.legs.site_numbers
     moved = np.array(twists[:1], dtype=float)
@@ -90,14 +90,14 @@ def frame_values(robot: Any, poses: Any, twists: FloatArray, readings: Readings)
         moved[0, numbers[name], :3] = 0.0
     if robot.reads.fitted:
         names, number, _ = _targets(robot, moved, readings)
-        rest = place_on_platform(robot, moved, readings)
+        nominal = place_on_platform(robot, moved, readings)
         for name in robot.reads.fitted:
             k = names.index(name)
-            moved[0, numbers[name], :3] = found.place_mm[k] - rest[int(np.argmax(number == k))]
+            moved[0, numbers[name], :3] = found.place_mm[k] - nominal[int(np.argmax(number == k))]
     change = moved[0] - twists[0]
     return {
-        one.name: float(sum(twist @ change[numbers[site]] for site, twist in one.twists.items()))
-        for one in open_numbers(robot.reads)
+        candidate.name: float(sum(twist @ change[numbers[site]] for site, twist in candidate.twists.items()))
+        for candidate in open_numbers(robot.reads)
     }
 
 
@@ -152,9 +152,9 @@ def starting_values(residuals: Any) -> tuple[FloatArray, int]:
     """Deviations (p,) to start from, and how many evaluations it took to find them.
 
     residuals: `rrru.estimation.observations.target_positions.TargetPositions` or the like, readings in the robot's
-    frame. The nominal ones where the nominal robot is near; else the robot's `stages` one after the other, such
-    as frames and then with these the drives, robustly. All parameters at once would take steps along what is hardly
-    determined for what large turns leave to the second order.
+    frame. The nominal ones where the nominal robot is near; else the robot's `stages` one after the other, such as
+    frames and then with these the drives, robustly. A search over all parameters at once would move hardly determined
+    combinations to fit second-order terms of large turns.
     """
     robot, evaluations = residuals.mechanism, 0
     found = np.asarray(robot.parameters.nominal)

@@ -98,10 +98,10 @@ class Chains:
             axis = move.axis if np.array_equal(turn, np.eye(3)) else Z
             if offset := self._offsets.get(move.joint, 0.0):
                 seat = seat @ (placed(turn=turn_about(axis, offset)) if move.kind == "R" else placed(offset * axis))
-            own = placement @ seat
+            frame = placement @ seat
             self.seats[self.sites[move.name]] = seat
             home = 0.0 if drive is not None else move.home
-            self._made[key] = Joint(self.sites[move.name], move.kind, axis, own[:3, 3], own[:3, :3], drive, home)
+            self._made[key] = Joint(self.sites[move.name], move.kind, axis, frame[:3, 3], frame[:3, :3], drive, home)
         return self._made[key], placed(turn=turn.T)
 
     def _refuse_shared(self):
@@ -118,13 +118,13 @@ class Chains:
 
 
 def with_bars(legs):
-    """The legs of Legs, those that end in bars as such, at the home pose, and of these the Cuts by number."""
+    """The legs of Legs at the home pose, ended in bars where possible, and the Cuts of these by number."""
     actuators, passive = legs.home_drives[None], legs.home_passive[None]
     ways = [walk(legs, leg, actuators, passive, Twists(legs)) for leg in legs.legs]
     alone = {group[0] for group in legs.groups if len(group) == 1}
     drives = legs.driven(actuators)[0]
-    each = [_with_bar(leg, ways[k], drives) if k in alone else (leg, None) for k, leg in enumerate(legs.legs)]
-    return tuple(leg for leg, _ in each), {number: cut for number, (_, cut) in enumerate(each) if cut}
+    pairs = [_with_bar(leg, ways[k], drives) if k in alone else (leg, None) for k, leg in enumerate(legs.legs)]
+    return tuple(leg for leg, _ in pairs), {number: cut for number, (_, cut) in enumerate(pairs) if cut}
 
 
 def _with_bar(leg, way, drives):
@@ -148,8 +148,8 @@ def _with_bar(leg, way, drives):
                 return leg, None
             length, drive = length - drives[slide.drive], slide.drive
         at = leg.joints[first]
-        own = way.turns[first][0].T @ (near - way.places[first][0])
-        seat = Joint(f"{leg.name} ball", "fixed", Z, at.shift_mm + at.turn @ own)
+        offset = way.turns[first][0].T @ (near - way.places[first][0])
+        seat = Joint(f"{leg.name} ball", "fixed", Z, at.shift_mm + at.turn @ offset)
         bar = Bar(float(length), way.turn[0].T @ (far - way.place[0]), drive)
         line = (far - near) / np.linalg.norm(far - near)
         behind = Cut(leg.joints[turns[cut]].name, way.turns[turns[cut]][0].T @ line)

@@ -28,28 +28,28 @@ def of_mimics(assembly, mimics):
 
     Raises ConfigError for the mimic of a mimic and of a joint that is not on the chain.
     """
-    own = {move.origin: move.joint for move in assembly.moves.values()}
+    on_chain = {move.origin: move.joint for move in assembly.moves.values()}
     result = {}
     for name, (driver, factor, offset) in mimics.items():
-        if name not in own:
+        if name not in on_chain:
             continue
-        if driver not in own or driver in mimics:
-            known = ", ".join(one for one in own if one not in mimics) or "none here"
+        if driver not in on_chain or driver in mimics:
+            known = ", ".join(joint for joint in on_chain if joint not in mimics) or "none here"
             raise assembly.error(f"joint {name} mimics {driver!r}; allowed: driven joints of the chain, {known}")
-        result[own[name]] = _follows(assembly.model, own[name], own[driver], factor, offset)
+        result[on_chain[name]] = _follows(assembly.model, on_chain[name], on_chain[driver], factor, offset)
     return result
 
 
 def of_equalities(assembly, driven):
     """Follows by MuJoCo's joint from the active joint equalities of an MJCF's legs; driven: joints with actuators.
 
-    Raises ConfigError for a follower of what no actuator drives, with an actuator of its own, or of a curve.
+    Raises ConfigError for a follower of a joint without actuator, with an actuator of its own, or along a curve.
     """
     model, result = assembly.model, {}
-    own = {move.joint for move in assembly.moves.values()}
+    of_legs = {move.joint for move in assembly.moves.values()}
     for k in np.flatnonzero(model.eq_active0):
         joint, driver = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
-        if model.eq_type[k] != _EQ.mjEQ_JOINT or joint not in own:
+        if model.eq_type[k] != _EQ.mjEQ_JOINT or joint not in of_legs:
             continue
         name = f"joint {assembly.joint_name(joint)}"
         if driver < 0:
@@ -75,5 +75,5 @@ def coupling(driven, follows):
 
 def _follows(model, joint, driver, factor, offset):
     """The Follows of numbers in m and rad."""
-    own, other = (MM if model.jnt_type[one] == _SLIDE else 1.0 for one in (joint, driver))
-    return Follows(driver, factor * own / other, offset * own)
+    unit, driver_unit = (MM if model.jnt_type[number] == _SLIDE else 1.0 for number in (joint, driver))
+    return Follows(driver, factor * unit / driver_unit, offset * unit)

@@ -1,12 +1,12 @@
-"""What small errors of a robot's legs change in the file that it came from.
+"""Changes of a robot's file by small geometric errors of its legs.
 
 A twist at a site is a placement T before the motion of the site's joint. In the file a body's joints S move it from its
-placement P in its parent's frame, and with all T that act there it stands at
+placement P in its parent's frame. With all T that act there its placement is
 
     P X_0 S_1 X_1 .. S_n X_n
 
-with X in the body's own frame. A connect's anchors move with the T before and behind it. What lies between two axes of
-one ball joint no file holds. Lengths in mm, angles in rad; placements are (4, 4).
+with X in the body's own frame. A connect's anchors move with the T before and behind it. No file can represent an
+error between two axes of one ball joint. Lengths in mm, angles in rad; placements are (4, 4).
 """
 
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ SAME = 1e-10
 @dataclass(frozen=True)
 class Changes:
     """bodies: by number the placements X, one more than it has joints; anchors: by connect's number its points on its
-    first and second body (3,); frames: by name places on the platform; lost: what no file holds, in words.
+    first and second body (3,); frames: by name places on the platform; lost: what no file can represent, in words.
     """
 
     bodies: dict
@@ -41,12 +41,12 @@ class Changes:
 
 @dataclass(frozen=True)
 class Found:
-    """What a diagnosis has found of a robot.
+    """Results of a diagnosis that a robot's file may represent.
 
-    twists: (6,) by site; spread: (q, 6) by site, what q independent errors of one standard deviation each make of them;
-    reflectors: place (3,) on the platform, before its twist, by the site of each one that was read; tool_mm (3,): the
-    measured point; compliance, play: by number of the drive (value, standard error), in rad/(N mm) or mm/N, and in rad
-    or mm; loads: by drive the largest one, in N mm or N.
+    twists: (6,) by site; spread: (q, 6) by site, changes of the twists by q independent errors of one standard
+    deviation each; reflectors: place (3,) on the platform, before its twist, by the site of each one that was read;
+    tool_mm (3,): the measured point; compliance, play (the backlash): by number of the drive (value, standard error),
+    in rad/(N mm) or mm/N, and in rad or mm; loads: by drive the largest one, in N mm or N.
     """
 
     twists: dict
@@ -64,37 +64,37 @@ def changes_of(structure, found, twists):
     between, tip = _between(structure, twists, lost)
     bodies, anchors = {}, {}
     for number in sorted({number for path in assembly.paths for number in path}):
-        seam, own = assembly.seams[number], between.get(number, {})
+        seam, placements = assembly.seams[number], between.get(number, {})
         if seam.body is None:
-            anchors |= _anchors(assembly, seam, own, lost)
+            anchors |= _anchors(assembly, seam, placements, lost)
         else:
-            bodies[seam.body] = _of_body(assembly, seam, own, lost)
+            bodies[seam.body] = _of_body(assembly, seam, placements, lost)
     if tip is not None:
         bodies[assembly.platform] = (tip,)
     return Changes(bodies, anchors, _frames(found, twists), tuple(dict.fromkeys(lost)))
 
 
 def held_by(structure, candidates):
-    """Names of the Candidates whose twists the file of a Structure can hold."""
-    return [one.name for one in candidates if not changes_of(structure, Found({}), one.twists).lost]
+    """Names of the Candidates whose twists the file of a Structure can represent."""
+    return [candidate.name for candidate in candidates if not changes_of(structure, Found({}), candidate.twists).lost]
 
 
 def scatter(numbers, twists, spread):
-    """Standard errors by key of what `numbers` makes of twists (6,) by site, under the spread (q, 6) by site.
+    """Standard errors by key of the results of `numbers` for twists (6,) by site, under the spread (q, 6) by site.
 
-    Of vectors (3,) they are (3,), of placements (6,): of the shift, and of the turn about the own axes.
+    Those of vectors (3,) are (3,), those of placements (6,): of the shift, and of the turn about the own axes.
     """
-    squares, count = {}, max((len(one) for one in spread.values()), default=0)
+    squares, count = {}, max((len(part) for part in spread.values()), default=0)
     for k in range(count):
-        steps = ({s: sign * one[k] for s, one in spread.items()} for sign in (-1.0, 1.0))
-        low, high = (numbers(twists | {s: twists.get(s, _NOTHING) + one for s, one in step.items()}) for step in steps)
+        steps = ({s: sign * part[k] for s, part in spread.items()} for sign in (-1.0, 1.0))
+        low, high = (numbers(twists | {s: twists.get(s, _NOTHING) + d for s, d in step.items()}) for step in steps)
         for key, value in high.items():
             squares[key] = squares.get(key, 0.0) + (0.5 * difference(low[key], value)) ** 2
     return {key: np.sqrt(value) for key, value in squares.items()}
 
 
 def difference(low, high):
-    """Between two vectors (3,), or two placements: shift, and turn about the own axes."""
+    """Difference of two vectors (3,), or of two placements: shift, and turn about the own axes."""
     if high.ndim == 1:
         return high - low
     return np.concatenate([high[:3, 3] - low[:3, 3], Rotation.from_matrix(low[:3, :3].T @ high[:3, :3]).as_rotvec()])
@@ -120,10 +120,11 @@ def _frames(found, twists):
 def _between(structure, twists, lost):
     """Placements by number of the seam and of its item before which they act, from near to far, each with its site.
 
-    And what a chain's end changes of the place of a platform that is fixed to the last body, None where it is not.
+    Also the change of the place of a platform that is fixed to the last body of a chain, None where it is not.
     """
-    assembly, own = structure.assembly, _of_chains(structure, twists)
-    base = placement_of(twists.get(WORLD, _NOTHING)) @ own.get(structure.open_legs.legs[0].joints[0].name, np.eye(4))
+    assembly, by_site = structure.assembly, _of_chains(structure, twists)
+    first_site = structure.open_legs.legs[0].joints[0].name
+    base = placement_of(twists.get(WORLD, _NOTHING)) @ by_site.get(first_site, np.eye(4))
     result, tip, ends = {}, None, {}
     for path, leg in zip(assembly.paths, structure.open_legs.legs, strict=True):
         part = assembly.base
@@ -132,12 +133,12 @@ def _between(structure, twists, lost):
             forward = part == seam.near
             for k, item in enumerate(seam.items):
                 site = structure.chains.sites[item.name] if isinstance(item, Move) else None
-                if site in own:
+                if site in by_site:
                     seat = structure.chains.seats[site]
-                    acts = seat @ own[site] @ undone(seat)
+                    acts = seat @ by_site[site] @ undone(seat)
                     at[k if forward else k + 1] = (acts if forward else undone(acts)), site
             part = seam.other(part)
-        first, last, end = path[0], path[-1], own.get(leg.joints[-1].name, np.eye(4))
+        first, last, end = path[0], path[-1], by_site.get(leg.joints[-1].name, np.eye(4))
         _at_end(result, assembly.seams[first], first, assembly.base, base)
         if _hangs_on(assembly, last):
             tip = end
@@ -149,7 +150,7 @@ def _between(structure, twists, lost):
 
 
 def _at_end(result, seam, number, part, placement):
-    """Enter what moves a seam's end at a part, seen from there."""
+    """Enter the placement that moves a seam's end at a part, seen from there."""
     if part == seam.near:
         result[number][0] = placement, ""
     else:
@@ -229,6 +230,6 @@ def _anchors(assembly, seam, between, lost):
 
 
 def _lose(lost, site, placement):
-    """Note what shifts one axis of a ball joint against another."""
+    """Note a shift of one axis of a ball joint against another."""
     if np.abs(placement[:3, 3]).max() > 0.0:
         lost.append(f"{site}: the axes of a ball joint meet in a point")

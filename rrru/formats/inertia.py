@@ -4,7 +4,8 @@ Six points on a body's principal axes have its mass m, centre and inertia I:
 
     each m / 6, at +- sqrt(3 S_k / m) from the centre along axis k,   S_k = (trace I) / 2 - I_k
 
-Of a bar only what lies along it is known: two points have its mass, its centre's place along it and its inertia across.
+Of a bar only the distribution along it is known: two points have its mass, its centre's place along it and its inertia
+across.
 Lengths in mm, masses in kg.
 """
 
@@ -28,7 +29,7 @@ def points_of(model, body):
 
 
 def point_masses_of(chains, open_legs, legs):
-    """Lumps of all bodies that move with Legs; open_legs: the same ones without bars."""
+    """PointMasses of all bodies that move with Legs; open_legs: the same ones without bars."""
     assembly, result = chains.assembly, []
     for body in range(1, assembly.model.nbody):
         mass, holder = float(assembly.model.body_mass[body]), _holder(chains, body)
@@ -50,7 +51,7 @@ def point_masses_of(chains, open_legs, legs):
 
 
 def _holder(chains, body):
-    """The body itself, or what it hangs on at home, that is part of a leg; None for what stands still or is loose."""
+    """The body, or the parent of it at home, that is part of a leg; None for a body that is fixed or loose."""
     assembly = chains.assembly
     while body and assembly.frames[body][0] not in (assembly.base, *chains.parts):
         body = int(assembly.model.body_parentid[body])
@@ -63,7 +64,7 @@ def _moved(placement, points):
 
 
 def _of_bar(open_legs, legs, place, mass, at):
-    """Two Lumps of a body of a bar whose points (6, 3) are at a Place of the leg without the bar."""
+    """Two PointMasses of a body of a bar whose points (6, 3) are at a Place of the leg without the bar."""
     chain, leg = open_legs.legs[place.leg], legs.legs[place.leg]
     actuators, passive = open_legs.home_drives[None], open_legs.home_passive[None]
     way = walk(open_legs, chain, actuators, passive, Twists(open_legs))

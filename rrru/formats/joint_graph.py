@@ -1,4 +1,4 @@
-"""What joins the rigid parts of a mechanism: seams of placements (4, 4) and moves, for `rrru.formats.robot_file`.
+"""Joint graph of a mechanism: seams of placements (4, 4) and moves join its rigid parts, for `rrru.formats.robot_file`.
 
 Lengths in mm, angles in rad.
 """
@@ -26,7 +26,7 @@ class Move:
 
 @dataclass(frozen=True, eq=False)
 class Seam:
-    """What joins two parts: placements and Moves, in their order from the part `near` to the part `far`.
+    """An edge of the graph: placements and Moves, in their order from the part `near` to the part `far`.
 
     body: MuJoCo's number of the body whose joints these are, None for connects, whose numbers are `connects`.
     """

@@ -1,9 +1,9 @@
-"""Stiffness and play of drives in an MJCF: a servo's kp, and a joint with a range between motor and driven joint.
+"""Stiffness and backlash of drives in an MJCF: a servo's kp, and a joint with a range between motor and driven joint.
 
-Between both a rotor as heavy as what the joint moves is assumed, without which they could not be told apart. Friction F
-on the arm, along a tendon over both joints, holds it within its play against its load. The servo has to overcome it, so
-that a drive turns back by the play and 2 F / kp before the arm does: the width w that was found is their sum. Where
-friction alone winds up more there is no play, and F = w kp / 2.
+Between both a rotor with the inertia of all that the joint moves is assumed, without which the two joints would be
+redundant. Friction F on the arm, along a tendon over both joints, holds it within the backlash against its load. The
+servo has to overcome it: a drive turns back by the backlash and 2 F / kp before the arm does, and the width w found is
+their sum. Where friction alone winds up more than w, the file has no backlash, and F = w kp / 2.
 """
 
 import mujoco
@@ -13,17 +13,17 @@ from rrru.formats.mjcf_reader import MM
 from rrru.formats.xml_text import sizes, words
 
 _SERVOS = ("position", "general")
-# a limit that gives way by far less than any play
+# a limit whose deflection is far less than any backlash
 _STIFF = "0.9999 0.9999 0.0001"
 # ASSUME friction holds an arm against this many times the largest load of the campaign
 _HOLDS = 1.25
-# ASSUME and drags an arm that carries no load along at this, by kind: rad/s^2, m/s^2
+# ASSUME friction accelerates an arm without load by this, by kind: rad/s^2, m/s^2
 _DRAGS = {"R": 2.0, "P": 1.0}
 _NONE = dict.fromkeys(("ref", "springref", "stiffness", "damping", "frictionloss", "margin"), "0")
 
 
 def write_stiffness(document, structure, found):
-    """Write the stiffness of the drives' servos into a document; returns what it cannot hold, in words."""
+    """Write the stiffness of the drives' servos into a document; returns what it cannot represent, in words."""
     model, lost = structure.assembly.model, []
     ratio = any("dampratio" in one.attrib for one in document.root.iter())
     for number, (compliance, error) in found.compliance.items():
@@ -60,7 +60,7 @@ def _is_servo(model, k, joint):
     )
 
 
-def write_plays(document, structure, found, lines):
+def write_backlash(document, structure, found, lines):
     """Write the lost motion of drives into a document; lines: (axis, point in mm) of changed joints, by joint."""
     inertia = _inertia(structure.assembly.model)
     for number, (width, error) in found.play.items():
@@ -73,30 +73,30 @@ def write_plays(document, structure, found, lines):
         # to m and N m, or rad and N
         scale, force, unit = (1.0, 1.0 / MM, "rad") if move.kind == "R" else (1.0 / MM, 1.0, "m")
         load = max(force * found.loads.get(number, 0.0), _DRAGS[move.kind] * inertia[move.joint])
-        whole, holding = scale * width, _HOLDS * load
+        lost, holding = scale * width, _HOLDS * load
         stiffness = _stiffness(structure, found, number)
-        play = whole - 2.0 * holding / stiffness
-        told = f"lost motion of {whole:.4g} +- {sizes(scale * error)} {unit} at {move.origin}"
+        backlash = lost - 2.0 * holding / stiffness
+        text = f"lost motion of {lost:.4g} +- {sizes(scale * error)} {unit} at {move.origin}"
         hard = {"solreffriction": _hard(structure), "solimpfriction": _STIFF}
-        if play <= 0.0:
+        if backlash <= 0.0:
             element = document.joints[move.joint]
-            element.attrib |= hard | {"frictionloss": words(0.5 * whole * stiffness)}
-            document.note(element, f"found: {told}, less than what friction against its load winds up: friction alone")
+            element.attrib |= hard | {"frictionloss": words(0.5 * lost * stiffness)}
+            document.note(element, f"found: {text}, less than the wind-up by friction against its load: friction alone")
             continue
         line = lines.get(move.joint, _line(structure, move.joint))
-        element = _write_play(document, structure, (move, line, play), inertia[move.joint])
-        document.note(element, f"found: {told}, of which friction on the arm winds up {whole - play:.2g}")
+        element = _write_joint(document, structure, (move, line, backlash), inertia[move.joint])
+        document.note(element, f"found: {text}, of which friction on the arm winds up {lost - backlash:.2g}")
         section = document.root.find("tendon")
         section = document.inside(document.root, "tendon", {}) if section is None else section
         tendon = {"name": f"{move.origin}_play", "frictionloss": words(holding)}
         tendon = document.inside(section, "fixed", tendon | hard)
-        document.note(tendon, f"assumed: {_HOLDS:g} times the largest load, or inertia, holds the arm within its play")
+        document.note(tendon, f"assumed: {_HOLDS:g} times the largest load, or inertia, holds the arm within backlash")
         for name in (move.origin, f"{move.origin}_play"):
             document.inside(tendon, "joint", {"joint": name, "coef": "1"})
 
 
 def _stiffness(structure, found, number):
-    """Stiffness of a drive in the corrected file, N m/rad or N/m, inf where no servo gives way."""
+    """Stiffness of a drive in the corrected file, N m/rad or N/m, inf where it has no compliant servo."""
     model, move = structure.assembly.model, structure.driven[number]
     compliance, _ = found.compliance.get(number, (0.0, 0.0))
     if compliance > 0.0:
@@ -115,10 +115,10 @@ def _hard(structure):
     return words([2.0 * structure.assembly.model.opt.timestep, 1.0])
 
 
-def _write_play(document, structure, what, inertia):
-    """Write a joint with a range behind a driven one; what: its Move, line (axis, point in mm) and play."""
-    (move, (axis, point), play), model = what, structure.assembly.model
-    half = 0.5 * play * (np.degrees(1.0) if move.kind == "R" and document.degrees else 1.0)
+def _write_joint(document, structure, what, inertia):
+    """Write a joint with a range behind a driven one; what: its Move, line (axis, point in mm) and backlash."""
+    (move, (axis, point), backlash), model = what, structure.assembly.model
+    half = 0.5 * backlash * (np.degrees(1.0) if move.kind == "R" and document.degrees else 1.0)
     own_rotor = model.dof_armature[model.jnt_dofadr[move.joint]] > 0.0
     attributes = {
         "name": f"{move.origin}_play",

@@ -1,4 +1,4 @@
-"""Keyframes of an MJCF whose numbers were changed: a place for every joint, and loops that are closed.
+"""Keyframes of an MJCF whose numbers were changed: values of all joints, with closed loops.
 
 Newton on the equalities with the driven joints held:  J dq = -r,  the smallest dq. m and rad.
 """
@@ -6,7 +6,7 @@ Newton on the equalities with the driven joints held:  J dq = -r,  the smallest 
 import mujoco
 import numpy as np
 
-from rrru.formats.mjcf_reader import plays_of
+from rrru.formats.mjcf_reader import backlash_joints
 from rrru.formats.xml_text import own_children, words
 
 _STEPS, _CLOSED_M = 30, 1e-12
@@ -38,7 +38,7 @@ def close_keys(document, before, driven, model):
     new one closes them.
     """
     keys = [one for section in document.root.findall("keyframe") for one in own_children(section)]
-    held = {model.joint(name).id for name in driven} | set(plays_of(model))
+    held = {model.joint(name).id for name in driven} | set(backlash_joints(model))
     for k, element in enumerate(keys):
         qpos = closed_qpos(model, _carried(before, model, before.key_qpos[k], "jnt_qposadr", model.qpos0), held)
         if len(qpos) != before.nq or np.abs(qpos - before.key_qpos[k]).max() > _CLOSED_M:
@@ -54,9 +54,9 @@ def close_keys(document, before, driven, model):
 def _carried(before, model, values, address, default):
     """Values per joint of one model as those of another, which has more joints; these have the default's."""
     result, old = np.array(default), {before.joint(j).name for j in range(before.njnt)}
-    kept = [j for j in range(model.njnt) if not model.joint(j).name or model.joint(j).name in old]
+    common = [j for j in range(model.njnt) if not model.joint(j).name or model.joint(j).name in old]
     starts, ends = getattr(before, address), getattr(model, address)
-    for j, k in enumerate(kept):
+    for j, k in enumerate(common):
         stop = starts[j + 1] if j + 1 < before.njnt else len(values)
         result[ends[k] : ends[k] + stop - starts[j]] = values[starts[j] : stop]
     return result

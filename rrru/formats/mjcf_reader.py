@@ -1,4 +1,4 @@
-"""The bodies of a MuJoCo model as rigid parts, and what joins these, for `rrru.formats.robot_file`.
+"""The bodies of a MuJoCo model as rigid parts, and the joint graph of these, for `rrru.formats.robot_file`.
 
 Bodies without a joint and welded ones make one part. Seams join parts: the joints between a body and its parent, and
 the connects between two parts, where one is a ball joint and two are a hinge. A leg is a path of seams from the base to
@@ -21,10 +21,10 @@ _EQ, _JOINT = mujoco.mjtEq, mujoco.mjtJoint
 _SAME = 1e-9
 
 
-def plays_of(model):
-    """Joints that are the play of driven ones: of the same body, kind and line, with a range and without an actuator.
+def backlash_joints(model):
+    """Joints that model the backlash of driven ones: same body, kind and line, with a range and without an actuator.
 
-    They stand in the middle; by joint the driven one.
+    A robot is read with these joints in the middle of their ranges. Returns the driven joint by joint.
     """
     kinds = [int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)]
     driven = {
@@ -77,7 +77,7 @@ class Assembly:
         self.frames = self._frames([k for k, kind in kinds.items() if kind == _EQ.mjEQ_WELD])
         if self.frames[platform][0] == base:
             raise self.error(f"body {self.body_name(platform)} is fixed to the base; allowed: a body that moves")
-        self._names, self._plays = set(), plays_of(model)
+        self._names, self._backlash_joints = set(), backlash_joints(model)
         connects = [k for k, kind in kinds.items() if kind == _EQ.mjEQ_CONNECT]
         self.seams = tuple(self._joint_seams() + self._connect_seams(connects))
         for k, kind in kinds.items():
@@ -144,7 +144,7 @@ class Assembly:
             (near, before), (far, after) = self.frames[int(model.body_parentid[body])], self.frames[body]
             items = [before @ self.own(body)]
             for joint in range(first, first + count):
-                items += self._joint_items(joint) if joint not in self._plays else []
+                items += self._joint_items(joint) if joint not in self._backlash_joints else []
             if near != far:
                 result.append(Seam(near, far, (*items, undone(after)), body))
         return result
@@ -179,20 +179,20 @@ class Assembly:
     def _connect_items(self, near, far, group):
         """Placements and Moves of all connects (number, point of near, point of far) of two parts."""
         turn = (undone(self.home_of(near)) @ self.home_of(far))[:3, :3]
-        (first, near_mm, far_mm), *others = group
+        (first, near_mm, far_mm), *further = group
         name = self.eq_name(first)
-        if not others:
+        if not further:
             return self._ball_items(name, near_mm, turn, far_mm)
-        if len(others) > 1:
+        if len(further) > 1:
             bodies = f"{self.body_name(near)} and {self.body_name(far)}"
             raise self.error(f"{len(group)} connects between {bodies}; allowed: one, two for a hinge, or a weld")
-        along, own = others[0][1] - near_mm, others[0][2] - far_mm
-        if min(np.linalg.norm(along), np.linalg.norm(own)) < 1e-6:
+        along, far_along = further[0][1] - near_mm, further[0][2] - far_mm
+        if min(np.linalg.norm(along), np.linalg.norm(far_along)) < 1e-6:
             raise self.error(
-                f"connects {name} and {self.eq_name(others[0][0])} are at one point; allowed: two points make a hinge"
+                f"connects {name} and {self.eq_name(further[0][0])} are at one point; allowed: two points make a hinge"
             )
-        along, own = along / np.linalg.norm(along), turn @ own / np.linalg.norm(own)
-        cross, cosine = np.cross(own, along), own @ along
+        along, far_along = along / np.linalg.norm(along), turn @ far_along / np.linalg.norm(far_along)
+        cross, cosine = np.cross(far_along, along), far_along @ along
         skew = np.cross(np.eye(3), cross)
         turn = (np.eye(3) + skew + skew @ skew / (1.0 + cosine)) @ turn
         return [placed(near_mm), Move(self._unique(name), "R", along, name), placed(turn=turn), placed(-far_mm)]

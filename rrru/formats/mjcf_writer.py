@@ -1,14 +1,14 @@
-"""An MJCF with what a diagnosis has found of its robot: places of bodies, axes, anchors, stiffness and play of drives.
+"""An MJCF with the results of a diagnosis: places of bodies, axes, anchors, stiffness and backlash of drives.
 
-The file stays the user's: names, defaults and comments are kept, and each changed number has its standard error in a
-comment. Lengths in mm and angles in rad, m in the file.
+Names, defaults and comments of the user's file stay, and each changed number has its standard error in a comment.
+Lengths in mm and angles in rad, m in the file.
 """
 
 import mujoco
 import numpy as np
 
 from rrru.formats.file_changes import MEASURED_TOOL, SAME, changes_of, difference, scatter
-from rrru.formats.mjcf_drives import write_plays, write_stiffness
+from rrru.formats.mjcf_drives import write_backlash, write_stiffness
 from rrru.formats.mjcf_home import close_keys
 from rrru.formats.mjcf_reader import MM, ends_of
 from rrru.formats.mjcf_text import MjcfDocument
@@ -21,7 +21,7 @@ _EQ = mujoco.mjtEq
 
 
 def to_mjcf(path, platform, found, folder):
-    """The text of an MJCF with what is Found of its robot, for a file in a folder, and what it cannot hold, in words.
+    """The text of an MJCF with the Found of its robot, for a file in a folder, and what it cannot represent, in words.
 
     Raises ConfigError for a file whose bodies do not all stand in it as such.
     """
@@ -41,7 +41,7 @@ def to_mjcf(path, platform, found, folder):
     _write_bodies(document, changed, nominal)
     lost = [*changes_of(structure, found, found.twists).lost, *write_stiffness(document, structure, found)]
     axes = {key[1]: value for key, value in values.items() if key[0] == "axis"}
-    write_plays(document, structure, found, {joint: (axis, values["pos", joint]) for joint, axis in axes.items()})
+    write_backlash(document, structure, found, {joint: (axis, values["pos", joint]) for joint, axis in axes.items()})
     _write_frames(document, structure.assembly.platform, changed)
     _write_anchors(document, model, values, errors)
     close_keys(document, model, [move.origin for move in structure.driven], document.compiled())
@@ -76,14 +76,14 @@ def _write_bodies(document, changed, nominal):
     for key, (value, error) in changed.items():
         kind, number = key[:2]
         if kind == "body":
-            element, own = document.bodies[number], _TURNS
+            element = document.bodies[number]
             turned = np.abs(difference(nominal[key], value)[3:]).max() > SAME
             names = ("pos", *_TURNS) if turned else ("pos",)
             was = " ".join(f'{name}="{element.get(name)}"' for name in names if name in element.attrib)
-            document.note(element, f"corrected: {_told(error)}; was {was or 'no place'}")
+            document.note(element, f"corrected: {_error_text(error)}; was {was or 'no place'}")
             element.set("pos", words(value[:3, 3] / MM))
             if turned:
-                for name in own:
+                for name in _TURNS:
                     element.attrib.pop(name, None)
                 element.set("quat", words(quaternion(value[:3, :3])))
         elif kind in ("axis", "pos"):
@@ -93,7 +93,7 @@ def _write_bodies(document, changed, nominal):
             element.set(kind, words(value / scale))
 
 
-def _told(error):
+def _error_text(error):
     """Standard errors (6,) of a placement in words."""
     if not error.any():
         return "with frame and tool, whose errors it has"
@@ -105,11 +105,11 @@ def _write_frames(document, platform, changed):
     for key, (value, error) in changed.items():
         if key[0] == "frame":
             place = {"pos": words(value[:3, 3] / MM), "quat": words(quaternion(value[:3, :3]))}
-            document.note(document.site(platform, key[1], place), f"found: {_told(error)}")
+            document.note(document.site(platform, key[1], place), f"found: {_error_text(error)}")
 
 
 def _write_anchors(document, model, values, errors):
-    """Write where connects and welds hold bodies together, as far as the changed bodies' places tell it wrongly."""
+    """Write the anchors of connects and welds where the changed places of the bodies would move them."""
     now = document.compiled()
     for k, element in enumerate(document.equalities):
         kind = int(model.eq_type[k])
@@ -134,7 +134,7 @@ def _hold(document, connect, bodies, points, errors):
     for infer in ("body1", "body2", "anchor"):
         element.attrib.pop(infer, None)
     for end, (body, point) in enumerate(zip(bodies, points, strict=True)):
-        own = element.get(f"site{end + 1}", f"{name}_{end + 1}")
+        site = element.get(f"site{end + 1}", f"{name}_{end + 1}")
         error = errors.get(("anchor", k, end), np.full(3, np.nan))
-        document.note(document.site(body, own, {"pos": words(point / MM)}), f"corrected: pos +- {sizes(error / MM)} m")
-        element.set(f"site{end + 1}", own)
+        document.note(document.site(body, site, {"pos": words(point / MM)}), f"corrected: pos +- {sizes(error / MM)} m")
+        element.set(f"site{end + 1}", site)

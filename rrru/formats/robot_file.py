@@ -26,25 +26,25 @@ from rrru.kinematics.legs import Drive, Parts, unit_twist
 _RANGE = {"rad": 1.0, "mm": 100.0}
 _UNITS = {"R": "rad", "P": "mm"}
 _TRN = mujoco.mjtTrn
-# a model's numbers in m, kg and rad that a robot is made of; more is a slip, and what is reckoned from it overflows
-_RECKONED = ("body_pos", "body_quat", "body_ipos", "body_mass", "jnt_pos", "jnt_axis", "jnt_range")
-_RECKONED += ("site_pos", "eq_data")
+# a model's numbers in m, kg and rad that define a robot, and their limit: larger ones are mistakes and would overflow
+_DEFINING = ("body_pos", "body_quat", "body_ipos", "body_mass", "jnt_pos", "jnt_axis", "jnt_range")
+_DEFINING += ("site_pos", "eq_data")
 _MOST = 1e9
 
 
 def from_urdf(path, base=None, tip=None, home=None, tips=None, carries=None, **options):
     """The GeneralRobot of a URDF's chain from the link base, by default the root, to the link tip, the only last one.
 
-    All joints between them are driven, but for those that mimic others. home: values by driven joint of the home pose
-    in rad or mm, by default 0, or the middle of a range without it; tips: instead of tip the links of several hands by
-    name, carries: the targets of each, see `rrru.kinematics.end_effectors`; options: of GeneralRobot. The frames are
-    the links'. Raises ConfigError for what cannot be read.
+    All joints between them are driven, except those that mimic others. home: values by driven joint of the home pose in
+    rad or mm, by default 0, or the middle of a range without it; tips: instead of tip the links of several end
+    effectors by name, carries: the targets on each, see `rrru.kinematics.end_effectors`; options: of GeneralRobot. The
+    frames are the links'. Raises ConfigError for a file that cannot be read.
     """
     file = _existing(path)
     if tips or carries:
         if not tips or len(tips) < 2 or tip:
             raise ConfigError(f"{file}: tips {', '.join(tips or ()) or 'none'}; allowed: two or more, and no tip")
-        arms = {hand: from_urdf(path, base, link, home, **options) for hand, link in tips.items()}
+        arms = {arm: from_urdf(path, base, link, home, **options) for arm, link in tips.items()}
         return with_hands(arms, shared_joints(arms), carries)
     return _robot(*urdf_parts(file, base, tip, home), options)
 
@@ -83,8 +83,8 @@ def from_mjcf(path, platform, **options):
 
     Joints with actuators are driven, and so are those that follow them by a joint equality. The home pose is that of
     the first keyframe, else of the reference configuration; loops that are open there by less than a millimetre are
-    closed. options: of GeneralRobot. The platform's frame is its body's. Raises ConfigError for what cannot be read or
-    is no robot.
+    closed. options: of GeneralRobot. The platform's frame is its body's. Raises ConfigError for a file that cannot be
+    read or is no robot.
     """
     return _robot(*mjcf_parts(path, platform), options)
 
@@ -121,12 +121,12 @@ def _existing(path):
 
 
 def _assembly(model, file, base, platform, home):
-    """The Assembly of a model whose numbers can be reckoned with; MuJoCo only warns of others."""
-    for what, values in ({name: getattr(model, name) for name in _RECKONED} | {"the home pose": home}).items():
+    """The Assembly of a model whose numbers are within limits; MuJoCo only warns of others."""
+    for what, values in ({name: getattr(model, name) for name in _DEFINING} | {"the home pose": home}).items():
         if len(odd := values[~(np.abs(values) <= _MOST)]):
             raise ConfigError(f"{file}: {what} has the value {odd[0]:g}; allowed: numbers of at most {_MOST:g}")
     for what in ("jnt_axis", "body_quat"):
-        # MuJoCo brings them to unit length, but for those whose length overflows
+        # MuJoCo normalises them, except those whose length overflows
         values = getattr(model, what)
         if len(odd := values[np.abs(np.linalg.norm(values, axis=1) - 1.0) > 1e-6]):
             raise ConfigError(f"{file}: {what} has the value {odd[0]}; allowed: a direction with a length")
@@ -136,11 +136,11 @@ def _assembly(model, file, base, platform, home):
 def _servos(assembly):
     """By driven joint of the legs, in the order of the actuators, ranges (low, high) of qpos that its servos allow."""
     model, result = assembly.model, {}
-    own = {move.joint for move in assembly.moves.values()} - {None}
+    of_legs = {move.joint for move in assembly.moves.values()} - {None}
     for k in range(len(model.actuator_trntype)):
         name, kind = model.actuator(k).name or f"actuator {k + 1}", int(model.actuator_trntype[k])
         moved = _moved_by(model, k)
-        if moved is not None and not moved & own:
+        if moved is not None and not moved & of_legs:
             continue
         if kind not in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
             raise assembly.error(f"{name} drives by {_TRN(kind).name[6:].lower()}; allowed: a joint")
@@ -166,7 +166,7 @@ def _effort(model, joint):
 
 
 def _moved_by(model, k):
-    """Joints that an actuator moves, None where these are not told."""
+    """Joints that an actuator moves, None where these are unknown."""
     kind, target = int(model.actuator_trntype[k]), int(model.actuator_trnid[k, 0])
     if kind in (_TRN.mjTRN_JOINT, _TRN.mjTRN_JOINTINPARENT):
         return {target}
@@ -184,22 +184,23 @@ def _robot(assembly, servos, follows, options):
     if unknown := set(options) - known:
         raise assembly.error(f"unknown key {unknown.pop()!r}; allowed: {', '.join(sorted(known))}")
     structure = structure_of(assembly, servos, follows, options.get("up"))
-    chains, legs, each = structure.chains, structure.legs, structure.driven
+    chains, legs, moves = structure.chains, structure.legs, structure.driven
     bars = [leg for leg in legs.legs if leg.bar]
     arm = float(np.mean([np.linalg.norm(leg.bar.platform_mm) for leg in bars])) if bars else 0.0
     defaults = {"name": assembly.file.stem, "up": structure.up} | ({"angle_arm_mm": arm} if arm else {})
-    drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(each)])
+    drives, followers = _drives(legs, [_drive(legs, k, move, chains.sites[move.name]) for k, move in enumerate(moves)])
     parts = Parts(drives=drives, followers=followers, members=tuple((leg.bar_sites[0],) for leg in bars))
-    stated = [_stated(assembly, move, servos[move.joint]) for move in each[: len(servos)]]
-    own = {"legs": legs, "parts": parts, "point_masses": point_masses_of(chains, structure.open_legs, legs)}
-    own["drive_range"] = np.array([_range(assembly, move, one) for move, one in zip(each, stated, strict=False)])
-    own["assumed"] = frozenset(drive.column for drive, one in zip(drives, stated, strict=True) if not one)
-    own |= _limits(assembly, each[: len(servos)])
-    return GeneralRobot(**defaults | own | options)
+    stated = [_stated(assembly, move, servos[move.joint]) for move in moves[: len(servos)]]
+    from_file = {"legs": legs, "parts": parts, "point_masses": point_masses_of(chains, structure.open_legs, legs)}
+    ranges = [_range(assembly, move, given) for move, given in zip(moves, stated, strict=False)]
+    from_file["drive_range"] = np.array(ranges)
+    from_file["assumed"] = frozenset(drive.column for drive, given in zip(drives, stated, strict=True) if not given)
+    from_file |= _limits(assembly, moves[: len(servos)])
+    return GeneralRobot(**defaults | from_file | options)
 
 
 def _limits(assembly, moves):
-    """What a GeneralRobot has as `effort_limits` and `velocity_limits`, of the driven joints of some Moves."""
+    """The `effort_limits` and `velocity_limits` of a GeneralRobot, of the driven joints of some Moves."""
     none = np.nan, np.nan
     effort, velocity = np.array([assembly.limits.get(move.joint, none) for move in moves]).T
     slides = np.array([move.kind == "P" for move in moves])
@@ -216,7 +217,7 @@ def _stated(assembly, move, servos):
 
 
 def _range(assembly, move, ranges):
-    """Lowest and highest value of a driven joint that all of its ranges hold."""
+    """Lowest and highest value of a driven joint within all of its ranges."""
     model, unit = assembly.model, MM if move.kind == "P" else 1.0
     if not ranges:
         about = _RANGE[_UNITS[move.kind]]
@@ -228,19 +229,19 @@ def _range(assembly, move, ranges):
     return unit * low, unit * high
 
 
-def _drives(legs, each):
-    """The Drives, and those of the followers, from one for each driven value that knows no other."""
+def _drives(legs, uncoupled):
+    """The Drives, and those of the followers, from one uncoupled Drive for each driven value."""
     if legs.coupling is None:
-        return tuple(each), ()
+        return tuple(uncoupled), ()
     drives = []
     for number, column in enumerate(legs.coupling.T):
-        others = {each[k].site: by * each[k].twist for k, by in enumerate(column) if by and k != number}
-        drives.append(replace(each[number], others=others))
-    return tuple(drives), tuple(each[len(drives) :])
+        coupled = {uncoupled[k].site: by * uncoupled[k].twist for k, by in enumerate(column) if by and k != number}
+        drives.append(replace(uncoupled[number], others=coupled))
+    return tuple(drives), tuple(uncoupled[len(drives) :])
 
 
 def _drive(legs, number, move, site):
-    """The Drive of a driven value's Move, without what follows it."""
+    """The Drive of a driven value's Move, without its followers."""
     unit = _UNITS[move.kind]
     for leg in legs.legs:
         if leg.bar and leg.bar.drive == number:

@@ -1,5 +1,4 @@
-"""The legs of an Assembly, closed at home, and how they came about, for `rrru.formats.robot_file` and what writes
-files.
+"""The legs of an Assembly, closed at home, and their origin in the file, for `rrru.formats.robot_file` and the writers.
 
 Lengths in mm, angles in rad.
 """
@@ -19,8 +18,8 @@ from rrru.kinematics.closure_kernel import ARM_MM
 from rrru.kinematics.legs import Legs
 from rrru.kinematics.mobility import free_motions
 
-# a loop may be open by this at the file's home pose, whose numbers are often rounded, and by that after it is closed,
-# where more joints than needed do not fit each other; below the last it is not closed at all
+# a loop may be open by the first length at the file's home pose, whose numbers are often rounded, and by the second
+# after it is closed, where redundant joints do not fit each other; below the third it counts as closed already
 _OPEN_MM, _LEFT_MM, _CLOSED_MM = 1.0, 0.01, 1e-9
 
 
@@ -67,8 +66,8 @@ def structure_of(assembly, servos, follows, up=None):
     gravity = home[:3, :3] @ assembly.model.opt.gravity
     if up is None:
         up = tuple(-gravity / np.linalg.norm(gravity)) if gravity.any() else (0.0, 0.0, 1.0)
-    each, cuts = with_bars(open_legs)
-    legs = _closed(assembly, replace(open_legs, legs=each), up)
+    with_bar, cuts = with_bars(open_legs)
+    legs = _closed(assembly, replace(open_legs, legs=with_bar), up)
     return Structure(assembly, chains, open_legs, cuts, legs, servos, follows, up)
 
 
@@ -98,7 +97,7 @@ def _closed(assembly, legs, up):
 
 
 def _gaps(legs, poses):
-    """What every leg lacks (legs,) in mm at one pose with drives at home, angles counted in the arm."""
+    """Closure error (legs,) in mm of every leg at one pose with drives at home, angles counted in the arm."""
     result, actuators, twists = [], legs.home_drives[None], Twists(legs)
     for leg in legs.legs:
         way = walk(legs, leg, actuators, poses.passive, twists)

@@ -1,6 +1,6 @@
 """A URDF as MuJoCo's parser reads it, for `rrru.formats.robot_file`.
 
-Shapes are left out, which a robot's motion does not need, and fixed links kept: base and tip are often fixed ones.
+Shapes are left out, which a robot's motion does not need. Fixed links stay, since base and tip are often fixed ones.
 """
 
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ def read(file):
 
 
 def _limits(joint):
-    """Effort and velocity of a joint's limit, NaN where none is stated; files write 0 for what nobody knows."""
+    """Effort and velocity of a joint's limit, NaN where none is stated; files write 0 for an unknown limit."""
     limit, result = joint.find("limit"), []
     for key in ("effort", "velocity"):
         try:

@@ -1,7 +1,7 @@
-"""A URDF with what a diagnosis has found of its robot: the origins of its joints, and frames on its tip.
+"""A URDF with the results of a diagnosis: the origins of its robot's joints, and frames on its tip.
 
-The file stays the user's: names and comments are kept, and each changed number has its standard error in a comment. A
-URDF holds neither stiffness nor play of drives. Lengths in mm and angles in rad, m in the file.
+Names and comments of the user's file stay, and each changed number has its standard error in a comment. A URDF cannot
+represent stiffness and backlash of drives. Lengths in mm and angles in rad, m in the file.
 """
 
 import os
@@ -17,7 +17,7 @@ from rrru.formats.xml_text import Document, roll_pitch_yaw, sizes, words
 
 
 def to_urdf(path, found, folder, base=None, tip=None, home=None):
-    """The text of a URDF with what is Found of its robot, for a file in a folder, and what it cannot hold, in words.
+    """The text of a URDF with the Found of its robot, for a file in a folder, and what it cannot represent, in words.
 
     base, tip, home: as of `rrru.formats.robot_file.from_urdf`.
     """
@@ -42,11 +42,11 @@ def to_urdf(path, found, folder, base=None, tip=None, home=None):
             _write_behind(document, joints[name], name, (value, error))
         else:
             body = assembly.body_name(assembly.platform)
-            _write_frame(document, (body, name.replace(" ", "_")), value, f"found: {_told(error)}")
+            _write_frame(document, (body, name.replace(" ", "_")), value, f"found: {_error_text(error)}")
     _find_meshes(document.root, assembly.file.resolve().parent, folder)
     lost = list(changes_of(structure, found, found.twists).lost)
-    for what, each in (("compliance", found.compliance), ("play", found.play)):
-        drives = [structure.driven[number].origin for number, (value, _) in each.items() if value > 0.0]
+    for what, by_drive in (("compliance", found.compliance), ("backlash", found.play)):
+        drives = [structure.driven[number].origin for number, (value, _) in by_drive.items() if value > 0.0]
         lost += [f"{what} of {', '.join(drives)}"] if drives else []
     return document.text, tuple(lost)
 
@@ -62,7 +62,7 @@ def _numbers(structure, found, twists):
     return result | {("frame", name): place for name, place in changes.frames.items()}
 
 
-def _told(error):
+def _error_text(error):
     """Standard errors (6,) of a placement in words."""
     if not error.any():
         return "with frame and tool, whose errors it has"
@@ -75,7 +75,7 @@ def _write_origin(document, joint, placement, error, turned):
     if origin is None:
         origin = document.behind(joint.find("child"), "origin", {})
     was = " ".join(f'{name}="{value}"' for name, value in origin.attrib.items())
-    document.note(joint, f"corrected: {_told(error)}; was {was or 'no origin'}")
+    document.note(joint, f"corrected: {_error_text(error)}; was {was or 'no origin'}")
     origin.set("xyz", _xyz(placement))
     if turned:
         origin.set("rpy", _rpy(placement))
@@ -91,13 +91,16 @@ def _rpy(placement):
     return words(roll_pitch_yaw(placement[:3, :3]))
 
 
-def _write_behind(document, joint, link, told):
-    """Write a link between a joint and the link that it moved: what is off behind its motion."""
-    placement, error = told
+def _write_behind(document, joint, link, seat_error):
+    """Write a link between a joint and the link that it moved, for an error behind its motion.
+
+    seat_error: placement (4, 4) and its standard errors (6,).
+    """
+    placement, error = seat_error
     joint.find("child").set("link", f"{link}_seat")
     seat = document.behind(joint, "link", {"name": f"{link}_seat"})
     _write_fixed(document, seat, (f"{link}_seat", link), placement)
-    document.note(seat, f"corrected: {_told(error)}")
+    document.note(seat, f"corrected: {_error_text(error)}")
 
 
 def _write_frame(document, links, placement, text):
@@ -121,7 +124,7 @@ def _write_fixed(document, behind, links, placement):
 
 
 def _find_meshes(root, source, folder):
-    """Have meshes and textures that are named relative to the old file found from a folder.
+    """Change relative names of meshes and textures in the old file to names relative to a folder.
 
     Names of other files, such as the shared libraries of a simulator's plugins, are not relative to it.
     """

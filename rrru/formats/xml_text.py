@@ -1,4 +1,4 @@
-"""An XML file that a person wrote, changed here and there: comments, order and indentation stay."""
+"""Edits of an XML file that a person wrote: comments, order and indentation stay."""
 
 from xml.etree import ElementTree
 from xml.parsers import expat

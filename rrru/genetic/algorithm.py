@@ -1,7 +1,7 @@
 """The paper's genetic algorithm: MATLAB's `ga` step by step, in blocks of generations that run compiled.
 
 PyGAD's own algorithm, another reading of the paper, is in `pygad_run`, an evolution strategy in `cma_es`; `minimise`
-calls what the settings name.
+calls the one that the settings name.
 """
 
 from numbers import Integral

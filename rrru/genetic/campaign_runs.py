@@ -1,4 +1,4 @@
-"""The genetic algorithm on the calibrations of one campaign, beside the optimum that it should find."""
+"""The genetic algorithm on the calibrations of one campaign, compared with the optimum that it should find."""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -15,7 +15,7 @@ from rrru.seeds import run_seed
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of one campaign: GeneticSettings, the number of runs, and what their seeds are made of."""
+    """Runs of one campaign: GeneticSettings, the number of runs, and the labels of their seeds."""
 
     settings: GeneticSettings
     seeds: int
@@ -47,15 +47,17 @@ def study_set(searched, identified, calibration, runs):
         row = result.row() | polished | {"optimum_mm": best.mean_mm}
         row |= {name: _excess(value, best.mean_mm) for name, value in above.items()}
         found = dict(zip(parameters, result.deviations, strict=True)) | {
-            one: shared[one.name] for one in mechanism.parameters if one.name not in parameters.names
+            parameter: shared[parameter.name]
+            for parameter in mechanism.parameters
+            if parameter.name not in parameters.names
         }
         parts = pd.DataFrame([row]), result.history(), parameter_rows(found)
         for name, part in zip(frames, parts, strict=True):
             frames[name].append(part.assign(seed=number))
     spent = {"least_squares": fit_seconds, "least_mean_distance": fit_seconds + polish_seconds}
     timings = pd.DataFrame((spent | {"genetic": float(np.median(seconds))}).items(), columns=["method", "seconds"])
-    whole = {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()} | {"timings": timings}
-    return {name: frame.assign(calibration=calibration) for name, frame in whole.items()}
+    tables = {name: pd.concat(parts, ignore_index=True) for name, parts in frames.items()} | {"timings": timings}
+    return {name: frame.assign(calibration=calibration) for name, frame in tables.items()}
 
 
 def parameter_rows(found):
@@ -83,11 +85,12 @@ def against_least_squares(runs, found, calibrations, parameters, truth):
     """Rows of `genetic_against_least_squares` of one campaign (without its name).
 
     runs, found, calibrations, parameters: rows of `genetic`, `genetic_parameters`, `calibrations` and `parameters` of
-    that campaign; truth: the true deviations by identifiable name, or None where nobody knows them.
+    that campaign; truth: the true deviations by identifiable name, or None where they are unknown.
     """
     result = []
     for calibration, part in runs.groupby("calibration", sort=False):
-        fits, fitted, own = (table[table["calibration"] == calibration] for table in (calibrations, parameters, found))
+        tables = calibrations, parameters, found
+        fits, fitted, genetic = (table[table["calibration"] == calibration] for table in tables)
         for row in fits.itertuples():
             errors = _parameter_error(fitted[fitted["method"] == row.method], truth)
             reached = {"runs": 1, "mean_mm": row.mean_mm, "worst_mean_mm": row.mean_mm}
@@ -97,7 +100,7 @@ def against_least_squares(runs, found, calibrations, parameters, truth):
             ("genetic", "objective_mm", 0),
             ("genetic_polished", "polished_mm", part["polish_evaluations"]),
         ):
-            errors = _parameter_error(own, truth if method == "genetic" else None)
+            errors = _parameter_error(genetic, truth if method == "genetic" else None)
             evaluations = float((part["evaluations"] + more).median())
             reached = {"runs": len(part), "mean_mm": part[column].median(), "worst_mean_mm": part[column].max()}
             label = {"calibration": calibration, "method": method, "evaluations": evaluations}
@@ -108,14 +111,14 @@ def against_least_squares(runs, found, calibrations, parameters, truth):
 
 
 def _excess(value, optimum):
-    """Share by which a mean distance exceeds the least one; NaN where that is zero but for rounding."""
+    """Share by which a mean distance exceeds the least one; NaN where that is zero up to rounding."""
     return value / optimum - 1.0 if optimum > 1e-9 else np.nan
 
 
 def _parameter_error(rows, truth):
-    """RMS deviation of angles and of lengths from the truth over rows of parameters; NaN where nobody knows it.
+    """RMS deviation of angles and of lengths from the truth over rows of parameters; NaN where it is unknown.
 
-    NaN too where the legs of the real robot differ, so that there is no true value.
+    Also NaN where the legs of the real robot differ, so that there is no true value.
     """
     units = {} if truth is None else rows.groupby("parameter")["unit"].first()
     error = {}

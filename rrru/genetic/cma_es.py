@@ -1,8 +1,8 @@
-"""Evolution of a normal distribution (CMA-ES) beside the paper's genetic algorithm: the objective's valleys are narrow
-and lie askew, and the distribution learns their shape.
+"""Evolution of a normal distribution (CMA-ES), an alternative to the paper's genetic algorithm.
 
-Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772 (2016): weighted recombination of the better half,
-cumulated step-size control, rank-one and rank-mu updates, all numbers as there. Genes lie in 0..1.
+The objective's valleys are narrow and not along the axes, and the covariance adapts to their shape. Hansen, The CMA
+Evolution Strategy: A Tutorial, arXiv:1604.00772 (2016): weighted recombination of the better half, cumulated step-size
+control, rank-one and rank-mu updates, all numbers as there. Genes are in 0..1.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ _MIDDLE, _SPREAD, _LEAST_SPREAD = 0.5, 0.3, 1e-12
 def run(rate, box, settings, seed):
     """GeneticResult of a checked objective within a Box; see `algorithm.minimise`.
 
-    Of GeneticSettings it takes the population, all islands together, and what ends a run. What is drawn outside of the
-    bounds is moved onto them. Stalled is also a distribution without any spread left.
+    Of GeneticSettings it uses the population, all islands together, and the stop criteria. Genes drawn outside of the
+    bounds are moved onto them. A distribution without any spread counts as stalled, too.
     """
     generator, search = np.random.default_rng(seed), _Distribution(box.low.size, sum(settings.populations))
     stall = settings.stall_generations, settings.stall_tolerance
@@ -47,7 +47,7 @@ def run(rate, box, settings, seed):
 
 
 class _Distribution:
-    """Mean (p,), step size and covariance (p, p) of what is drawn next, and the paths (p,) of the mean so far."""
+    """Mean (p,), step size and covariance (p, p) of the next draws, and the evolution paths (p,)."""
 
     def __init__(self, genes, count):
         self.count, self.mean, self.size, self.learned = count, np.full(genes, _MIDDLE), _SPREAD, 0
@@ -74,19 +74,19 @@ class _Distribution:
         return np.clip(self.mean + self.size * (normal * self.lengths) @ self.axes.T, 0.0, 1.0)
 
     def learn(self, ranked):
-        """Move on from genes (n, p), the best first."""
+        """Update the distribution from genes (n, p), the best first."""
         apart = (ranked[: len(self.weights)] - self.mean) / self.size
         step = self.weights @ apart
         self.learned += 1
         self.mean = self.mean + self.size * step
-        keep, turn = 1 - self.along_steps, self.axes @ ((self.axes.T @ step) / self.lengths)
-        self.steps = keep * self.steps + np.sqrt((1 - keep**2) * self.mass) * turn
+        decay, turn = 1 - self.along_steps, self.axes @ ((self.axes.T @ step) / self.lengths)
+        self.steps = decay * self.steps + np.sqrt((1 - decay**2) * self.mass) * turn
         length = np.sqrt(self.steps @ self.steps)
         # a path that has just become long by the step size alone does not stretch the covariance
-        steady = length / np.sqrt(1 - keep ** (2 * self.learned)) < (1.4 + 2 / (len(step) + 1)) * self.usual
-        rest = 1 - self.along_path
-        self.path = rest * self.path + steady * np.sqrt((1 - rest**2) * self.mass) * step
-        lost = (1 - steady) * self.of_path * (1 - rest**2)
+        steady = length / np.sqrt(1 - decay ** (2 * self.learned)) < (1.4 + 2 / (len(step) + 1)) * self.usual
+        path_decay = 1 - self.along_path
+        self.path = path_decay * self.path + steady * np.sqrt((1 - path_decay**2) * self.mass) * step
+        lost = (1 - steady) * self.of_path * (1 - path_decay**2)
         self.covariance = (1 - self.of_path - self.of_steps + lost) * self.covariance
         self.covariance += self.of_path * np.outer(self.path, self.path)
         self.covariance += self.of_steps * (apart.T * self.weights) @ apart

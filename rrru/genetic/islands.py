@@ -1,4 +1,4 @@
-"""Migration between the islands of a population, which lie in one array, one after the other."""
+"""Migration between the islands of a population, which are in one array, one after the other."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ def migrate(population, score, plan, migrants):
     plan: see `plan.make_plan`; migrants: (islands,), see `plan.migrants_of`; they also stay where they were. Of equal
     scores the earlier is better.
     """
-    # ASSUME all migrants leave before any arrives, so that nothing travels further than one island at a time.
+    # ASSUME all migrants leave before any arrives, so that no individual moves further than one island at a time.
     arrived, arrived_score = population.copy(), score.copy()
     ranks = [start + np.argsort(score[start:stop], kind="stable") for start, stop in plan[:, :2]]
     for source, count in enumerate(migrants if len(plan) > 1 else ()):

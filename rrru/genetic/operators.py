@@ -1,9 +1,9 @@
 """Operators of the genetic algorithm that the paper used (MATLAB `ga`) as array functions, and its generations.
 
-Scores are minimised; `inf` marks an infeasible individual. Genes lie in 0..1. Random numbers are drawn outside and
-handed in, so that the same numbers give the same children. All islands of a population lie in one array, one after the
-other; see `plan.make_plan` for `plan`. What is compiled stands in this one file, since numba's cache does not see
-changes of another. Sources: Global Optimization Toolbox, "Genetic Algorithm Options" and "How the Genetic Algorithm
+Scores are minimised; `inf` marks an infeasible individual. Genes are in 0..1. Random numbers are drawn outside and
+passed in, so that the same numbers give the same children. All islands of a population are in one array, one after the
+other; see `plan.make_plan` for `plan`. All compiled code is in this one file, since numba's cache does not see changes
+of another. Sources: Global Optimization Toolbox, "Genetic Algorithm Options" and "How the Genetic Algorithm
 Works"; J. E. Baker, "Reducing bias and inefficiency in the selection algorithm", ICGA 1987 (stochastic uniform).
 """
 
@@ -26,7 +26,7 @@ def shift_linear(score, parents):
     the worst would fall below zero: then the worst gets zero. Where all scores are equal, or none is finite, everyone
     gets the same.
     """
-    # ASSUME an infeasible individual (score inf) gets no place while anyone is feasible, nor enters mean and extremes.
+    # ASSUME an infeasible individual (score inf) gets no place while another is feasible, nor enters mean and extremes.
     n = score.size
     feasible = 0
     best, worst = np.inf, -np.inf
@@ -58,7 +58,7 @@ def shift_linear(score, parents):
 def stochastic_uniform(expectation, count, offset):
     """Indices, shape (count,), of parents: equal steps along a line of segments as long as the expectations (n,).
 
-    `offset` in 0..1 is the first position in units of the step; nobody without expectation is taken.
+    `offset` in 0..1 is the first position in units of the step; no individual without expectation is chosen.
     """
     last = expectation.size - 1
     while expectation[last] <= 0.0 and last > 0:
@@ -113,11 +113,11 @@ def feasible(population, parents, steps, mutants):
     A parent for which none does is copied.
     """
     for i in range(len(steps)):
-        own = population[parents[i]]
-        mutants[i] = own
+        parent = population[parents[i]]
+        mutants[i] = parent
         for step in steps[i]:
-            if ((own + step >= 0.0) & (own + step <= 1.0)).all():
-                mutants[i] = own + step
+            if ((parent + step >= 0.0) & (parent + step <= 1.0)).all():
+                mutants[i] = parent + step
                 break
 
 
@@ -135,11 +135,11 @@ def ranked(score):
     """Indices (n,) of scores (n,) from the best to the worst, stable; NumPy's sort takes seconds to compile."""
     order = np.arange(score.size)
     for i in range(1, score.size):
-        k, own = i, order[i]
-        while k > 0 and score[order[k - 1]] > score[own]:
+        k, inserted = i, order[i]
+        while k > 0 and score[order[k - 1]] > score[inserted]:
             order[k] = order[k - 1]
             k -= 1
-        order[k] = own
+        order[k] = inserted
     return order
 
 
@@ -159,23 +159,23 @@ def next_population(population, score, plan, draws, children, known):
         first = start + elites + crossed
         mutated = stop - first
         count = 2 * crossed + mutated
-        own, own_score = population[start:stop], score[start:stop]
-        rank = ranked(own_score)
+        members, member_score = population[start:stop], score[start:stop]
+        rank = ranked(member_score)
         for i in range(elites):
-            children[start + i] = own[rank[i]]
-            known[start + i] = own_score[rank[i]]
-        chosen = stochastic_uniform(shift_linear(own_score, count), count, uniform[u])
+            children[start + i] = members[rank[i]]
+            known[start + i] = member_score[rank[i]]
+        chosen = stochastic_uniform(shift_linear(member_score, count), count, uniform[u])
         parents = shuffled(chosen, uniform[u + 1 : u + 1 + count])
         u += 1 + count
         coin = uniform[u : u + crossed * genes].reshape(crossed, genes)
         u += crossed * genes
-        scattered(own, parents, coin, children[start + elites : first])
+        scattered(members, parents, coin, children[start + elites : first])
         steps = size * moves[g : g + mutated]
         g += mutated
         if moves.shape[1] == 1:
-            gaussian(own, parents[2 * crossed :], steps[:, 0], children[first:stop])
+            gaussian(members, parents[2 * crossed :], steps[:, 0], children[first:stop])
         else:
-            feasible(own, parents[2 * crossed :], steps, children[first:stop])
+            feasible(members, parents[2 * crossed :], steps, children[first:stop])
 
 
 @_compiled

@@ -14,7 +14,7 @@ class Box(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """What stays the same in a run: plan of the islands, when the run stops, what a generation does.
+    """Constants of a run: plan of the islands, stop criteria, operators of a generation.
 
     adapts: whether mutation adapts its steps; looks_up: whether a child equal to one of the last population has its
     score.
@@ -33,7 +33,7 @@ def elite_count(size, share):
 
 
 def child_counts(size, elites, crossover_fraction):
-    """Numbers of children by crossover (the fraction of the elites' rest, rounded half up) and by mutation."""
+    """Numbers of children by crossover (the fraction of the non-elites, rounded half up) and by mutation."""
     places = size - elites
     crossed = math.floor(round(crossover_fraction * places, 9) + 0.5)
     return crossed, places - crossed

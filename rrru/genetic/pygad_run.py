@@ -1,10 +1,10 @@
-"""PyGAD's genetic algorithm with its own operators: another reading of the paper's words.
+"""PyGAD's genetic algorithm with its own operators: another reading of the paper.
 
-What the paper names is set: stochastic universal selection, a population of the stated size, genes in 0..1, and its
-"crossover probability" as PyGAD's, which says how likely each parent may mate. Everything else is PyGAD's default:
-single-point crossover, random mutation of a tenth of the genes (at least one), one elite. PyGAD knows neither islands
-nor migration. Islands are instances of their own here, and migrate as MATLAB's do, between runs of as many generations
-as the migration interval: PyGAD goes on where it stopped when it is run again.
+The paper's settings are used: stochastic universal selection, a population of the stated size, genes in 0..1, and its
+"crossover probability" as PyGAD's, the probability that a parent mates. Everything else is PyGAD's default:
+single-point crossover, random mutation of a tenth of the genes (at least one), one elite. PyGAD has neither islands
+nor migration. Here each island is an instance of its own. They migrate as MATLAB's do, between runs of as many
+generations as the migration interval: PyGAD continues where it stopped when it is run again.
 """
 
 import logging
@@ -25,9 +25,9 @@ _LOGGER.propagate = False
 
 
 def run(objective, box, settings, seed):
-    """GeneticResult of an objective, see `algorithm.minimise`, within a Box. Raises FitError where nobody is feasible.
+    """GeneticResult of an objective, see `algorithm.minimise`, within a Box.
 
-    Stalled is PyGAD's "saturate": the best objective stayed the same.
+    Stalled is PyGAD's "saturate": the best objective stayed the same. Raises FitError where no individual is feasible.
     """
     islands = [_Island(objective, box, settings, size, seed + k) for k, size in enumerate(settings.populations)]
     stall, rows = settings.stall_generations, make_plan(settings.populations, settings.elite_share, 1.0)
@@ -106,7 +106,7 @@ class _Island:
         self._keep(ga.population, ga.last_generation_fitness)
 
     def _keep(self, population, fitness):
-        """Keep the best individual, all scores and what was asked so far."""
+        """Keep the best individual, all scores and the number of evaluations so far."""
         score = -np.asarray(fitness, dtype=float)
         self.genes.append(population[score.argmin()].copy())
         self.scores.append(score)

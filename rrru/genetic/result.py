@@ -1,4 +1,4 @@
-"""What a run of the genetic algorithm found, and what it would have found had it stopped earlier."""
+"""Result of a run of the genetic algorithm, and of the same run stopped earlier."""
 
 from dataclasses import dataclass, replace
 
@@ -10,11 +10,12 @@ from rrru.genetic.operators import has_stalled
 
 @dataclass(frozen=True)
 class GeneticResult:
-    """What one run found, g generations after its initial population (entry 0 of every history).
+    """Result of one run, g generations after its initial population (entry 0 of every history).
 
     stopped: "generations" or "stalled"; found: (g + 1, p) the best individual; best_history, mean_history: (g + 1,)
     best, and mean over the feasible individuals, of the objective after each generation, before migration; inf where
-    nobody is feasible; asked: (g + 1,) individuals whose objective was needed so far (elites and migrants keep theirs).
+    no individual is feasible; asked: (g + 1,) individuals whose objective was needed so far (elites and migrants keep
+    theirs).
     """
 
     stopped: str
@@ -51,9 +52,9 @@ class GeneticResult:
     def history(self):
         """Frame of the convergence: every generation up to 100, every 10th after it, and the last."""
         every = np.arange(self.generations + 1)
-        kept = every[(every <= 100) | (every % 10 == 0) | (every == self.generations)]
+        listed = every[(every <= 100) | (every % 10 == 0) | (every == self.generations)]
         return pd.DataFrame(
-            {"generation": kept, "best_mm": self.best_history[kept], "mean_mm": self.mean_history[kept]}
+            {"generation": listed, "best_mm": self.best_history[listed], "mean_mm": self.mean_history[listed]}
         )
 
     def stalled(self, generations, tolerance):
@@ -66,7 +67,7 @@ class GeneticResult:
 
 
 def means(scores):
-    """Mean over the feasible individuals of each row (k,) of scores (k, n), inf where nobody is feasible."""
+    """Mean over the feasible individuals of each row (k,) of scores (k, n), inf where none is feasible."""
     feasible = np.isfinite(scores)
     if feasible.all():
         return scores.mean(axis=1)

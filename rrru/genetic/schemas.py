@@ -24,7 +24,7 @@ population             str    one population, or islands {one, islands}
 value                  float  value of the setting
 
 ## genetic | tables/genetic.parquet | campaign calibration seed
-One row per run of the genetic algorithm with the chosen settings, beside the least mean distance that it should find.
+One row per run of the genetic algorithm with the chosen settings, with the least mean distance that it should find.
 --
 campaign calibration seed objective_mm generations evaluations stopped
 polished_mm            float  mean distance after a local polish from where the run ended
@@ -50,12 +50,12 @@ campaign calibration seed generation best_mm mean_mm
 Methods side by side on every calibration; the genetic algorithm's entries are medians over its seeds.
 --
 campaign calibration method
-runs                   int    seeds; 1 for what has none
+runs                   int    seeds; 1 for a method without seeds
 mean_mm                float  mean distance reached (median over the seeds)
 worst_mean_mm          float  mean distance of the worst seed
 excess                 float? mean_mm over the least mean distance - 1; null where that is zero
 evaluations            float  evaluations of all residuals (median over the seeds)
-angle_error_rad        float? RMS deviation of the drive-angle errors from the truth; null where nobody knows it
+angle_error_rad        float? RMS deviation of the drive-angle errors from the truth; null where it is unknown
 length_error_mm        float? RMS deviation of dL1, dL2, dL3 and da from the truth
 
 ## timings | timings/{campaign}.parquet | campaign calibration method
@@ -65,7 +65,7 @@ campaign calibration method
 seconds                float  wall time of one calibration (median over the seeds)
 
 ## sweep_runs | tables/sweep_runs.parquet | operators stop parameter population value seed
-Runs of the sweeps of the crossover and migration fraction: each to the end, and as it was where it stalled first.
+Runs of the sweeps of the crossover and migration fraction: each to the end, and stopped where it stalled first.
 --
 operators stop parameter population value seed objective_mm generations evaluations stopped
 
@@ -83,13 +83,13 @@ Convergence of the runs in `sweep_runs`: every generation up to 100, every 10th 
 operators parameter population value seed generation best_mm mean_mm
 
 ## sweep_effect | tables/sweep_effect.parquet | operators stop parameter population
-Whether a setting's effect can be told from the seeds' scatter: Kruskal-Wallis test over all values.
+Whether a setting's effect is significant against the variation between seeds: Kruskal-Wallis test over all values.
 --
 operators stop parameter population
 settings               int    values compared
 runs                   int    runs compared
 statistic              float  H
-p_value                float  chance of such differences if the setting did nothing
+p_value                float  probability of such differences if the setting had no effect
 epsilon_squared        float  share of the rank variance that the setting explains
 statistic_mutating     float  H without the crossover fraction 1.0, where nothing mutates
 p_value_mutating       float  the same

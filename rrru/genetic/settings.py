@@ -9,7 +9,7 @@ from rrru.errors import ConfigError
 from rrru.genetic.plan import elite_count
 
 # readings of the paper: MATLAB's step with its Gaussian or its adaptive feasible mutation, and PyGAD's own operators;
-# and what finds the same with a fraction of the evaluations
+# and CMA-ES, which needs a fraction of the evaluations
 OPERATORS = ("matlab_gaussian", "matlab_adaptive", "pygad", "cma_es")
 _ALLOWED = {
     "crossover_fraction": (Real, 0.0, 1.0, "0 to 1"),
@@ -30,7 +30,7 @@ class GeneticSettings:
 
     operators: one of OPERATORS; "pygad" takes of the others only the crossover fraction, as its crossover probability,
     and those of islands, generations and stalling; "cma_es" only the whole population, generations and stalling.
-    crossover_fraction: P_c, share of the non-elite children made by crossover, the rest by mutation.
+    crossover_fraction: P_c, share of the non-elite children made by crossover, the others by mutation.
     migration_fraction: P_m, share of the smaller island that migrates every `migration_interval` generations.
     populations: sizes of the islands. elite_share: elites per island are ceil(share size). stall_generations,
     stall_tolerance: see `operators.has_stalled`; 0 generations never stop early. mutation_scale, mutation_shrink: see

@@ -1,6 +1,6 @@
-"""Sweeps of the genetic algorithm's settings over many seeds, and whether their effect shows above the scatter.
+"""Sweeps of the genetic algorithm's settings over many seeds, and tests whether their effect is significant.
 
-Every run goes to the end. What it would have found had it stopped where it stalls is read off its history.
+Every run goes to the end. The result of the same run stopped where it stalls comes from its history.
 """
 
 from dataclasses import replace
@@ -22,7 +22,7 @@ _RESAMPLES = 1999
 def run_sweep(objective, parameters, settings, parameter, value, seeds, study_seed=0):
     """Frames by table name of the runs of the genetic algorithm at one value of one setting, one per seed number.
 
-    objective, settings: see `algorithm.minimise`, but that a run goes on after it stalled; parameters: ParameterSet;
+    objective, settings: see `algorithm.minimise`, but a stalled run continues to the end; parameters: ParameterSet;
     parameter: of the settings, one of SWEPT, set to `value`; seeds: seed numbers, each run's own seed being
     run_seed(study_seed, parameter, population, value, number) with population "one" or "islands". Raises ConfigError
     for another parameter or a value that is not allowed.
@@ -36,11 +36,11 @@ def run_sweep(objective, parameters, settings, parameter, value, seeds, study_se
     frames = {"sweep_runs": [], "sweep_history": [], "sweep_parameters": []}
     for number in seeds:
         seed = run_seed(study_seed, parameter, kind, value, number)
-        whole = minimise(objective, parameters.low, parameters.high, replace(settings, stall_generations=0), seed)
+        to_end = minimise(objective, parameters.low, parameters.high, replace(settings, stall_generations=0), seed)
         labels = {"operators": settings.operators, "parameter": parameter, "value": float(value)}
         labels |= {"population": kind, "seed": int(number)}
-        frames["sweep_history"].append(whole.history().assign(**labels))
-        for stop, result in (("stall", whole.stalled(*stall)), ("end", whole)):
+        frames["sweep_history"].append(to_end.history().assign(**labels))
+        for stop, result in (("stall", to_end.stalled(*stall)), ("end", to_end)):
             found = {"name": parameters.names, "unit": parameters.units, "deviation": result.deviations}
             frames["sweep_runs"].append(pd.DataFrame([result.row()]).assign(stop=stop, **labels))
             frames["sweep_parameters"].append(pd.DataFrame(found).assign(stop=stop, **labels))
@@ -74,7 +74,7 @@ def setting_effect(runs):
 
 
 def setting_pairs(runs, seed=0):
-    """How far each setting is from the best one: a row per value but the best, of each SWEEP of runs.
+    """Difference of each setting from the best one: a row per value except the best, of each SWEEP of runs.
 
     Columns: those of SWEEP, value, best_value (lowest median objective), median_mm, difference_mm (of the
     medians, value minus best) with its 95 % percentile-bootstrap interval difference_low_mm, difference_high_mm (NaN
@@ -91,10 +91,10 @@ def setting_pairs(runs, seed=0):
         pairs = []
         for value, sample in samples.items():
             if value != best:
-                own = run_seed(seed, *key, value)
+                pair_seed = run_seed(seed, *key, value)
                 label = dict(zip(SWEEP, key, strict=True)) | {"value": value, "best_value": best}
                 test = {"p_value": float(stats.mannwhitneyu(sample, samples[best]).pvalue)}
-                difference = _median_difference(sample, samples[best], own)
+                difference = _median_difference(sample, samples[best], pair_seed)
                 pairs.append(label | {"median_mm": float(np.median(sample))} | difference | test)
         for pair, corrected in zip(pairs, _holm([pair["p_value"] for pair in pairs]), strict=True):
             rows.append(pair | {"p_holm": corrected, "distinguishable": corrected < _LEVEL})
@@ -114,7 +114,7 @@ def _kruskal(group):
 
 
 def _median_difference(sample, reference, seed):
-    """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it cannot be had."""
+    """Difference of the medians and its 95 % percentile-bootstrap interval, each NaN where it is undefined."""
     from scipy import stats
 
     names = ("difference_mm", "difference_low_mm", "difference_high_mm")

@@ -1,7 +1,7 @@
-"""A robot with a closed form whose campaign leaves more open than its own numbers: frame, reflectors, tool.
+"""A robot with a closed form and additional parameters of its campaign: frame, reflectors, tool.
 
-These are added to its parameters as directions at sites, as far as the campaign's poses tell them beside the robot's
-own; everything but the inverse then goes through the general model. Lengths in mm, angles in rad.
+These are added to its parameters as directions at sites, as far as they are identifiable at the campaign's poses
+together with the robot's own. Everything except the inverse then uses the general model. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -13,14 +13,14 @@ from rrru.kinematics.base_parameters import choose, direction, offered, open_num
 from rrru.kinematics.robot import Robot
 from rrru.parameters import Parameter, ParameterSet
 
-# share of a number that the poses must leave beside the others
+# share of a parameter's column that must be independent of the other columns
 _LEFT_OF_DATA = 1e-2
 _ANGLE_LIMIT_RAD, _LENGTH_LIMIT_MM = 0.3, 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class AugmentedRobot(Robot):
-    """A robot and what its campaign's Reads leave open; added: Candidates that join its parameters, None for all."""
+    """A robot and its campaign's MeasurementConfig; added: Candidates that join its parameters, None for all."""
 
     robot: Robot
     reads: object
@@ -33,22 +33,22 @@ class AugmentedRobot(Robot):
 
     @property
     def _added(self):
-        """The Candidates beside the robot's own parameters."""
+        """The Candidates in addition to the robot's own parameters."""
         return open_numbers(self.reads) if self.added is None else self.added
 
     @cached_property
     def parameters(self):
         """The robot's parameters and the added ones, nominally zero."""
         limits = {"mm": _LENGTH_LIMIT_MM, "rad": _ANGLE_LIMIT_RAD}
-        bounds = ((one, limits[one.unit]) for one in self._added)
-        more = (Parameter(one.name, one.unit, 0.0, -most, most, "bounds assumed") for one, most in bounds)
+        bounds = ((added, limits[added.unit]) for added in self._added)
+        more = (Parameter(added.name, added.unit, 0.0, -limit, limit, "bounds assumed") for added, limit in bounds)
         return ParameterSet((*self.robot.parameters, *more))
 
     @cached_property
     def directions(self):
         """Twists (sites, 6, p) that a unit of each parameter makes."""
-        own = np.pad(self.robot.directions, ((0, len(self.legs.reflectors)), (0, 0), (0, 0)))
-        return np.concatenate([own, *(direction(self.legs, one)[:, :, None] for one in self._added)], axis=2)
+        robots = np.pad(self.robot.directions, ((0, len(self.legs.reflectors)), (0, 0), (0, 0)))
+        return np.concatenate([robots, *(direction(self.legs, added)[:, :, None] for added in self._added)], axis=2)
 
     @property
     def offered(self):
@@ -56,29 +56,29 @@ class AugmentedRobot(Robot):
         return offered(self.legs, open_numbers(self.reads))
 
     def seen_at(self, actuators, position_mm, readings=None):
-        """The robot with what is open and told, beside its own numbers, by poses (n, K), (n, 3) and Readings."""
-        whole = replace(self, added=self._added)
-        poses = whole.solve(actuators, position_mm)
+        """The robot with the added parameters that are identifiable at poses (n, K), (n, 3) with Readings."""
+        complete = replace(self, added=self._added)
+        poses = complete.solve(actuators, position_mm)
         seen = poses.closed
-        at = whole.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
-        columns, count = at.columns(whole.directions), len(self.robot.parameters)
+        at = complete.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
+        columns, count = at.columns(complete.directions), len(self.robot.parameters)
         columns = columns.reshape(-1, columns.shape[2])
         basis, _ = np.linalg.qr(columns[:, :count])
-        scale = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self._added])
+        scale = np.array([1.0 if added.unit == "mm" else 1.0 / self.angle_arm_mm for added in self._added])
         chosen, _ = choose(columns[:, count:] * scale, [True] * len(scale), _LEFT_OF_DATA, basis)
         return replace(self, added=tuple(self._added[k] for k in chosen))
 
     def inverse(self, position_mm, deviations=None, elbow="out"):
         """Actuator values (n, K) for positions (n, 3) in the robot's own frame by its own parameters; see Robot."""
-        own = None if deviations is None else np.asarray(deviations)[: len(self.robot.parameters)]
-        return self.robot.inverse(position_mm, own, elbow)
+        robots = None if deviations is None else np.asarray(deviations)[: len(self.robot.parameters)]
+        return self.robot.inverse(position_mm, robots, elbow)
 
     def widened(self, angle_rad, length_mm):
         """The robot with other bounds of its own parameters."""
         return replace(self, robot=self.robot.widened(angle_rad, length_mm))
 
     def identifiable(self, values):
-        """Mapping of the parameters from values of any of the robot's own; nobody knows the added ones."""
+        """Mapping of the parameters from values of any of the robot's own; the added ones are unknown."""
         return self.robot.identifiable(values)
 
     def passive_near(self, position_mm, actuators):

@@ -1,4 +1,4 @@
-"""The geometric numbers of any robot, and which of them positions can tell apart. Lengths in mm, angles in rad."""
+"""The geometric parameters of any robot, and which of them are identifiable (base parameters). mm, rad."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ import numpy as np
 from rrru.kinematics.legs import TOOL, WORLD, unit_twist
 from rrru.parameters import Parameter, ParameterSet
 
-# so far off may be a drive whose zero is lost, in rad and in mm
+# largest error of a drive's lost zero offset, in rad and in mm
 _LOST = {"rad": 0.6, "mm": 100.0}
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A geometric number: its name, unit ("mm", "rad"), number of its drive (0: none), and twists (6,) by site."""
+    """A geometric parameter: its name, unit ("mm", "rad"), number of its drive (0: none), and twists (6,) by site."""
 
     name: str
     unit: str
@@ -24,11 +24,11 @@ class Candidate:
 
 @dataclass(frozen=True)
 class MeasurementConfig:
-    """What the readings of a campaign leave open.
+    """The measurement configuration of a campaign: what is measured, and what is unknown about it.
 
     reflectors: names of the sites of the reflectors that were read, none where the tool was; fitted: those of them
-    whose place on the tool is not known; turned: whether orientations were read; frame: whether it is only roughly
-    known how the instrument's frame, and where orientations were read the tool's, lie.
+    whose place on the tool is not known; turned: whether orientations were read; frame: whether the pose of the
+    instrument's frame, and where orientations were read that of the tool, is known only roughly.
     """
 
     reflectors: tuple[str, ...] = ()
@@ -38,7 +38,7 @@ class MeasurementConfig:
 
 
 def open_numbers(reads: MeasurementConfig) -> tuple[Candidate, ...]:
-    """Candidates that Reads leave open: places of reflectors, the tool's pose where orientations tell it, the frame."""
+    """Candidates of a MeasurementConfig: places of reflectors, the tool's pose with orientations, the frame."""
     first = 3 if reads.fitted else 0
     tool = range(first, 6) if reads.turned and reads.frame else ()
     places = [(name, k) for name in reads.fitted for k in range(3)] + [(TOOL, k) for k in tool]
@@ -48,7 +48,7 @@ def open_numbers(reads: MeasurementConfig) -> tuple[Candidate, ...]:
 def candidates_of(legs, parts, reads=None):
     """All Candidates of Legs, drives first, then lengths along links, other shifts, angles, tool and world.
 
-    What Reads leave open comes before the rest of tool and world.
+    Those of the MeasurementConfig come before the others of tool and world.
     """
     reads = reads or MeasurementConfig()
     drives = [
@@ -69,12 +69,12 @@ def candidates_of(legs, parts, reads=None):
             bar, end = leg.bar_sites
             lengths.append((bar, 0))
             shifts += [(end, k) for k in range(3)]
-    # of several hands the last frame of each is its tool
+    # with several end effectors the last frame of each is its tool
     tool = () if legs.hands else range(6 if reads.turned or reads.reflectors else 3)
-    own = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
+    outside = [(TOOL, k) for k in tool] + [(WORLD, k) for k in range(6)]
     numbers = [_at(*place) for place in (*lengths, *shifts, *turns) if place not in taken]
-    every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in own)]
-    return tuple({one.name: one for one in every}.values())
+    every = [*drives, *numbers, *open_numbers(reads), *(_at(*place) for place in outside)]
+    return tuple({candidate.name: candidate for candidate in every}.values())
 
 
 def _at(site, component):
@@ -84,7 +84,7 @@ def _at(site, component):
 
 
 def bounded(candidates, limits):
-    """The ParameterSet of Candidates, nominally zero, bounded by their unit's limit, drives by what may be lost."""
+    """The ParameterSet of Candidates, nominally zero, bounded by their unit's limit, drives by a lost zero offset."""
     most = (max(limits[one.unit], _LOST[one.unit] if one.leg else 0.0) for one in candidates)
     return ParameterSet(
         tuple(
@@ -109,17 +109,17 @@ def direction(legs, candidate):
 
 
 def offered(legs, candidates):
-    """Which components (sites, 6) of twists Candidates stand for."""
+    """Which components (sites, 6) of twists Candidates represent."""
     return np.any([direction(legs, one).astype(bool) for one in candidates], axis=0)
 
 
 def choose(columns, allowed, least, basis=None):
-    """Numbers of the columns (m, c) that those chosen before them leave more than the share `least` of.
+    """Numbers of the columns (m, c) of which more than the share `least` is independent of the chosen ones before.
 
-    allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. With {number:
-    combination (k,) of the chosen before it} of the others.
+    allowed (c,): which may be chosen; basis (m, b): orthonormal columns that are chosen already. Returns also
+    {number: combination (k,) of the chosen before it} of the columns that are not chosen.
     """
-    basis, chosen, stands = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
+    basis, chosen, combined = np.zeros((len(columns), 0)) if basis is None else basis, [], {}
     for number, column in enumerate(columns.T):
         left = column - basis @ (basis.T @ column)
         left -= basis @ (basis.T @ left)
@@ -128,8 +128,8 @@ def choose(columns, allowed, least, basis=None):
             basis = np.column_stack([basis, left / np.linalg.norm(left)])
             chosen.append(number)
         else:
-            stands[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
-    return chosen, stands
+            combined[number] = np.linalg.lstsq(columns[:, chosen], column, rcond=None)[0]
+    return chosen, combined
 
 
 def in_words(combination, names):

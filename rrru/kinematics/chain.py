@@ -15,7 +15,7 @@ from rrru.kinematics import chain_kernel
 class Poses:
     """Platform poses at n points: position_mm (n, 3), turn (n, 3, 3), passive values (n, k), closed (n,).
 
-    residual_mm (n,): what the closure lacks, angles counted at an arm of 500 mm.
+    residual_mm (n,): residual of the closure, angles counted at a characteristic length of 500 mm.
     """
 
     position_mm: np.ndarray
@@ -44,8 +44,8 @@ class Poses:
     def where(self, rows, other):
         """Place, orientation and passive values of the poses where rows (n,) are true, else of others."""
         names = ("position_mm", "turn", "passive")
-        own = ((getattr(self, name), getattr(other, name)) for name in names)
-        return type(self)(*(np.where(rows.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in own), None, None)
+        pairs = ((getattr(self, name), getattr(other, name)) for name in names)
+        return type(self)(*(np.where(rows.reshape(-1, *(1,) * (a.ndim - 1)), a, b) for a, b in pairs), None, None)
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def bar_pose(legs, leg, way, poses, actuators, twists):
     point, n = leg.bar.platform_mm - twists.values[:, end_site, :3], len(way.place)
     if len(poses.position_mm) != n or len(poses.turn) != n:
         raise ValueError(f"poses at {len(poses.position_mm)} points; allowed: {n}")
-    # numba compiles anew for arrays that lie otherwise
+    # numba compiles anew for arrays of another memory layout
     given = (np.require(part, float, ["C", "W"]) for part in (way.place, poses.position_mm, poses.turn, point))
     far, frame, span = np.empty((n, 3)), np.empty((n, 3, 3)), np.empty(n)
     chain_kernel.reach(*given, far, frame, span)

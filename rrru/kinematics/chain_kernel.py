@@ -1,6 +1,6 @@
-"""Compiled: the walk along a leg, the bar that ends it, and the sweep over sites, point by point.
+"""Compiled: forward kinematics of a leg, the bar that ends it, and the sweep over sites, point by point.
 
-Numba's cache does not see other files; so all that these call stands here. Lengths in mm, angles in rad.
+Numba's cache does not see other files; so all functions that these call are here. Lengths in mm, angles in rad.
 """
 
 import numba

@@ -1,12 +1,12 @@
-"""Any robot's legs closed exactly: Newton on the platform's pose and the passive joints, all n points at once.
+"""Exact loop closure of any robot's legs: Newton on the platform's pose and the passive joints, all n points at once.
 
-With the pose T of the platform guessed, leg i ends elsewhere by the small twist e_i. With S_i its passive joints'
-screws and W_i the wrenches that they do not feel, W_i S_i = 0, the step obeys
+At a guessed pose T of the platform, leg i ends elsewhere by the small twist e_i. With S_i its passive joints'
+screws and W_i the wrenches reciprocal to them, W_i S_i = 0, the step obeys
 
     T - S_i dp_i = e_i   =>   W_i T = W_i e_i,   stacked over the legs   A T = b,   dp_i = S_i^+ (T - e_i)
 
 The W_i of legs that share passive joints are blocks of one W (`rrru.kinematics.wrenches`); their equations are added. A
-bar has one wrench, the unit force along its line, and e_i the length that it lacks. More wrenches than six are met by
+bar has one wrench, the unit force along its line, and e_i its missing length. More than six wrenches are met by
 least squares. Screws and twists are at the world's origin, the velocity first: (v, w). Lengths in mm, angles in rad.
 """
 
@@ -34,7 +34,7 @@ class Closure:
         if sum(counts) < 6:
             raise ConfigError(f"the legs hold the platform by {sum(counts)} constraints; allowed: at least 6")
         self._tables = tables(legs, self._spare)
-        # of more than six constraints a bar's length counts as what it turns at the arm, as the chains' shifts do
+        # with more than six constraints lengths, of bars and of chains' shifts, count in units of the arm
         weights = [1.0 / ARM_MM if legs.legs[group[0]].bar else 1.0 for group in groups]
         self._weights = np.repeat(weights, counts)[:, None]
         ends = np.cumsum([0, *counts])
@@ -42,7 +42,7 @@ class Closure:
         self.row_count, self.rows = int(ends[-1]), [slices[k] for k in range(len(legs.legs))]
 
     def wrenches(self, ways, _poses):
-        """Wrenches (n, r, 6) of every leg that its passive joints do not feel."""
+        """Wrenches (n, r, 6) of every leg that are reciprocal to its passive joints."""
         return wrenches_of(self.legs, self._spare, ways)
 
     def inverse(self, wrenches):
@@ -55,7 +55,7 @@ class Closure:
     def solve(self, actuators, start, twists=None):
         """Poses at actuator values (n, K) next to the Poses `start`, under finite twists (n or 1, sites, 6).
 
-        NaN where Newton does not end.
+        NaN where Newton does not converge.
         """
         driven = self.legs.driven(actuators)
         return Poses(*closed(self._tables, driven, start, Twists(self.legs, twists), self.row_count == 6))

@@ -1,12 +1,12 @@
 """Compiled Newton of `rrru.kinematics.closure`, point by point, for any robot: its legs come as flat arrays.
 
-With a chain's passive screws S and its lack e, a bar's wrench w and its lack, the platform's step T is the least of
+With a chain's passive screws S and its closure error e, a bar's wrench w and its error, the platform's step T minimises
 
     sum over chains |T - S dp - e|^2 + sum over bars (w T - e)^2
 
-A joint whose screw depends on those before it keeps its value. Before Newton begins, all that a point's passive joints
-do not change, links, twists and drives, is drawn together into one frame between any two. A frame (4, 3) has its axes
-and its place as rows. Lengths in mm, angles in rad; in screws and small twists lengths are counted in the arm.
+A joint whose screw depends on those before it keeps its value. Before Newton begins, the links, twists and drives
+between two passive joints are multiplied into one frame. A frame (4, 3) has its axes and its place as rows. Lengths in
+mm, angles in rad; in screws and small twists lengths are counted in the arm.
 """
 
 import numba
@@ -16,8 +16,8 @@ TOLERANCE_MM, MOST_STEPS = 1e-10, 60
 # a step turns by less and moves by less than this
 LONGEST_RAD, LONGEST_MM = 0.3, 150.0
 ARM_MM = 500.0
-# of a square what must be beside the directions before it, or it depends on them
-_BESIDE = 1e-13
+# share of a squared screw that must be independent of the directions before it
+_INDEPENDENT_SHARE = 1e-13
 
 # called by compiled code only
 _part = numba.njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
@@ -97,8 +97,8 @@ def _displace(frame, twist, factor):
 def _draw_together(slots, frames, motions, drives, twists, active, links):
     """Links of one point: frames leg by leg from the base to the first passive joint, and so on to the leg's end."""
     row = 0
-    for each in range(len(links)):
-        _begin(links[each])
+    for k in range(len(links)):
+        _begin(links[k])
     for slot in range(len(slots)):
         link = links[row]
         _append(link, frames[slot])
@@ -169,7 +169,7 @@ def _resolve(equations):
         equations[j, n + 1] = equations[j, j]
     for j in range(n):
         row = equations[j]
-        row[n + 1] = 0.0 if row[j] <= _BESIDE * row[n + 1] else 1.0 / row[j]
+        row[n + 1] = 0.0 if row[j] <= _INDEPENDENT_SHARE * row[n + 1] else 1.0 / row[j]
         for i in range(j + 1, n):
             part = row[n + 1] * row[i]
             if part != 0.0:
@@ -237,8 +237,8 @@ def solve(tables, room, drives, twists, active, platform, passive, sizes, lacks)
     """Poses of n points, in place of where they start, under twists (n or 1, sites, 6) at the active sites (sites,).
 
     tables, room: of `rrru.kinematics.closure_tables`; drives (n, K); platform (n, 4, 3): frames; passive (n, k). Writes
-    the sizes (n,) of the last steps in mm, angles counted at the arm, and what the legs lacked before, lacks (n, legs,
-    6): a bar's length first, a chain's twist. Points without a pose are left anywhere.
+    the sizes (n,) of the last steps in mm, angles counted at the arm, and the legs' closure errors before, lacks (n,
+    legs, 6): a bar's length first, a chain's twist. Points without a pose keep arbitrary values.
     """
     slots, frames, motions, ends, bars, screws, numbers, turning = tables
     links, work = room[0], room[1:]

@@ -1,11 +1,11 @@
-"""A robot's legs as flat arrays, and what `rrru.kinematics.closure_kernel` makes of them. Lengths mm, angles rad."""
+"""A robot's legs as flat arrays for `rrru.kinematics.closure_kernel`, and its results. Lengths mm, angles rad."""
 
 import numpy as np
 
 from rrru.errors import ConfigError
 from rrru.kinematics import closure_kernel
 
-# a pose with more left than this is none
+# a pose with a larger residual is not closed
 _CLOSED_MM = 1e-7
 
 
@@ -60,10 +60,10 @@ def _bar_numbers(legs, leg):
 
 
 def closed(tables, actuators, start, twists, all_met):
-    """What Poses hold at actuator values (n, K), next to the Poses `start`; NaN where Newton does not end.
+    """The fields of Poses at actuator values (n, K), next to the Poses `start`; NaN where Newton does not converge.
 
-    twists: Twists at n points or one; all_met: whether all constraints can be met, not only by least squares. What is
-    left is inf where actuator values or start are not known. Raises ValueError where shapes do not fit.
+    twists: Twists at n points or one; all_met: whether all constraints can be met, not only by least squares. The
+    residual is inf where actuator values or start are unknown. Raises ValueError where shapes do not fit.
     """
     slots, _, _, ends, _, screws, _, turning = tables
     n, k, legs, most = len(actuators), len(turning), len(ends), max(slots[:, 1].max(), ends[:, 4].max())

@@ -22,7 +22,7 @@ class Kernel(types.WrapperAddressProtocol):
         self._address = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
 
     def __wrapper_address__(self):
-        """Where the machine code lies."""
+        """Address of the machine code."""
         return self._address
 
     def signature(self):

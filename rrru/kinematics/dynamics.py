@@ -15,8 +15,8 @@ d_i with the force
     F_i = W . dx/db_i + (m_a + m_f / 2) (g . d_i - b_i'')
 
 Gravity points along +z in the 3-RRRU's frame and along -z in the others'. The platform's translation is the only motion
-of the loads at the platform; a forearm's own rotation is left out. On a base that leans by a small turn w the weight is
-g - w x g in the robot's frame. Lengths mm, angles rad, forces N, torques N mm, masses kg, times s.
+of the loads at the platform; a forearm's own rotation is neglected. On a base that is tilted by a small turn w gravity
+is g - w x g in the robot's frame. Lengths mm, angles rad, forces N, torques N mm, masses kg, times s.
 """
 
 from dataclasses import dataclass, fields
@@ -71,9 +71,9 @@ def level_axes(robot):
 
 
 def arm_load(masses, arm_mm, pulls, acceleration):
-    """Torques (n, k) in N mm of their own masses and half forearms on drives that turn level arms.
+    """Torques (n, k) in N mm of the arms' own masses and half forearms on drives that turn level arms.
 
-    pulls (n, k): gravity in mm/s^2 along the way of the arms' ends; acceleration (n, k): of the drives.
+    pulls (n, k): gravity in mm/s^2 along the path of the arms' ends; acceleration (n, k): of the drives.
     """
     weight = 0.5 * (masses.arm_kg + masses.forearm_kg) * arm_mm * pulls
     inertia = (masses.arm_kg / 3.0 + 0.5 * masses.forearm_kg) * arm_mm**2
@@ -112,20 +112,21 @@ def loads(robot, masses, at, actuators, drive_motion, acceleration_mm_s2, payloa
 
 
 def load_slopes(robot, masses, at, actuators, acceleration_mm_s2, payload_kg):
-    """Derivatives of `loads`: by the platform's mass in kg, by the lean of the base about each level axis, and by
-    mass and each of these leans.
+    """Derivatives of `loads`: by the platform's mass in kg, by the tilt of the base about each level axis, and by
+    mass and each of these tilts.
 
-    Exact but for the square of the lean.
+    Exact except for terms of second order in the tilt.
     """
     mass, still = carried_kg(robot, masses, payload_kg)[:, None], np.zeros(np.shape(actuators))
     motion = np.asarray(actuators, dtype=float), still, still
-    leaning = [-cross(axis, gravity(robot)) for axis in np.eye(3)[level_axes(robot)]]
+    tilted = [-cross(axis, gravity(robot)) for axis in np.eye(3)[level_axes(robot)]]
     by_mass = _of_platform(robot, at, (gravity(robot) - acceleration_mm_s2) / PER_NEWTON)
-    per_kg = [_of_platform(robot, at, np.ones_like(mass) * one / PER_NEWTON) for one in leaning]
-    by_lean = [
-        _of_platform(robot, at, mass * one / PER_NEWTON) + _of_parts(robot, masses, at, motion, one) for one in leaning
+    per_kg = [_of_platform(robot, at, np.ones_like(mass) * change / PER_NEWTON) for change in tilted]
+    by_tilt = [
+        _of_platform(robot, at, mass * change / PER_NEWTON) + _of_parts(robot, masses, at, motion, change)
+        for change in tilted
     ]
-    return by_mass, *by_lean, *per_kg
+    return by_mass, *by_tilt, *per_kg
 
 
 def carried_kg(robot, masses, payload_kg):
@@ -142,14 +143,14 @@ def _of_platform(robot, at, force):
 
 
 def _of_parts(robot, masses, at, motion, gravity_mm_s2):
-    """The Loads of all that moves but for the platform.
+    """The Loads of all moving masses except the platform's.
 
     motion: values, rates and accelerations (n, K) of the drives.
     """
     member = robot.own_member_forces(motion, at.poses, gravity_mm_s2)
     driven = robot.own_load(masses, motion, at.poses, gravity_mm_s2)
     count, sizes = len(motion[0]), (len(robot.parts.members), len(robot.legs.driven_kinds))
-    member, driven = (np.broadcast_to(one, (count, size)) for one, size in zip((member, driven), sizes, strict=True))
+    member, driven = (np.broadcast_to(load, (count, size)) for load, size in zip((member, driven), sizes, strict=True))
     held = np.zeros((count, 3)) if robot.parts.held_from else member
     base = robot.own_base_moment(motion, at.poses, gravity_mm_s2)
     return _with_followers(robot, driven, member, held, _own_across(robot, at, motion, gravity_mm_s2), base)
@@ -187,14 +188,14 @@ def _joint_frames(robot, at):
 
 
 def _across_axes(robot, turns, moment):
-    """What of moments (n, J, 3) about an arm's turning joints is across their axes, in their frames."""
+    """Components across the axes of moments (n, J, 3) about an arm's turning joints, in the joints' frames."""
     axes = np.stack([joint.axis for joint in robot.legs.joints if joint.name in robot.legs.arm_joints])
-    own = np.einsum("njab,nja->njb", turns, np.broadcast_to(moment, turns.shape[:3]))
-    return own - (own * axes).sum(axis=-1, keepdims=True) * axes
+    in_joint = np.einsum("njab,nja->njb", turns, np.broadcast_to(moment, turns.shape[:3]))
+    return in_joint - (in_joint * axes).sum(axis=-1, keepdims=True) * axes
 
 
 def _carrying(legs, poses, names):
-    """1 where the arm of some joints carries the platform of n poses, 0 where that is another arm's: (n, J, 1)."""
+    """1 where the arm of some joints carries the platform of n poses, 0 where another arm does: (n, J, 1)."""
     on = np.array([[name in {joint.name for joint in leg.joints} for name in names] for leg in legs.legs], dtype=float)
     return on[poses.leg if legs.hands else np.zeros(len(poses.closed), dtype=int)][:, :, None]
 

@@ -1,10 +1,10 @@
-"""Robots with several hands: arms that share their first joints, the trunk, and end apart.
+"""Robots with several end effectors: arms that share their first joints, the trunk.
 
-Every arm is a leg from the base to its own hand; what is measured is of one hand or the other, pose by pose. A twist
-moves a hand as the serial arm to it does, and a twist at a joint that the arm does not have moves nothing; so A of
-`rrru.kinematics.parameter_jacobian` is the identity, and the wrenches of all legs but the one that is read are zero.
-Which hand a pose is of follows from the position near which it is looked for: that of the hand that nominally is
-nearest. The masses of all arms load the trunk. Lengths in mm, angles in rad.
+Every arm is a leg from the base to its own end effector; each pose is measured at one of them. A twist moves an end
+effector as in the serial arm to it, and a twist at a joint of another arm does not move it. So A of
+`rrru.kinematics.parameter_jacobian` is the identity, and the wrenches of all legs except the measured one are zero.
+A pose belongs to the end effector whose nominal position is nearest to the position near which the pose is searched.
+The masses of all arms load the trunk. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -26,13 +26,13 @@ _SAME_MM = 1e-6
 
 @dataclass(frozen=True)
 class EndEffectorPoses(Poses):
-    """Poses of hands; leg (n,): number of the leg whose end each is."""
+    """Poses of end effectors; leg (n,): number of the leg whose end each is."""
 
     leg: np.ndarray
 
 
 class Ends:
-    """The ends of legs that end apart, as `rrru.kinematics.closure.Closure` is of legs that hold one platform."""
+    """Forward model of legs with separate ends, in place of `rrru.kinematics.closure.Closure`."""
 
     row_count = 6
 
@@ -40,21 +40,21 @@ class Ends:
         self.legs, self.rows = legs, [slice(0, 6)] * len(legs.legs)
 
     def wrenches(self, _ways, poses):
-        """Wrenches (n, 6, 6) of every leg: all six where its hand is read, none elsewhere."""
+        """Wrenches (n, 6, 6) of every leg: all six where its end effector is read, none elsewhere."""
         return [np.where((poses.leg == number)[:, None, None], _EYE, 0.0) for number in range(len(self.legs.legs))]
 
     def inverse(self, wrenches):
-        """Twists (n, 6, 6) of the hand per constraint."""
+        """Twists (n, 6, 6) of the end effector per constraint."""
         return np.broadcast_to(_EYE, wrenches[0].shape)
 
     def solve(self, actuators, start, twists=None):
-        """EndEffectorPoses (n) of the hands of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
-        every, own = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
-        rows = np.arange(len(own))
-        position, turn = (np.stack(part)[own, rows] for part in zip(*every, strict=True))
+        """EndEffectorPoses (n) of the legs of `start` at actuator values (n, K), under twists (n or 1, sites, 6)."""
+        every, leg = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs, twists)), start.leg
+        rows = np.arange(len(leg))
+        position, turn = (np.stack(part)[leg, rows] for part in zip(*every, strict=True))
         known = np.isfinite(position).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         position[~known], turn[~known] = np.nan, np.nan
-        return EndEffectorPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, own)
+        return EndEffectorPoses(position, turn, start.passive, np.where(known, 0.0, np.inf), known, leg)
 
 
 def ends(legs, actuators, twists):
@@ -65,7 +65,7 @@ def ends(legs, actuators, twists):
 
 @dataclass(frozen=True, eq=False)
 class MultiArmRobot(GeneralRobot):
-    """A GeneralRobot of several hands. Its inverse is that of the first one."""
+    """A GeneralRobot of several end effectors. Its inverse is that of the first one."""
 
     @cached_property
     def model(self):
@@ -73,77 +73,77 @@ class MultiArmRobot(GeneralRobot):
         return Ends(self.legs)
 
     def near(self, position_mm, actuators):
-        """EndEffectorPoses (n) of those whose tools nominally are nearest to positions (n, 3), at actuator values (n,
-        K).
-        """
+        """EndEffectorPoses (n) with the nominal tools nearest to positions (n, 3), at actuator values (n, K)."""
         actuators = np.asarray(actuators, dtype=float)
         off = np.nan_to_num(self._tools(actuators) - np.asarray(position_mm))
         none, leg = np.zeros((len(actuators), 0)), np.linalg.norm(off, axis=2).argmin(axis=0)
         return self.model.solve(actuators, EndEffectorPoses(None, None, none, None, None, leg))
 
     def guess(self, actuators, targets=None):
-        """Positions (n, 3) of the tools of the hands that carry targets (n,), by default of the first hand.
+        """Positions (n, 3) of the tools of the end effectors that carry targets (n,), by default of the first one.
 
-        Raises ConfigError for a target that no hand carries.
+        Raises ConfigError for a target that no end effector carries.
         """
-        owner = {target: number for number, hand in enumerate(self.legs.hands) for target in hand}
+        owner = {target: number for number, carried in enumerate(self.legs.hands) for target in carried}
         wanted = [self.legs.hands[0][0]] * len(actuators) if targets is None else list(targets)
         if unknown := [target for target in wanted if target not in owner]:
             allowed = ", ".join(owner)
-            raise ConfigError(f"robot {self.name}: no hand carries the target {unknown[0]!r}; allowed: {allowed}")
+            text = f"no end effector carries the target {unknown[0]!r}; allowed: {allowed}"
+            raise ConfigError(f"robot {self.name}: {text}")
         return self._tools(actuators)[[owner[target] for target in wanted], np.arange(len(wanted))]
 
     def _tools(self, actuators):
-        """Nominal positions (hands, n, 3) of the tools of all hands at actuator values (n, K)."""
+        """Nominal positions (legs, n, 3) of the tools of all end effectors at actuator values (n, K)."""
         every = ends(self.legs, np.asarray(actuators, dtype=float), Twists(self.legs))
         return np.stack([place + turn @ np.asarray(self.tool_mm) for place, turn in every])
 
     def _workspace(self):
-        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) of the hands in turn."""
+        """Actuator values (n, K) spread over the drives' ranges and positions (n, 3) of the end effectors in turn."""
         actuators, _ = super()._workspace()
-        return actuators, self.guess(actuators, list(islice(cycle(h for h, *_ in self.legs.hands), len(actuators))))
+        first_targets = cycle(target for target, *_ in self.legs.hands)
+        return actuators, self.guess(actuators, list(islice(first_targets, len(actuators))))
 
 
 def with_hands(arms, shared, carries=None):
-    """The MultiArmRobot that arms by name, robots of one leg of driven joints each, make.
+    """The MultiArmRobot of arms by name, robots of one leg of driven joints each.
 
-    shared: number of joints, the base's frame among them, from the base to where the arms part, alike in all of them;
-    carries: names of the targets that each hand carries, by default one of the hand's own name. Options and what is
-    shared are the first arm's; fixed frames of the arms get the hand's name before theirs. Raises ConfigError for
-    joints of two arms with one name.
+    shared: number of joints that all arms share, from the base on, the base's frame included; carries: names of the
+    targets on each end effector, by default one with the arm's name. Options and shared joints are the first arm's;
+    fixed frames of the arms get the arm's name as prefix. Raises ConfigError for joints of two arms with one name.
     """
     first, carries = next(iter(arms.values())), carries or {}
     if unknown := [name for name in carries if name not in arms]:
         raise ConfigError(f"robot {first.name}: targets of {unknown[0]!r}; allowed: {', '.join(arms)}")
-    hands = tuple(tuple(carries.get(name, (name,))) for name in arms)
-    every = [target for hand in hands for target in hand]
-    if len(set(every)) < len(every) or not all(hands):
-        raise ConfigError(f"robot {first.name}: targets {', '.join(every)}; allowed: one or more a hand, of their own")
+    targets = tuple(tuple(carries.get(name, (name,))) for name in arms)
+    every = [target for carried in targets for target in carried]
+    if len(set(every)) < len(every) or not all(targets):
+        allowed = "one or more different names for each end effector"
+        raise ConfigError(f"robot {first.name}: targets {', '.join(every)}; allowed: {allowed}")
     arms = {name: _apart(arm, name, shared) for name, arm in arms.items()}
     chains, order = _chains(arms, shared, first.name)
     drives, ranges, home = _drives(arms.values())
-    followers = {one.site: one for arm in arms.values() for one in arm.parts.followers}
+    followers = {follower.site: follower for arm in arms.values() for follower in arm.parts.followers}
     coupling = _coupling(arms.values(), order, list(drives))
-    options = {one.name: getattr(first, one.name) for one in fields(first)}
-    own = {
-        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=hands),
+    options = {option.name: getattr(first, option.name) for option in fields(first)}
+    joined = {
+        "legs": Legs(chains, home, first.legs.home_mm, first.legs.home_turn, coupling=coupling, hands=targets),
         "parts": Parts(drives=tuple(drives.values()), followers=tuple(followers.values())),
         "drive_range": ranges,
         "assumed": frozenset().union(*(arm.assumed for arm in arms.values())),
         "point_masses": _point_masses([*arms.values()], shared),
         **{name: _limits(arms.values(), name, drives) for name in ("effort_limits", "velocity_limits")},
     }
-    return MultiArmRobot(**options | own)
+    return MultiArmRobot(**options | joined)
 
 
 def _drives(arms):
-    """Drives by column of all arms, with all that follows them in any, their ranges (K, 2) and home values (K,)."""
+    """Drives by column of all arms, with the followers in any arm, their ranges (K, 2) and home values (K,)."""
     drives, ranges, homes = {}, {}, {}
     for arm in arms:
-        for drive, own, home in zip(arm.parts.drives, arm.drive_range, arm.legs.home_drives, strict=True):
+        for drive, ends, home in zip(arm.parts.drives, arm.drive_range, arm.legs.home_drives, strict=True):
             known = drives.get(drive.column, drive)
             drives[drive.column] = replace(known, others=known.others | drive.others)
-            ranges.setdefault(drive.column, own)
+            ranges.setdefault(drive.column, ends)
             homes.setdefault(drive.column, home)
     return drives, np.array([*ranges.values()]), np.array([*homes.values()])
 
@@ -164,17 +164,17 @@ def shared_joints(arms):
 
 
 def _point_masses(arms, shared):
-    """The point masses of arms: of the trunk those that all have there, as one may count another arm to its trunk."""
-    first, *others = arms
+    """The point masses of arms; on the trunk only those of all arms, since one arm may count another to its trunk."""
+    first, *further = arms
     trunk = set(_names(first)[:shared])
-    common = [one for one in first.point_masses if one.joint in trunk and all(_has(arm, one) for arm in others)]
+    common = [mass for mass in first.point_masses if mass.joint in trunk and all(_has(arm, mass) for arm in further)]
     return (*common, *(point_mass for arm in arms for point_mass in arm.point_masses if point_mass.joint not in trunk))
 
 
 def _has(arm, point_mass):
     """Whether an arm has a point mass."""
-    alike = (one for one in arm.point_masses if (one.joint, one.mass_kg) == (point_mass.joint, point_mass.mass_kg))
-    return any(np.allclose(one.at_mm, point_mass.at_mm, rtol=0.0, atol=_SAME_MM) for one in alike)
+    alike = (own for own in arm.point_masses if (own.joint, own.mass_kg) == (point_mass.joint, point_mass.mass_kg))
+    return any(np.allclose(own.at_mm, point_mass.at_mm, rtol=0.0, atol=_SAME_MM) for own in alike)
 
 
 def _names(arm):
@@ -182,17 +182,17 @@ def _names(arm):
     return [joint.name for joint in arm.legs.legs[0].joints]
 
 
-def _apart(arm, hand, shared):
-    """An arm whose fixed frames behind the shared joints are called by the hand as well; the last one is the hand."""
+def _apart(arm, arm_name, shared):
+    """An arm whose fixed frames behind the shared joints have the arm's name as prefix, the end effector's too."""
     (leg,) = arm.legs.legs
-    new = {joint.name: f"{hand} {joint.name}" for joint in leg.joints[shared:] if joint.kind == "fixed"}
+    new = {joint.name: f"{arm_name} {joint.name}" for joint in leg.joints[shared:] if joint.kind == "fixed"}
     new[PLATFORM] = new.get(leg.joints[-1].name, leg.joints[-1].name)
     joints = tuple(replace(joint, name=new.get(joint.name, joint.name)) for joint in leg.joints)
     point_masses = tuple(
         replace(point_mass, joint=new.get(point_mass.joint, point_mass.joint)) for point_mass in arm.point_masses
     )
     return replace(
-        arm, legs=replace(arm.legs, legs=(replace(leg, name=hand, joints=joints),)), point_masses=point_masses
+        arm, legs=replace(arm.legs, legs=(replace(leg, name=arm_name, joints=joints),)), point_masses=point_masses
     )
 
 
@@ -203,10 +203,10 @@ def _chains(arms, shared, robot):
         (leg,) = arm.legs.legs
         if leg.bar or arm.legs.passive_joints:
             raise ConfigError(f"robot {robot}: {name} is no chain of driven joints; allowed: arms")
-        own = _names(arm)[shared:]
-        if again := taken.intersection(own):
+        names = _names(arm)[shared:]
+        if again := taken.intersection(names):
             raise ConfigError(f"robot {robot}: two arms have a joint {again.pop()!r}; allowed: names of their own")
-        taken.update(own)
+        taken.update(names)
         joints = [
             joint if joint.drive is None else replace(joint, drive=driven.setdefault(joint.name, len(driven)))
             for joint in leg.joints
@@ -217,12 +217,12 @@ def _chains(arms, shared, robot):
 
 
 def _coupling(arms, joints, columns):
-    """Driven values (D, K) of joints per drive, each told by the arms that have it; None where they are the same."""
+    """Driven values (D, K) of joints per drive, from the arms that have the joint; None where they are the same."""
     result = np.zeros((len(joints), len(columns)))
     for arm in arms:
-        own = {joint.drive: joint.name for joint in arm.legs.joints if joint.drive is not None}
-        matrix = np.eye(len(own)) if arm.legs.coupling is None else arm.legs.coupling
+        names = {joint.drive: joint.name for joint in arm.legs.joints if joint.drive is not None}
+        matrix = np.eye(len(names)) if arm.legs.coupling is None else arm.legs.coupling
         for (row, number), factor in np.ndenumerate(matrix):
-            result[joints.index(own[row]), columns.index(arm.parts.columns[number])] = factor
+            result[joints.index(names[row]), columns.index(arm.parts.columns[number])] = factor
     same = result.shape[0] == result.shape[1] and np.array_equal(result, np.eye(len(result)))
     return None if same else result

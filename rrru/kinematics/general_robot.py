@@ -1,9 +1,10 @@
-"""A robot that has no file of its own: legs from a description, everything else by the general model.
+"""A robot that has no module of its own: legs from a description, everything else by the general model.
 
-Its parameters are directions at sites. "frame" is what a campaign's readings leave open alone, frame and reflectors;
-"zero" are its drives' offsets beside it; "full" is every geometric number that positions can tell, drives first, then
-lengths, then angles: a number that those before it imitate over the workspace is left out, and `gauge` says what stands
-for it. A campaign keeps those of either that its poses tell. Lengths in mm, angles in rad.
+Its parameters are directions at sites. The set "frame" has the unknowns of a campaign's readings alone: frame and
+reflectors. "zero" has the drives' zero offsets as well. "full" has every identifiable geometric parameter, drives
+first, then lengths, then angles. A parameter that is confounded with those before it over the workspace is not
+identifiable and left out; `gauge` states which combination replaces it. With a campaign each set is reduced to the
+parameters that are identifiable at its poses. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -29,7 +30,7 @@ from rrru.kinematics.point_masses import base_moment, driven_loads, member_force
 from rrru.kinematics.robot import Robot
 
 SETS = ("frame", "zero", "full")
-# poses over which a number has to be told from the others, their tilt, and the share of it that must be left
+# poses over which parameters have to be separable, their tilt, and the independent share of a column that is needed
 _POSES, _TILT_RAD, _LEFT, _LEFT_OF_DATA = 60, 0.15, 1e-6, 1e-2
 _SEEN = 1e-6  # share of the largest singular value that others need to count
 
@@ -38,11 +39,11 @@ _SEEN = 1e-6  # share of the largest singular value that others need to count
 class GeneralRobot(Robot):
     """A robot of any legs.
 
-    drive_range (K, 2): actuator values between which it works; assumed: columns of the drives that nobody states a
-    range of, which may go beyond it; parameter_set: one of SETS; point_masses: point masses of its links; sample:
-    actuator values (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace;
-    among: names that it is chosen from, by default all; reads: what a campaign's readings leave open; effort_limits,
-    velocity_limits: of `Robot`.
+    drive_range (K, 2): actuator values between which it works; assumed: columns of the drives without a stated range,
+    which may go beyond it; parameter_set: one of SETS; point_masses: point masses of its links; sample: actuator values
+    (n, K), positions (n, 3) and Readings at which the set is chosen, by default over the workspace; among: names that
+    it is chosen from, by default all; reads: a campaign's MeasurementConfig; effort_limits, velocity_limits: of
+    `Robot`.
     """
 
     name: str
@@ -77,7 +78,7 @@ class GeneralRobot(Robot):
 
     @cached_property
     def _chosen(self):
-        """Chosen Candidates, and of the others the combination of chosen ones (k,) that imitates each, by name."""
+        """Chosen Candidates, and by name the combination of chosen ones (k,) that each other one is confounded with."""
         wanted = self._wanted
         if self.parameter_set != "full" and not self.sample:
             return wanted, {}
@@ -85,15 +86,18 @@ class GeneralRobot(Robot):
         poses, least = self.solve(actuators, position), _LEFT_OF_DATA if self.sample else _LEFT
         seen = poses.closed
         at = self.map(actuators[seen], poses.of(seen), readings=readings.of(seen) if readings else None)
-        columns = at.columns(np.stack([direction(self.legs, one) for one in self.candidates], axis=-1))
-        sizes = np.array([1.0 if one.unit == "mm" else 1.0 / self.angle_arm_mm for one in self.candidates])
-        names = {one.name for one in wanted} & set(self.among or [one.name for one in wanted])
-        allowed = [one.name in names for one in self.candidates]
-        chosen, stands = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
-        gauge = {
-            self.candidates[number].name: of * sizes[chosen[: len(of)]] / sizes[number] for number, of in stands.items()
+        candidates = self.candidates
+        columns = at.columns(np.stack([direction(self.legs, candidate) for candidate in candidates], axis=-1))
+        sizes = np.array([1.0 if candidate.unit == "mm" else 1.0 / self.angle_arm_mm for candidate in candidates])
+        names = {candidate.name for candidate in wanted}
+        names &= set(self.among or names)
+        allowed = [candidate.name in names for candidate in candidates]
+        chosen, combined = choose(columns.reshape(-1, len(sizes)) * sizes, allowed, least)
+        replaced = {
+            candidates[number].name: combination * sizes[chosen[: len(combination)]] / sizes[number]
+            for number, combination in combined.items()
         }
-        return tuple(self.candidates[k] for k in chosen), gauge
+        return tuple(candidates[k] for k in chosen), replaced
 
     @property
     def offered(self):
@@ -130,14 +134,19 @@ class GeneralRobot(Robot):
 
     @cached_property
     def gauge(self):
-        """By left-out number in words what stands for it, such as "0.71 base1_x - 0.2 dl1"; "nothing" if unseen."""
-        return {left: in_words(of, self.parameters.names) for left, of in self._chosen[1].items()}
+        """By name of a not identifiable parameter the combination that replaces it, such as "0.71 base1_x - 0.2 dl1".
+
+        "nothing" where it has no effect on the readings.
+        """
+        return {left: in_words(combination, self.parameters.names) for left, combination in self._chosen[1].items()}
 
     def confounded_outside(self, name):
-        """Candidates of frame, tool and reflectors that a parameter imitates, and its size for a unit of each."""
-        names, (_, gauge) = self.parameters.names, self._chosen
-        known = {one.name: one for one in self.candidates if self._outside.issuperset(one.twists)}
-        sizes = {left: dict(zip(names, of.tolist(), strict=False)).get(name, 0.0) for left, of in gauge.items()}
+        """Candidates of frame, tool and reflectors confounded with a parameter, and its size for a unit of each."""
+        names, (_, replaced) = self.parameters.names, self._chosen
+        outside = self._outside
+        known = {candidate.name: candidate for candidate in self.candidates if outside.issuperset(candidate.twists)}
+        shares = {left: dict(zip(names, part.tolist(), strict=False)) for left, part in replaced.items()}
+        sizes = {left: share.get(name, 0.0) for left, share in shares.items()}
         return tuple((known[left], size) for left, size in sizes.items() if left in known and size)
 
     @property
@@ -153,8 +162,8 @@ class GeneralRobot(Robot):
     @cached_property
     def directions(self):
         """Twists (sites, 6, p) that a unit of each parameter makes."""
-        each = [direction(self.legs, one)[..., None] for one in self._chosen[0]]
-        return np.concatenate([np.zeros((len(self.legs.sites), 6, 0)), *each], axis=-1)
+        columns = [direction(self.legs, candidate)[..., None] for candidate in self._chosen[0]]
+        return np.concatenate([np.zeros((len(self.legs.sites), 6, 0)), *columns], axis=-1)
 
     @property
     def deviation_names(self):
@@ -163,29 +172,29 @@ class GeneralRobot(Robot):
 
     def twists_of(self, values):
         """Twists (1, sites, 6) of deviations by name."""
-        known = {one.name: one for one in self.candidates}
+        known = {candidate.name: candidate for candidate in self.candidates}
         twists = [value * direction(self.legs, known[name]) for name, value in values.items()]
         return np.sum(twists, axis=0)[None] if twists else self.twists()
 
     def identifiable(self, values):
-        """Mapping of the parameters from values of any Candidates: what is left out counts by what stands for it."""
+        """Mapping of the parameters from values of any Candidates: others count by what replaces them."""
         result = dict.fromkeys(self.parameters.names, 0.0)
         for name, value in values.items():
             if name in result:
                 result[name] += value
-            for stands, share in zip(self._chosen[0], self._chosen[1].get(name, ()), strict=False):
-                result[stands.name] += share * value
+            for chosen, share in zip(self._chosen[0], self._chosen[1].get(name, ()), strict=False):
+                result[chosen.name] += share * value
         return result
 
     def reading(self, reads):
-        """The robot with what a campaign's readings leave open, `rrru.kinematics.base_parameters.Reads`."""
+        """The robot with a campaign's `rrru.kinematics.base_parameters.MeasurementConfig`."""
         return replace(self, legs=replace(self.legs, reflectors=reads.reflectors), reads=reads)
 
     def seen_at(self, actuators, position_mm, readings=None):
-        """The robot with its set chosen on poses of a campaign, (n, K) and (n, 3), by what noise lets tell.
+        """The robot with its set reduced to the parameters identifiable at poses of a campaign, (n, K) and (n, 3).
 
-        readings: what was read at these poses, by default positions of the tool. Of a robot so chosen, on poses of a
-        part of its campaign, it keeps a part of the numbers.
+        readings: what was read at these poses, by default positions of the tool. A second reduction, at poses of a part
+        of the campaign, chooses among the parameters of the first one.
         """
         among = () if self.sample is None else self.parameters.names
         sample = np.asarray(actuators, dtype=float), np.asarray(position_mm, dtype=float), readings
@@ -198,7 +207,7 @@ class GeneralRobot(Robot):
 
     @property
     def orients(self):
-        """Whether its drives can orient its platform beside moving it."""
+        """Whether its drives can orient its platform besides moving it."""
         return self.freedoms[1] > 0
 
     @property
@@ -214,7 +223,7 @@ class GeneralRobot(Robot):
         return self.legs.longest_mm(first, travel) + float(np.linalg.norm(self.tool_mm))
 
     def inverse(self, position_mm, deviations=None, elbow="out", turn=None):
-        """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from the home pose does not end.
+        """Actuator values (n, K) for positions (n, 3) of the tool; NaN where Newton from home does not converge.
 
         Under deviations positions are met as nearly as the drives can. turn (n, 3, 3): the platform's orientation, by
         default the home pose's, where the drives can choose it; of the assemblies there is only the home pose's.
@@ -276,14 +285,14 @@ class GeneralRobot(Robot):
 
     @cached_property
     def freedoms(self):
-        """Freedoms of the tool's position, and beside it of the platform's orientation, that the drives have."""
+        """Degrees of freedom of the tool's position, and in addition of the platform's orientation, by the drives."""
         actuators, position = (part[:10] for part in self._workspace())
         poses = self.solve(actuators, position)
         at = self.map(actuators[poses.closed], poses.of(poses.closed))
         position_rank = np.linalg.matrix_rank(at.drive_response, rtol=_SEEN).max()
         turn = self.angle_arm_mm * at.platform[:, 3:] @ at.drive_counts
-        both = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
-        return int(position_rank), int(both - position_rank)
+        pose_rank = np.linalg.matrix_rank(np.concatenate([at.drive_response, turn], axis=1), rtol=_SEEN).max()
+        return int(position_rank), int(pose_rank - position_rank)
 
     @cached_property
     def _driven_leg(self):
@@ -301,7 +310,7 @@ class GeneralRobot(Robot):
     def guess(self, actuators, targets=None):
         """Positions (n, 3) of the tool at actuator values (n, K): a driven leg's end, or followed from home.
 
-        The home position's where they are lost.
+        The home position where they are lost.
         """
         actuators = np.asarray(actuators, dtype=float)
         known = end_of(self.legs, self._driven_leg, actuators) if self._driven_leg else followed(self, actuators)

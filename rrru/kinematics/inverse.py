@@ -1,4 +1,4 @@
-"""Actuator values of a robot without a file: Newton steps, lengths of driven bars. Lengths in mm, angles in rad."""
+"""Inverse kinematics of a general robot: Newton continuation, lengths of driven bars. Lengths in mm, angles in rad."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 from rrru.cache import last_kept
 from rrru.kinematics.chain import Poses, Twists, bar_pose, walk
 
-# an inverse has at most so many steps, and the longest is so large a share of a drive's range, or of a turn if that is
-# less: longer ones end in other assemblies, or nowhere
+# an inverse has at most so many steps. The longest step is a share of a drive's range, or of a turn if that is less:
+# longer ones end in other assemblies or do not converge
 _STEPS, _REACHED_MM, _LONGEST_STEP = 100, 1e-9, 0.05
 # singular values below this share count as lost; where they leave steps below a share of the drives' ranges, it takes
 # a step of another share to get away
@@ -30,8 +30,8 @@ def inverse_kinematics(robot, place, start, twists, nearest=True):
     """Actuator values (n, K) of a robot at places of its tool, under twists (n or 1, sites, 6); NaN where it has none.
 
     place: positions (n, 3) of the tool and orientations (n, 3, 3) of the platform, met where the drives can choose
-    them; start: actuator values (n, K) and positions (n, 3) near which to look; nearest: whether positions may be met
-    as nearly as the drives can.
+    them; start: actuator values (n, K) and positions (n, 3) near which to search; nearest: whether the nearest
+    position that the drives can reach is accepted.
     """
     (position, wanted), (actuators, near) = place, start
     poses, left = robot.solve(actuators, near, twists), np.full(len(position), np.inf)
@@ -42,25 +42,25 @@ def inverse_kinematics(robot, place, start, twists, nearest=True):
         rows, poses = rows[going], poses.of(going)
         if not len(rows):
             break
-        own = twists[rows] if len(twists) > 1 else twists
-        at = robot.map(actuators[rows], poses, own)
-        lack = position[rows] - robot.measured(at.poses, own)
+        twist = twists[rows] if len(twists) > 1 else twists
+        at = robot.map(actuators[rows], poses, twist)
+        lack = position[rows] - robot.measured(at.poses, twist)
         turning = Rotation.from_matrix(wanted[rows] @ at.poses.turn.transpose(0, 2, 1)).as_rotvec()
         step, held, lost = drive_step(at, robot.freedoms, lack, turning, widths)
         longest, gain = np.abs(step).max(axis=1), (at.drive_response @ (widths * step)[:, :, None])[:, :, 0]
-        # what no drive changes stays: a point off the plane that a planar robot keeps to
+        # an error that no drive changes stays: a point off the plane of a planar robot
         off = np.linalg.norm(lack - gain, axis=1)
         going = nearest | lost | (longest >= _STILL) | (off < 1e3 * _REACHED_MM)
         if nearest:
-            # a plane that deviations have tilted holds the commanded points no more: the nearest ones have to do
+            # a plane that deviations have tilted does not contain the commanded points: the nearest ones replace them
             lack = np.where(lost[:, None], lack, gain)
         left[rows] = np.linalg.norm(lack, axis=1) + robot.angle_arm_mm * held
         step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(longest, 1e-9))[:, None]
-        # a stretched arm is led nowhere by what it cannot do there
+        # a stretched arm gets no step in the direction of its singularity: it is moved away from there
         still = lost & (longest < _STILL) & (left[rows] >= _REACHED_MM)
         step[still] = np.where(actuators[rows] - low > high - actuators[rows], -_AWAY, _AWAY)[still]
         actuators[rows] += widths * step
-        poses = robot.model.solve(actuators[rows], poses, own)
+        poses = robot.model.solve(actuators[rows], poses, twist)
     return np.where((left < 1e3 * _REACHED_MM)[:, None], actuators, np.nan)
 
 
@@ -76,7 +76,7 @@ def followed(robot, actuators):
 
 
 def near_or_followed(robot, actuators, near):
-    """Poses `near` (n) which to look at actuator values (n, K), or those followed from home if these are close by.
+    """Poses (n) from which to search at actuator values (n, K): `near`, or those followed from home if close to it.
 
     Passive joints far from home are not known from the platform's place alone.
     """
@@ -95,11 +95,11 @@ def _steps_from_home(robot, actuators):
 
 
 def _widths(robot):
-    """How far (K,) each drive goes, a turning one no further than a turn; a turn where no range is known."""
+    """Width (K,) of each drive's range, at most one turn of a turning drive; a turn where no range is known."""
     turning = np.array(robot.parts.units) == "rad"
-    own = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
+    width = np.minimum(np.ptp(robot.drive_range, axis=1), np.where(turning, 2.0 * np.pi, np.inf))
     turn = np.where(turning, 2.0 * np.pi, 2.0 * np.pi * robot.angle_arm_mm)
-    return np.where((own > 0.0) & np.isfinite(own), own, turn)
+    return np.where((width > 0.0) & np.isfinite(width), width, turn)
 
 
 def in_range(robot, actuators):
@@ -107,9 +107,9 @@ def in_range(robot, actuators):
     legs, slack = robot.legs, _SLACK * _widths(robot)
     low, high = np.asarray(robot.drive_range, dtype=float).T + np.outer([-1.0, 1.0], slack)
     coupling = np.eye(len(legs.driven_kinds)) if legs.coupling is None else legs.coupling
-    turning, whole = np.array(legs.driven_kinds) == "R", np.isclose(coupling, np.rint(coupling))
-    # a turn of such a drive brings back all that it moves
-    periodic = ((coupling == 0.0) | (turning[:, None] & whole)).all(axis=0)
+    turning, integer = np.array(legs.driven_kinds) == "R", np.isclose(coupling, np.rint(coupling))
+    # a full turn of such a drive returns all joints that it moves
+    periodic = ((coupling == 0.0) | (turning[:, None] & integer)).all(axis=0)
     turns = np.ceil((low - actuators) / (2.0 * np.pi))
     assumed = np.array([drive.column in robot.assumed for drive in robot.parts.drives])
     beyond = ~assumed & ~((low <= actuators) & (actuators <= high))
@@ -118,18 +118,19 @@ def in_range(robot, actuators):
 
 
 def drive_step(at, ranks, lack_mm, turning_rad, widths):
-    """Changes (n, K) of the actuator values that remove what position (n, 3) and, as far as they can, turn (n, 3) lack.
+    """Changes (n, K) of the actuator values that remove errors of position (n, 3) and, if possible, of turn (n, 3).
 
-    ranks: freedoms of the point's position and, beside it, of the platform's orientation that the drives have; widths
-    (K,): how far each drive goes, in shares of which the smallest changes are found and given. With the size (n,) in
-    rad of the change of orientation that they can and should still make, and where (n,) a pose lacks some freedom.
+    ranks: degrees of freedom of the point's position and, in addition, of the platform's orientation by the drives;
+    widths (K,): of the drives' ranges, which scale the changes; the smallest scaled changes are returned. Returns also
+    the size (n,) in rad of the remaining change of orientation that is possible, and whether (n,) a pose lacks a degree
+    of freedom. The orientation is corrected in the null space of the position (Siciliano et al., 2009, section 3.5).
     """
     response, turn = at.drive_response * widths, at.platform[:, 3:] @ at.drive_counts * widths
     reach, stretched = _inverse_of_rank(response, ranks[0], response)
     step = reach @ lack_mm[:, :, None]
-    beside = np.eye(len(widths)) - reach @ response
-    inverse, aligned = _inverse_of_rank(turn @ beside, ranks[1], turn)
-    more = beside @ inverse @ (turning_rad[:, :, None] - turn @ step)
+    null_space = np.eye(len(widths)) - reach @ response
+    inverse, aligned = _inverse_of_rank(turn @ null_space, ranks[1], turn)
+    more = null_space @ inverse @ (turning_rad[:, :, None] - turn @ step)
     held = np.linalg.norm((turn @ more)[:, :, 0], axis=1)
     if sum(ranks) == _FREEDOMS:
         # every orientation can be met, in another pose if not here
@@ -137,14 +138,15 @@ def drive_step(at, ranks, lack_mm, turning_rad, widths):
     return (step + more)[:, :, 0], held, stretched | aligned
 
 
-def _inverse_of_rank(matrices, rank, whole):
+def _inverse_of_rank(matrices, rank, unprojected):
     """Pseudo-inverses (n, k, j) of matrices (n, j, k) by their largest `rank` singular values, and which (n,) lack one.
 
-    Values that are nothing beside the matrices (n, j, k) of which these are a part are left out.
+    unprojected: matrices (n, j, k) of which these are projections; singular values negligible next to them are left
+    out.
     """
     u, size, vt = np.linalg.svd(matrices, full_matrices=False)
     size = size[:, :rank]
-    lost = size <= _LOST * np.linalg.norm(whole, axis=(1, 2))[:, None]
+    lost = size <= _LOST * np.linalg.norm(unprojected, axis=(1, 2))[:, None]
     shares = np.where(lost, 0.0, 1.0 / np.where(lost, 1.0, size))
     return (vt[:, :rank].transpose(0, 2, 1) * shares[:, None]) @ u[:, :, :rank].transpose(0, 2, 1), lost.any(axis=1)
 
@@ -162,11 +164,11 @@ def bar_lengths(legs, drive_range, place, twists):
     place: its positions (n, 3) and orientations (n, 3, 3); twists (n or 1, sites, 6).
     """
     poses = Poses(*place, np.zeros((len(place[0]), 0)), None, None)
-    none, own = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
+    none, given = np.zeros((len(place[0]), len(drive_range))), Twists(legs, twists)
     needed = none.copy()
     for leg in legs.legs:
         if leg.bar:
-            way = walk(legs, leg, none, poses.passive, own)
-            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, poses, none, own).lack_mm
+            way = walk(legs, leg, none, poses.passive, given)
+            needed[:, leg.bar.drive] = -bar_pose(legs, leg, way, poses, none, given).lack_mm
     low, high = np.asarray(drive_range, dtype=float).T
     return np.where(((needed >= low) & (needed <= high)).all(axis=1, keepdims=True), needed, np.nan)

@@ -1,14 +1,14 @@
-"""A robot as legs of screws: what every robot's file describes and the general model computes with.
+"""A robot as legs of screws: the description of every robot and the input of the general model.
 
 A platform is held by legs. A leg is a chain of joints from the base to the platform; each joint is preceded by a fixed
 placement, the link. Universal and ball joints are revolute ones at one place. A leg may end in a bar instead, a link or
 cable between two ball joints, which only holds its length. Joints of one name, with all that precedes them, are shared
 by legs: the two bars of a Delta's arm share its drive, and chains may part behind a passive joint. Arms on one trunk
-are legs that end apart: each has an end of its own, its hand, see `rrru.kinematics.end_effectors`.
+are legs with separate ends: each has an end effector of its own, see `rrru.kinematics.end_effectors`.
 
-Whatever is off by a little is a twist at a site. Every joint's seat, every bar and its end at the platform, the world
-(the frame in which is measured), the tool (the measured point) and every reflector on it is a site with a frame of its
-own, the last ones the platform's. Lengths in mm, angles in rad.
+Every small geometric error is a twist at a site. Sites are every joint's seat, every bar and its end at the platform,
+the world (the frame of the measurements), the tool (the measured point) and every reflector on it. Each site has its
+own frame, tool and reflectors that of the platform. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, field, replace
@@ -104,7 +104,7 @@ class Legs:
     home_drives (K,), home_mm (3,), home_turn (3, 3): actuator values and pose in the middle of the workspace;
     reflectors: names of the sites of reflectors that the tool carries, none where the tool itself is measured; coupling
     (D, K): driven values of joints and bars per actuator value, where some follow others; None where they are the same;
-    hands: of legs that end apart the names of the targets that each carries, empty where all hold one platform.
+    hands: of legs with separate end effectors the names of the targets on each, empty where all hold one platform.
     """
 
     legs: tuple[Leg, ...]
@@ -128,7 +128,7 @@ class Legs:
 
     @property
     def arm_joints(self):
-        """Names of the turning joints of an arm, a single leg without a bar, or of arms that end apart; else none."""
+        """Names of the turning joints of an arm (one leg without a bar) or of arms with separate ends; else none."""
         if (len(self.legs) > 1 and not self.hands) or self.legs[0].bar:
             return ()
         return tuple(joint.name for joint in self.joints if joint.kind == "R")
@@ -182,14 +182,14 @@ class Legs:
 
     @cached_property
     def groups(self):
-        """Numbers of the legs of each group: those that share passive joints, and all that end apart, are one."""
+        """Numbers of the legs of each group: legs that share passive joints; all legs if they have separate ends."""
         if self.hands:
             return (tuple(range(len(self.legs))),)
         result = []
         for number, leg in enumerate(self.legs):
-            own = {joint.name for joint in leg.joints if joint.passive}
-            # what legs share lies before where they part, in the first of them as in all
-            near = (group for group in result if own & {joint.name for joint in self.legs[group[0]].joints})
+            passive = {joint.name for joint in leg.joints if joint.passive}
+            # shared joints precede the branching, so the first leg of a group has them as all others do
+            near = (group for group in result if passive & {joint.name for joint in self.legs[group[0]].joints})
             group = next(near, None)
             if group is None:
                 result.append([number])
@@ -271,7 +271,7 @@ class Parts:
     drives: of every actuator value; feet: sites at which the legs stand on the base, x outwards and y to the side;
     links: name of a length to the sites whose x lies along it, several for a leg of several bars; members: the links
     that push the platform, likewise; held_from: sites from which a leg pushes whose inner joint friction holds;
-    followers: joints that follow drives and have none of their own, as if they had.
+    followers: joints that follow drives and have none of their own, described as Drives.
     """
 
     drives: tuple[Drive, ...]

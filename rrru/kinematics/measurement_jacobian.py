@@ -1,4 +1,4 @@
-"""What small twists anywhere in a robot do to the Readings of an instrument: reflectors and orientations."""
+"""Measurement Jacobian: Readings of reflectors and orientations by small twists anywhere in a robot."""
 
 from functools import cached_property
 

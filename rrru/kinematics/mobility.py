@@ -1,4 +1,4 @@
-"""Which motions a robot's legs leave to its platform with locked drives, in words. Lengths in mm, angles in rad."""
+"""Mobility of a robot's platform with locked drives (null space of its constraints), in words. mm, rad."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ _SCALE = np.repeat([ARM_MM, 1.0], 3)
 def free_motions(legs, up=(0.0, 0.0, 1.0)):
     """The motions in words, at the home pose of Legs, such as "turn about the vertical axis through the platform"."""
     free = _free_twists(legs)
-    # at the platform's centre: shifts, turns about it, then what is left of both
+    # at the platform's centre: shifts, turns about it, then the remaining screws
     free[:, :3] += np.cross(free[:, 3:], legs.home_mm / ARM_MM)
     shifts, turns = _without(free, slice(3, 6)), _without(free, slice(0, 3))
     pure = np.concatenate([shifts, turns])
@@ -43,8 +43,8 @@ def _without(twists, part):
         pivot, column = np.unravel_index(np.abs(result[row:]).argmax(), result[row:].shape)
         result[[row, row + pivot]] = result[[row + pivot, row]]
         result[row] /= result[row, column]
-        others = np.arange(len(result)) != row
-        result[others] -= np.outer(result[others, column], result[row])
+        further = np.arange(len(result)) != row
+        result[further] -= np.outer(result[further, column], result[row])
     return result
 
 

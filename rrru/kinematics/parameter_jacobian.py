@@ -1,4 +1,4 @@
-"""What small twists anywhere in a robot do to the platform, to first order: one map for every robot.
+"""Parameter Jacobian: motion of the platform by small twists anywhere in a robot, to first order, for every robot.
 
 A twist d at a site of leg i, drives held, moves the platform by the twist T of
 
@@ -58,7 +58,7 @@ class TwistMap:
 
     @cached_property
     def frames(self):
-        """Turn (n, 3, 3) and place (n, 3) of the frame at every site but world and tool, by the site's number."""
+        """Turn (n, 3, 3) and place (n, 3) of the frame at every site except world and tool, by the site's number."""
         return {number: frame for number, _, *frame in self._placed}
 
     @property
@@ -84,9 +84,9 @@ class TwistMap:
     def _swept(self, motion):
         """Motion (n, 3, S, 6) per twist at each of `_sites`, in its frame, from motion (n, 3, rows) per constraint."""
         numbers, legs, turns, places = self._sites
-        each = np.stack([motion[:, :, rows] @ one for *_, one, rows in self._legs])
+        by_leg = np.stack([motion[:, :, rows] @ wrenches for *_, wrenches, rows in self._legs])
         result = np.empty((*motion.shape[:2], len(numbers), 6))
-        chain_kernel.sweep(each, legs, numbers, turns, places, self._twists.values, result)
+        chain_kernel.sweep(by_leg, legs, numbers, turns, places, self._twists.values, result)
         return result
 
     @cached_property
@@ -120,8 +120,8 @@ class TwistMap:
         """Motion (n, 3, 6) of the measured point per twist at a site, in the site's frame."""
         if site == WORLD:
             point = self._in_world(self.point_mm[:, :, None])
-            own = self._own(self.closure.legs.site_numbers[WORLD], _EYE)
-            turning = cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ own
+            axes = self._own(self.closure.legs.site_numbers[WORLD], _EYE)
+            turning = cross(_EYE, point.transpose(0, 2, 1)).transpose(0, 2, 1) @ axes
             return np.concatenate([np.broadcast_to(_EYE, turning.shape), turning], axis=2)
         if site == TOOL:
             turn = self._in_world(self.poses.turn)
@@ -155,8 +155,8 @@ class TwistMap:
         result, active = np.zeros((len(rows), 3)), active_sites(np.asarray(twists))
         for name in self.closure.legs.sites:
             if active[numbers[name]]:
-                one = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))[rows]
-                result = result + np.einsum("naj,nj->na", self._effect_once(name), one)
+                twist = np.broadcast_to(twists[:, numbers[name]], (len(self), 6))[rows]
+                result = result + np.einsum("naj,nj->na", self._effect_once(name), twist)
         return result
 
     def columns(self, directions):

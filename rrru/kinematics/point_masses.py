@@ -16,7 +16,7 @@ from rrru.kinematics.legs import cross, turn_about
 
 # steps of the differences: in time, and of a driven value in rad or mm
 _STEP_S, _STEP = 1e-3, {"R": 1e-4, "P": 1e-2}
-# what a lump of the platform is fixed in
+# name of the frame in which a point mass of the platform is fixed
 PLATFORM = "platform"
 
 
@@ -54,7 +54,7 @@ def places(robot, actuators, poses, twists=None):
 
 
 def _behind_joint(legs, leg, way, point_mass, state):
-    """Places (n, 3) of a lump fixed in the frame behind the motion of a joint."""
+    """Places (n, 3) of a point mass fixed in the frame behind the motion of a joint."""
     (poses, actuators), number = state, [joint.name for joint in leg.joints].index(point_mass.joint)
     joint, turn, place = leg.joints[number], way.turns[number], way.places[number]
     if joint.kind != "fixed":
@@ -67,7 +67,7 @@ def _behind_joint(legs, leg, way, point_mass, state):
 
 
 def _along_bar(leg, way, point_mass):
-    """Places (n, 3) of a lump that lies on a bar, counted along it from its first ball joint, or from its end."""
+    """Places (n, 3) of a point mass on a bar, counted along it from its first ball joint, or from its end."""
     end = way.bar.near if point_mass.joint == leg.bar_sites[0] else way.bar.far
     return end + point_mass.at_mm[0] * way.bar.line
 

@@ -1,7 +1,7 @@
-"""What an instrument reads of a robot: places of reflectors on its tool, and the orientation of its platform.
+"""Readings of an instrument: places of reflectors on a robot's tool, and the orientation of its platform.
 
-A residual holds three numbers in each of m rows: what is lacking at the n positions, in mm, and after them at the k
-orientations that were read, rotation vectors in rad times an arm in mm, so that all rows have the same noise.
+A residual has three numbers in each of m rows. The first n rows are those of positions, in mm. After them come those of
+the k orientations read: rotation vectors in rad times a characteristic length in mm. All rows have the same noise.
 """
 
 from dataclasses import dataclass, fields
@@ -63,18 +63,19 @@ class Readings:
 def place_on_platform(robot: Any, twists: FloatArray, readings: Readings | None = None) -> FloatArray:
     """Places (n or 1, 3) of what is read, in the platform's frame, under twists (n or 1, sites, 6).
 
-    Of reflectors that are fixed to the world in the robot's.
+    Reflectors that are fixed to the world have places in the robot's frame.
     """
     numbers, tool_mm = robot.legs.site_numbers, np.asarray(robot.tool_mm)
     tool = twists[:, numbers[TOOL]]
     if readings is None or readings.reflectors is None:
         return tool_mm + tool[:, :3]
     count = len(readings)
-    own = np.broadcast_to(twists, (count, *twists.shape[1:]))[np.arange(count), reflector_numbers(robot.legs, readings)]
+    every = np.broadcast_to(twists, (count, *twists.shape[1:]))
+    reflector = every[np.arange(count), reflector_numbers(robot.legs, readings)]
     on_tool = tool_mm + turned_by(tool[:, 3:], readings.place_mm - tool_mm) + tool[:, :3]
     if readings.on_world is not None:
         on_tool = np.where(readings.on_world[:, None], readings.place_mm, on_tool)
-    return on_tool + own[:, :3]
+    return on_tool + reflector[:, :3]
 
 
 def points_read(robot, poses, twists, readings=None):
@@ -115,7 +116,7 @@ def turn_lacking(robot, readings, poses, twists):
 
 
 def slope_of_turns(lack):
-    """How rotation vectors (k, 3) grow less by a small turn of the model, (k, 3, 3): Jr^-1 to second order in them."""
+    """Decrease (k, 3, 3) of rotation vectors (k, 3) by a small turn of the model: Jr^-1 to second order in them."""
     cross = np.cross(lack[:, None, :], _EYE).transpose(0, 2, 1)
     return _EYE + 0.5 * cross + cross @ cross / 12.0
 

@@ -1,6 +1,6 @@
-"""What every robot offers to calibration, plant and diagnosis, by the general model. Lengths in mm, angles in rad.
+"""Interface of every robot for calibration, plant and diagnosis, by the general model. Lengths in mm, angles in rad.
 
-A robot's class adds its legs, parts and parameters, and where it pays a closed form of what is here.
+A robot's class adds its legs, parts and parameters, and closed forms of these methods where they are faster.
 """
 
 from abc import ABC, abstractmethod
@@ -25,13 +25,13 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Robot(ABC):
-    """A robot as its controller believes it to be, with small deviations of its numbers.
+    """The nominal robot of the controller, with small deviations of its parameters.
 
     name; parameters: a ParameterSet, the meaning of every vector of deviations (p,); legs: `rrru.kinematics.legs.Legs`;
     parts: its Parts; directions (sites, 6, p): the twists that a unit of each parameter makes; TRACKED: the set of
     parameters that measured positions identify, RICHEST: the largest such set, SEARCHED: that of the genetic algorithm;
-    angle_arm_mm: the length that makes angles comparable with lengths; size_mm: how far its tool can be from the
-    origin, at most; up (3,): away from the ground.
+    angle_arm_mm: characteristic length that makes angles comparable with lengths; size_mm: upper bound of the tool's
+    distance from the origin; up (3,): away from the ground.
     """
 
     name: str
@@ -46,11 +46,11 @@ class Robot(ABC):
     SEARCHED: str
     up = (0.0, 0.0, 1.0)
     tool_mm = (0.0, 0.0, 0.0)
-    # loads in N mm or N, and rates in rad/s or mm/s, that its file allows the drives (K,), NaN of a drive without one;
-    # None where it states none
+    # largest loads in N mm or N, and rates in rad/s or mm/s, of the drives (K,) by its file, NaN for a drive without
+    # one; None where it states none
     effort_limits: FloatArray | None = None
     velocity_limits: FloatArray | None = None
-    # whether its drives can orient its platform beside moving it
+    # whether its drives can orient its platform besides moving it
     orients = False
     # whether positions and their slopes are found without poses
     closed_form = False
@@ -63,11 +63,11 @@ class Robot(ABC):
 
     @property
     def strokes(self):
-        """Widths (K,) of the drives' stated ranges, NaN where none is stated, as of most robots."""
+        """Widths (K,) of the drives' stated ranges, NaN where none is stated, as for most robots."""
         return np.full(len(self.parts.drives), np.nan)
 
     def in_range(self, actuators):
-        """Actuator values (n, K), NaN outside of the drives' stated ranges; of most robots none are stated."""
+        """Actuator values (n, K), NaN outside of the drives' stated ranges; for most robots none are stated."""
         return actuators
 
     def planned(self, position_mm, deviations=None):
@@ -85,13 +85,13 @@ class Robot(ABC):
         return Closure(self.legs)
 
     def reading(self, reads):
-        """The robot for a campaign whose readings leave more open than its own numbers, see `Reads`."""
+        """The robot for a campaign with unknowns besides its own parameters, see `MeasurementConfig`."""
         from rrru.kinematics.augmented_robot import AugmentedRobot
 
         return AugmentedRobot(self, reads) if reads.reflectors or reads.turned or reads.frame else self
 
     def seen_at(self, _actuators, _position_mm, _readings=None):
-        """The robot with its parameters chosen for poses of a campaign; those of most robots stay as they are."""
+        """The robot with its parameters reduced to the identifiable ones at poses; most robots have a fixed set."""
         return self
 
     def widened(self, angle_rad, length_mm):
@@ -110,19 +110,19 @@ class Robot(ABC):
 
     @property
     def gauge(self):
-        """By number that is no parameter in words what stands for it; none of a fixed set."""
+        """By name of a not identifiable parameter the combination that replaces it, in words; empty for a fixed set."""
         return {}
 
     def confounded_outside(self, name):
-        """Candidates outside the robot that are no parameters since a parameter imitates them, and its size for a unit.
+        """Candidates outside the robot that a parameter is confounded with, and its size for a unit of each.
 
-        None of a fixed set.
+        Empty for a fixed set.
         """
         return ()
 
     @property
     def offered(self):
-        """Which components (sites, 6) of constant twists its parameters are chosen from; none of a fixed set."""
+        """Which components (sites, 6) of constant twists its parameters are chosen from; none for a fixed set."""
         return np.zeros((len(self.legs.sites), 6), dtype=bool)
 
     @property
@@ -169,11 +169,11 @@ class Robot(ABC):
 
         Of the tool, or of Readings at these poses.
         """
-        own = self.twists() if twists is None else twists
-        place = place_on_platform(self, own, readings)
+        given = self.twists() if twists is None else twists
+        place = place_on_platform(self, given, readings)
         if readings is None or readings.plain:
             return TwistMap(self.model, actuators, poses, twists, place)
-        return ReadingMap(self, actuators, poses, own, place, readings)
+        return ReadingMap(self, actuators, poses, given, place, readings)
 
     def map_at(self, actuators, position_mm, deviations=None):
         """The TwistMap under deviations (p,) at actuator values (n, K), near positions (n, 3)."""
@@ -181,9 +181,9 @@ class Robot(ABC):
         return self.map(actuators, self.solve(actuators, position_mm, twists), twists)
 
     def guess(self, actuators, targets=None):
-        """Positions (n, 3) from which to look for poses at actuator values (n, K): the home position's.
+        """Positions (n, 3) from which to search poses at actuator values (n, K): the home position.
 
-        targets (n,): names of what is read, which of several hands tell the one that carries it.
+        targets (n,): names of the targets read; with several end effectors they determine the one that carries it.
         """
         return np.tile(self.legs.home_mm, (len(actuators), 1))
 
@@ -238,22 +238,22 @@ class Robot(ABC):
         return at.translational_measure, *at.constraint_measures(self.angle_arm_mm)
 
     def own_load(self, masses, motion, poses, gravity_mm_s2):
-        """Loads (n, D) on the driven values, in N mm or N, of all that moves but for the platform; none here.
+        """Loads (n, D) on the driven values, in N mm or N, of all moving masses except the platform's; none here.
 
         motion: values, rates and accelerations (n, K) of the drives; gravity_mm_s2 (3,): in the robot's frame.
         """
         return 0.0
 
     def own_member_forces(self, motion, poses, gravity_mm_s2):
-        """Forces (n, members) in N on the members, compression positive, by all but the platform's load; none here."""
+        """Forces (n, members) in N on the members, compression positive, without the platform's load; none here."""
         return 0.0
 
     def own_moments(self, motion, poses, gravity_mm_s2, at_mm):
-        """Moments (n, J, 3) in N mm of all that an arm carries but for the platform about places at_mm; none here."""
+        """Moments (n, J, 3) in N mm of an arm's masses, without the platform's, about places at_mm; none here."""
         return 0.0
 
     def own_base_moment(self, motion, poses, gravity_mm_s2):
-        """Moments (n, 3) in N mm about the origin of all that moves but for the platform; none here."""
+        """Moments (n, 3) in N mm about the origin of all moving masses except the platform's; none here."""
         return 0.0
 
     def drive_errors(self, twists):
@@ -267,7 +267,7 @@ class Robot(ABC):
         return np.linalg.solve(flat @ flat.T, flat @ twists.reshape(len(twists), -1).T).T
 
     def unreached(self, values, as_home=True):
-        """What keeps the robot from a point whose actuator values (K,) are NaN in part, for a message."""
+        """Why a point whose actuator values (K,) are NaN in part cannot be reached, for a message."""
         return "out of reach of leg " + ", ".join(str(leg + 1) for leg in np.flatnonzero(np.isnan(values)))
 
     def require_reachable(self, position_mm, deviations=None):

@@ -2,8 +2,8 @@
 
 A locked drive lets leg i move the platform only across g_i, the unit gradient of its closure, and keeps it from turning
 about b_i, its constraint moment. The rows g_i make the translational measure, the rows b_i the constraint measure:
-each is the smallest singular value of a matrix of three unit rows, 0 at a singularity and 1 at best. The closures of a
-platform that only translates do not see the second kind.
+each is the smallest singular value of a matrix of three unit rows, 0 at a singularity and 1 at best. The closure
+equations of a platform that only translates do not show the second kind.
 """
 
 import numpy as np

@@ -21,9 +21,9 @@ def lower_intersection(centres_mm, radii_mm):
         d = np.linalg.norm(second - first, axis=-1)
         along = (second - first) / d[..., None]
         i = ((third - first) * along).sum(axis=-1)
-        rest = third - first - i[..., None] * along
-        j = np.linalg.norm(rest, axis=-1)
-        across = rest / j[..., None]
+        perpendicular = third - first - i[..., None] * along
+        j = np.linalg.norm(perpendicular, axis=-1)
+        across = perpendicular / j[..., None]
         x = (d**2 + squares[..., 0] - squares[..., 1]) / (2.0 * d)
         y = (i**2 + j**2 + squares[..., 0] - squares[..., 2] - 2.0 * i * x) / (2.0 * j)
         height = np.sqrt(squares[..., 0] - x**2 - y**2)

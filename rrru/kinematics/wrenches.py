@@ -1,4 +1,4 @@
-"""Screws of passive joints, and the wrenches on the platform that these do not feel.
+"""Screws of passive joints, and the wrenches on the platform that are reciprocal to them.
 
 Legs that share passive joints, behind which they part, make a group. Their screws are stacked, rows 6 m for m legs, a
 shared joint in all of them, and so are the wrenches W with W S = 0; where each leg ends is its own, where the platform
@@ -11,7 +11,7 @@ from rrru.kinematics.chain import Twists, walk
 from rrru.kinematics.closure_kernel import ARM_MM
 from rrru.kinematics.legs import cross
 
-# passive motions that a leg's singular values, lengths counted in the arm, tell from none
+# smallest singular value of a leg's passive screws, lengths counted in the arm, that counts as a motion
 _RANK = 1e-7
 SCALE = np.array([ARM_MM, ARM_MM, ARM_MM, 1.0, 1.0, 1.0])
 
@@ -24,19 +24,19 @@ def screw(joint, axis, place):
 
 def group_screws(legs, group, ways, spare=frozenset()):
     """Names (k,) of the passive joints of a group of m legs, without spare ones, and their screws (n, 6 m, k)."""
-    own = [[j for j in legs.legs[number].joints if j.passive and j.name not in spare] for number in group]
-    names = list(dict.fromkeys(joint.name for joints in own for joint in joints))
+    passive = [[j for j in legs.legs[number].joints if j.passive and j.name not in spare] for number in group]
+    names = list(dict.fromkeys(joint.name for joints in passive for joint in joints))
     result = np.zeros((len(ways[group[0]].place), 6 * len(group), len(names)))
-    for row, (number, joints) in enumerate(zip(group, own, strict=True)):
+    for row, (number, joints) in enumerate(zip(group, passive, strict=True)):
         for joint in joints:
             k = legs.legs[number].joints.index(joint)
-            one = screw(joint, ways[number].axes[k], ways[number].places[k])
-            result[:, 6 * row : 6 * row + 6, names.index(joint.name)] = one
+            column = screw(joint, ways[number].axes[k], ways[number].places[k])
+            result[:, 6 * row : 6 * row + 6, names.index(joint.name)] = column
     return names, result
 
 
 def spare_joints(legs):
-    """Names of the passive joints that depend on those before them a little off home, where joints may stand in line.
+    """Names of the passive joints that depend on those before them a little off home, where joints may be in line.
 
     They keep their values: a link between two ball joints does not spin.
     """
@@ -66,7 +66,7 @@ def constraints_of(legs, spare):
 
 
 def wrenches_of(legs, spare, ways):
-    """Wrenches (n, r, 6) of every leg, which together with its group's others the passive joints do not feel.
+    """Wrenches (n, r, 6) of every leg, which together with those of its group are reciprocal to the passive joints.
 
     spare: names of joints that keep their values.
     """
@@ -78,14 +78,14 @@ def wrenches_of(legs, spare, ways):
             line = way.bar.line
             result[group[0]] = np.concatenate([line, cross(way.bar.near, line)], axis=1)[:, None]
             continue
-        both = _beside(group_screws(legs, group, ways, spare)[1])
+        stacked = _reciprocal(group_screws(legs, group, ways, spare)[1])
         for row, number in enumerate(group):
-            result[number] = both[:, :, 6 * row : 6 * row + 6]
+            result[number] = stacked[:, :, 6 * row : 6 * row + 6]
     return result
 
 
-def _beside(screws):
-    """Wrenches (n, 6 m - k, 6 m) that independent screws (n, 6 m, k) do not feel."""
+def _reciprocal(screws):
+    """Wrenches (n, 6 m - k, 6 m) reciprocal to independent screws (n, 6 m, k)."""
     scale = np.resize(SCALE, screws.shape[1])
     if not screws.shape[2]:
         return np.broadcast_to(np.eye(len(scale)), (len(screws), len(scale), len(scale)))

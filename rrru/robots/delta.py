@@ -1,4 +1,4 @@
-"""Rotary Delta robot (paper C): what its controller believes.
+"""Rotary Delta robot (paper C): the nominal model of its controller.
 
 Frame of the static platform O-XYZ: the three drive axes lie in the plane Z = 0, z UP, leg i at the structure angle
 beta_i = -pi/6 + 2 pi (i-1)/3, so that Y points to the second drive axis (the scan prints every minus sign as a question
@@ -30,7 +30,7 @@ from rrru.parameters import LEGS
 from rrru.robots.three_legs import Deviation, of_each, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
-# columns of the legs' numbers: what the drive's angle adds to, l1, l2, a
+# columns of the legs' numbers: offset of the drive's angle, l1, l2, a
 _OWN = of_each_leg("dtheta", 0, "rad"), of_each_leg("dl1_", 1), of_each_leg("dl2_", 2), of_each_leg("da_", 3)
 _COMMON = {"dl1": Deviation(1), "dl2": Deviation(2), "da": Deviation(3)}
 

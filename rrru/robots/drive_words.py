@@ -1,4 +1,4 @@
-"""What sentences, tables and figures call the drives of a robot: one place that knows legs from joints, and kinds."""
+"""Names of a robot's drives in sentences, tables and figures, by legs or joints and by the kind of drive."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ _MOVED = {True: "drive arm", False: "link"}
 class DriveWords:
     """Words for the drives of one robot.
 
-    names: of the drives' sites; kinds: one of KINDS each; parallel: whether every drive has a leg of its own, which
-    then is named by its number.
+    names: of the drives' sites; kinds: of the drives, each one of KINDS; parallel: whether every drive has a leg of its
+    own, which then is named by its number.
     """
 
     names: tuple[str, ...] = ()
@@ -47,8 +47,8 @@ class DriveWords:
 
     def kinds_of(self, numbers: tuple[int, ...] = ()) -> tuple[str, ...]:
         """Kinds, each once, of the drives of these numbers from 1 on; of all where none of the numbers is a drive's."""
-        own = [self.kinds[number - 1] for number in numbers if 0 < number <= len(self.kinds)]
-        return tuple(dict.fromkeys(own or self.kinds or (TURNING,)))
+        chosen = [self.kinds[number - 1] for number in numbers if 0 < number <= len(self.kinds)]
+        return tuple(dict.fromkeys(chosen or self.kinds or (TURNING,)))
 
 
 def drive_words(robot) -> DriveWords:

@@ -19,8 +19,8 @@ def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, *
 
     A row whose joint has a drive of its own states its range_deg, or range_mm where it slides, and may state home_deg
     or home_mm, by default the range's middle. convention: "standard" or "modified". hands: the rows of each of several
-    arms, by the name of its hand, behind a trunk of the rows; carries: names of the targets that each hand carries, by
-    default its own. Raises ConfigError for unknown keys and missing ranges.
+    arms, by the name of its end effector, behind a trunk of the rows; carries: names of the targets on each end
+    effector, by default its own. Raises ConfigError for unknown keys and missing ranges.
     """
     if convention not in _CONVENTIONS:
         raise ConfigError(f"robot {name}: convention is {convention!r}; allowed: {', '.join(_CONVENTIONS)}")
@@ -28,7 +28,7 @@ def from_dh(rows, convention="standard", name="arm", hands=None, carries=None, *
         return _chain(rows, convention, name, options)
     if not hands or len(hands) < 2:
         raise ConfigError(f"robot {name}: hands {', '.join(hands or ()) or 'none'}; allowed: two or more")
-    arms = {hand: _chain([*rows, *more], convention, name, options) for hand, more in hands.items()}
+    arms = {arm: _chain([*rows, *more], convention, name, options) for arm, more in hands.items()}
     return with_hands(arms, 1 + len(rows), carries)
 
 
@@ -37,8 +37,8 @@ def _chain(rows, convention, name, options):
     plain, ranges, homes = [], [], []
     for number, row in enumerate(rows, 1):
         plain.append(_plain(row, f"robot {name}: row {number}"))
-        own = row.get("name", f"q{number}")
-        if set(row) & {"xyz_mm", "rpy_deg"} or own not in row.get("drives", {own: 1.0}):
+        joint = row.get("name", f"q{number}")
+        if set(row) & {"xyz_mm", "rpy_deg"} or joint not in row.get("drives", {joint: 1.0}):
             continue
         unit = "mm" if row.get("sliding") else "deg"
         if f"range_{unit}" not in row:

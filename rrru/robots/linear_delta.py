@@ -8,7 +8,7 @@ import numpy as np
 from rrru.errors import ConfigError
 from rrru.robots.ptt3 import Ptt3
 
-# ASSUME firmware knows only the difference of the radii; this platform radius acts on its tilt only
+# ASSUME firmware states only the difference of the radii; this platform radius acts on its tilt only
 _PLATFORM_MM = 30.0
 
 
@@ -31,10 +31,10 @@ class LinearDelta(Ptt3):
 
 
 def linear_delta(radius_mm, azimuth_rad, arms_mm, endstop_mm, parameter_set, angle_limit_rad=1.0, length_limit_mm=1e4):
-    """The mechanism of a printer, whose sliders stand at minus the way down from their endstops.
+    """The mechanism of a printer, whose slider positions are minus the distance down from their endstops.
 
     radius_mm: tower circle less joint offsets; azimuth_rad, arms_mm, endstop_mm: (3,) per tower; parameter_set:
-    "heights" or "distances" of the 3-PTT. The carriage's height is endstop + sqrt(arm^2 - radius^2) less the way down.
+    "heights" or "distances" of the 3-PTT. The carriage's height is endstop + sqrt(arm^2 - radius^2) less that distance.
     Raises ConfigError for arms that are too short.
     """
     arms = np.asarray(arms_mm, dtype=float)

@@ -1,4 +1,4 @@
-"""3-PTT translational parallel robot (paper B) and, with upright rails, the linear delta: what its controller believes.
+"""3-PTT translational parallel robot (paper B) and, with upright rails, the linear delta: nominal model.
 
 Three carriages run on rails at the azimuths phi_i, screw-driven; two bars of length L side by side, on ball joints, tie
 each to the platform. Robot frame: origin at the static platform's centre in the plane of the rails' zero marks, x
@@ -33,10 +33,10 @@ from rrru.parameters import LEGS
 from rrru.robots.three_legs import Deviation, of_each_leg, of_three_legs, points, three_drives
 from rrru.robots.tripod import BARS, Tripod, pair_of_bars
 
-# columns of the legs' numbers: what the slider adds to, L, a = R - r; azimuth, rise and swing of the rail
+# columns of the legs' numbers: offset of the slider, L, a = R - r; azimuth, rise and swing of the rail
 _SLIDERS, _LINKS = of_each_leg("db", 0), of_each_leg("dL", 1)
 _RAILS = of_each_leg("dphi", 3, "rad") | of_each_leg("rise", 4, "rad") | of_each_leg("swing", 5, "rad")
-# the first two azimuths only: the base's free rotation, which heights and distances do not see, fixes the third
+# the first two azimuths only: heights and distances do not determine the base's rotation, so the third is fixed
 _BASE = ("da", "dphi1", "dphi2")
 
 
@@ -44,8 +44,8 @@ _BASE = ("da", "dphi1", "dphi2")
 class Ptt3(Tripod):
     """The robot with its nominal dimensions in mm and its parameter_set, a key of PARAMETER_NAMES.
 
-    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. "tied" leaves out a = R - r, which horizontal rails
-    cannot tell from the sliders' zeros.
+    rail_inclination_rad: 0 horizontal rails, pi / 2 upright ones. "tied" leaves out a = R - r, which is confounded with
+    the sliders' zero offsets for horizontal rails.
     """
 
     L_mm: float = 350.0  # ASSUME this and the next two: Table 1 is lost
@@ -73,8 +73,8 @@ class Ptt3(Tripod):
         "distances": (*_BASE, *_SLIDERS, *_LINKS),
     }
     SOURCE = "paper B, 2.2; bounds assumed"
-    # ASSUME the ball joints stay level and side by side on a rail that points elsewhere: what turns before the drive
-    # turns back behind it. Only a = R - r is known: an azimuth turns it about the platform's joint
+    # ASSUME the ball joints stay level and side by side on a rail with another direction: a turn before the drive is
+    # undone behind it. Only a = R - r is known: an azimuth turns it about the platform's joint
     COLUMN_SITES = (
         *((("drive", 0, 1.0),), (("a bar", 0, 1.0), ("b bar", 0, 1.0)), (("foot", 0, 1.0),)),
         *((("azimuth", 5, 1.0), ("bracket", 5, -1.0)), (("foot", 4, -1.0), ("upright", 4, 1.0))),

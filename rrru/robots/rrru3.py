@@ -1,4 +1,4 @@
-"""3-RRRU translational parallel robot (paper A): what its controller believes.
+"""3-RRRU translational parallel robot (paper A): the nominal model of its controller.
 
 Robot frame: origin at the centre of the static platform, z DOWN. Leg i stands at azimuth phi_i; with u the radial and v
 the tangential coordinate of the platform's centre in leg i,
@@ -26,13 +26,13 @@ from rrru.robots.three_legs import Deviation, ThreeLegs, of_each, of_each_leg, o
 
 ELBOW_SIGN = {"out": -1.0, "in": 1.0}
 _LINKS, _SEATS = (1, 2, 3), ("foot", "elbow", "knee", "wrist", "cross", "platform")
-# columns of the legs' numbers: what the drive's angle adds to, L1, L2, L3, r - R
+# columns of the legs' numbers: offset of the drive's angle, L1, L2, L3, r - R
 _DRIVES = of_each_leg("dtheta", 0, "rad")
 _OWN_LINKS = {f"dL{leg}{link}": Deviation(link, leg) for leg in LEGS for link in _LINKS}
 _TIED_LINKS = {f"dL{link}": Deviation(link) for link in _LINKS}
 _RADII = {"dR": Deviation(4, factor=-1.0, site=("foot", 0)), "dr": Deviation(4)}
-# The gauge: R and r shift every leg by the same r - R, so that one number, da = dr - dR, stands for both.
-_GAUGED = {"da": Deviation(4, share=2.0)}
+# R and r shift every leg by the same r - R and are not identifiable separately: da = dr - dR replaces both
+_COMBINED = {"da": Deviation(4, share=2.0)}
 
 
 @dataclass(frozen=True)
@@ -57,11 +57,11 @@ class Rrru3(ThreeLegs):
 
     TRACKED = RICHEST = "identifiable"  # by measured positions
     DIMENSIONS = ("L1_mm", "L2_mm", "L3_mm", "R_mm", "r_mm")
-    DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _GAUGED
+    DEVIATIONS = _DRIVES | _OWN_LINKS | _TIED_LINKS | _RADII | _COMBINED
     PARAMETER_NAMES: ClassVar = {
         "published": (*_DRIVES, *_OWN_LINKS, *_RADII),
         "tied": (*_DRIVES, *_TIED_LINKS, *_RADII),
-        "identifiable": (*_DRIVES, *_TIED_LINKS, *_GAUGED),
+        "identifiable": (*_DRIVES, *_TIED_LINKS, *_COMBINED),
         "zero": (*_DRIVES,),
     }
     SOURCE = "paper A, section 2.2; bounds assumed"

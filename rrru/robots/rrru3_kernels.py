@@ -14,8 +14,8 @@ _LAST_STEP_SQUARED = 1e-8
 _MOST_STEPS = 25
 
 _compiled = numba.njit(cache=True, error_model="numpy", fastmath={"contract"})
-# taken up by its caller: a copy of its own would contract products otherwise, and compiled code give other last bits
-# than the same code loaded from the cache
+# inlined by its caller: a separate copy would contract products in another way, and freshly compiled code would give
+# other last bits than the same code loaded from the cache
 _part = numba.njit(forceinline=True, error_model="numpy", fastmath={"contract"})
 
 

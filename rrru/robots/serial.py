@@ -49,8 +49,8 @@ def serial(rows, drive_range, home, modified=False, tool_mm=(0.0, 0.0, 0.0), nam
             point_masses.append(PointMass(link.site, link.mass_kg, shift + turn @ np.asarray(link.com_mm)))
     leg = Leg("arm", (*joints, Joint("flange", "fixed", Z, shift, turn)))
     matrix = np.array(list(coupling.values())).T
-    own = None if np.array_equal(matrix, np.eye(len(matrix))) else matrix
-    legs = Legs((leg,), np.asarray(home, dtype=float), coupling=own)
+    coupled = None if np.array_equal(matrix, np.eye(len(matrix))) else matrix
+    legs = Legs((leg,), np.asarray(home, dtype=float), coupling=coupled)
     end = end_of(legs, leg, legs.home_drives[None])
     return GeneralRobot(
         name=name,
@@ -105,10 +105,10 @@ def _links(rows, modified, robot):
             result.append(_Link(f"frame {number}", "", "fixed", shift, turn, none, {}, **body))
             continue
         along, across, twist = row.get("d", 0.0) * Z, row.get("a", 0.0) * X, turn_about(X, row.get("alpha", 0.0))
-        own, name = turn_about(Z, row.get("theta", 0.0)), row.get("name", f"q{number}")
-        places = (np.zeros(3), own, (along + across, twist))
+        offset, name = turn_about(Z, row.get("theta", 0.0)), row.get("name", f"q{number}")
+        places = (np.zeros(3), offset, (along + across, twist))
         if modified:
-            places = across, twist @ own, (along, np.eye(3))
+            places = across, twist @ offset, (along, np.eye(3))
         kind = "P" if row.get("sliding") else "R"
         site = row.get("name", f"joint {number}")
         result.append(_Link(site, name, kind, *places, dict(row.get("drives", {name: 1.0})), **body))
@@ -135,11 +135,11 @@ def _coupling(joints, robot):
 
 
 def _parts(joints, coupling):
-    """The Parts: drives, each turns or slides its own joint and all that follow, and followers without drives."""
+    """The Parts: drives, each with its own joint and the joints that follow it, and followers without drives."""
     result = []
     for drive, column in coupling.items():
-        own = next(link for link in joints if link.name == drive)
+        driven = next(link for link in joints if link.name == drive)
         twists = {link.site: by * link.twist for link, by in zip(joints, column, strict=True) if by}
-        result.append(Drive(f"{drive}_{own.unit}", own.unit, own.site, twists.pop(own.site), twists))
+        result.append(Drive(f"{drive}_{driven.unit}", driven.unit, driven.site, twists.pop(driven.site), twists))
     followers = [Drive(f"{j.name}_{j.unit}", j.unit, j.site, j.twist) for j in joints if j.name not in j.drives]
     return Parts(drives=tuple(result), followers=tuple(followers))

@@ -1,4 +1,4 @@
-"""What robots with a closed form share: three legs, each with one closure, and a platform that follows them. mm, rad.
+"""Common base of robots with a closed form: three legs, each with one closure, and a platform that follows. mm, rad.
 
 A leg's frame has x outwards, y to the side and z as the robot's; a site's name is its leg's and what it is.
 """
@@ -58,7 +58,7 @@ class ThreeLegs(Robot):
     """Base of the mechanisms, which add `inverse`, `closure_jacobians`, `azimuth_rad`, both limits and `parameter_set`.
 
     DIMENSIONS: fields that must be positive; DEVIATIONS: parameters by name; PARAMETER_NAMES: sets of them by name;
-    SOURCE: of the parameters; nominal_legs (3, k): numbers of the legs, the first what an actuator's value adds to;
+    SOURCE: of the parameters; nominal_legs (3, k): numbers of the legs, the first the offset of an actuator's value;
     COLUMN_SITES: by column where a change acts: sites of a leg, each with the component of its twist and a factor.
     """
 
@@ -83,11 +83,11 @@ class ThreeLegs(Robot):
         """The parameters of the chosen set, nominally zero: the meaning of every vector of deviations (p,)."""
         limits = {"rad": self.angle_limit_rad, "mm": self.length_limit_mm}
         named = {name: self.DEVIATIONS[name] for name in self.PARAMETER_NAMES[self.parameter_set]}
-        bounds = {name: one.share * limits[one.unit] for name, one in named.items()}
+        bounds = {name: deviation.share * limits[deviation.unit] for name, deviation in named.items()}
         return ParameterSet(
             tuple(
-                Parameter(name, one.unit, 0.0, -bounds[name], bounds[name], self.SOURCE, one.leg)
-                for name, one in named.items()
+                Parameter(name, deviation.unit, 0.0, -bounds[name], bounds[name], self.SOURCE, deviation.leg)
+                for name, deviation in named.items()
             )
         )
 
@@ -109,24 +109,24 @@ class ThreeLegs(Robot):
     def identifiable(self, values):
         """Mapping of the parameters, no two of which act alike, from values of any of DEVIATIONS; absent ones are zero.
 
-        NaN for a number that stands for all legs where theirs differ.
+        NaN for a parameter common to all legs where the legs differ.
         """
         changes, result = self.leg_changes(values), {}
         for name in self.parameters.names:
-            one = self.DEVIATIONS[name]
-            legs = changes[:, one.column] / one.factor
-            result[name] = float(legs[one.leg - 1] if one.leg or (legs == legs[0]).all() else np.nan)
+            deviation = self.DEVIATIONS[name]
+            legs = changes[:, deviation.column] / deviation.factor
+            result[name] = float(legs[deviation.leg - 1] if deviation.leg or (legs == legs[0]).all() else np.nan)
         return result
 
     def leg_changes(self, values):
         """Changes (3, k) of the legs' numbers by values of any of DEVIATIONS; a leg's own replaces that of all legs."""
         result = np.zeros(self.nominal_legs.shape)
         for name, value in sorted(values.items(), key=lambda item: self.DEVIATIONS[item[0]].leg):
-            one = self.DEVIATIONS[name]
-            if one.leg:
-                result[one.leg - 1, one.column] = one.factor * value
+            deviation = self.DEVIATIONS[name]
+            if deviation.leg:
+                result[deviation.leg - 1, deviation.column] = deviation.factor * value
             else:
-                result[:, one.column] += one.factor * value
+                result[:, deviation.column] += deviation.factor * value
         return result
 
     @property
@@ -136,14 +136,14 @@ class ThreeLegs(Robot):
 
     def twists_of(self, values):
         """Twists (1, sites, 6) by values of any of DEVIATIONS."""
-        own = {name: value for name, value in values.items() if self.DEVIATIONS[name].site}
-        changes = self.leg_changes({name: value for name, value in values.items() if name not in own})
+        placed = {name: value for name, value in values.items() if self.DEVIATIONS[name].site}
+        changes = self.leg_changes({name: value for name, value in values.items() if name not in placed})
         result, numbers = np.zeros((1, len(self.legs.sites), 6)), self.legs.site_numbers
         for leg in LEGS:
             for change, sites in zip(changes[leg - 1], self.COLUMN_SITES, strict=True):
                 for site, component, factor in sites:
                     result[0, numbers[f"leg {leg} {site}"], component] += factor * change
-            for name, value in own.items():
+            for name, value in placed.items():
                 site, component = self.DEVIATIONS[name].site
                 result[0, numbers[f"leg {leg} {site}"], component] += value
         return result

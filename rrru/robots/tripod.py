@@ -1,4 +1,4 @@
-"""What robots share whose three links all end at one point: the platform's centre lies on three spheres.
+"""Common base of robots whose three links end at one point: the platform's centre is on three spheres.
 
 A link is a pair of bars side by side, a parallelogram that keeps the platform from turning. The driven end of link i,
 moved inwards by the platform's radius, is E_i(q_i); the platform's centre P keeps the link's length from it, which the

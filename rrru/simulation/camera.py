@@ -42,7 +42,7 @@ class Target:
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera as it really is: nobody but the renderer may know it.
+    """The true camera, for the renderer only: estimation must not use it.
 
     distortion: k1, k2, p1, p2; centre_offset_px: optical axis off the chip's middle; blur_px: 1 sigma of the lens's
     point spread; noise_grey: 1 sigma per pixel.
@@ -80,7 +80,7 @@ class Camera:
 
     @cached_property
     def rays(self):
-        """Normalised coordinates (2, fine rows, fine columns) of what falls on every sample of the chip."""
+        """Normalised coordinates (2, fine rows, fine columns) of the ray to every sample of the chip."""
         offset = (np.arange(_FINE) + 0.5) / _FINE - 0.5
         across = (np.arange(self.width_px)[:, None] + offset).ravel()
         down = (np.arange(self.height_px)[:, None] + offset).ravel()

@@ -1,4 +1,4 @@
-"""What every plant offers: nominal controller in front, a robot that is driven behind, a tracker beside."""
+"""Interface of every plant: a nominal controller, the robot that it drives, and a tracker."""
 
 from abc import ABC, abstractmethod
 
@@ -16,11 +16,11 @@ _ONLY_TOOL = Sees()
 
 
 class DrivenRobot(ABC):
-    """A robot whose truth is known: it drives plans and is measured.
+    """A robot with known ground truth: it drives plans and is measured.
 
-    mechanism: the robot that its controller believes in, masses: that one's; non_repeatability_mm: radius of the ball
-    in which the platform lies at random, see `non_repeatability`; rotation_limit_rad: a platform turned further than
-    this from where the nominal one stands counts as unsolved.
+    mechanism: the nominal robot of its controller, masses: of the nominal robot; non_repeatability_mm: radius of the
+    ball in which the platform's position is random, see `non_repeatability`; rotation_limit_rad: a platform turned
+    further than this from the nominal one counts as unsolved.
     """
 
     mechanism: Robot
@@ -30,14 +30,14 @@ class DrivenRobot(ABC):
 
     @abstractmethod
     def posed(self, motion, target):
-        """Poses (n) near targets (n, 3) along a Motion, and twists (n or 1, sites, 6) of all that is off in them."""
+        """Poses (n) near targets (n, 3) along a Motion, and twists (n or 1, sites, 6) of all their errors."""
 
     def run(self, plan, noise_mm, generator, controller=None, sees=_ONLY_TOOL):
         """Drive a plan; returns (measurements, truth) as frames.
 
         controller: positions (n, 3) in the order driven to actuator values (n, 3), by default the nominal inverse
-        kinematics; sees: what the tracker reads beside the tool's position. `measurements` fits the schema of that name
-        with the commanded positions of the plan and the values that the controller sent, `truth` holds the exact
+        kinematics; sees: what the tracker reads besides the tool's position. `measurements` fits the schema of that
+        name with the commanded positions of the plan and the values that the controller sent, `truth` has the exact
         position in the tracker's frame and the platform's rotation, both a row for every reflector at every point.
         Noise is drawn for every row, solved or not, so that one lost point does not change the others.
         """
@@ -62,7 +62,7 @@ class DrivenRobot(ABC):
         return measurements, truth.assign(**vector_columns("true", position), platform_rotation_rad=turned[row])
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan driven through a controller; the nominal mechanism's loads."""
+        """The Motion, input of the effects, of a plan driven through a controller; the nominal mechanism's loads."""
         return make_motion(self.mechanism, self.masses, self.course(plan, controller))
 
     def course(self, plan, controller):
@@ -92,14 +92,14 @@ class DrivenRobot(ABC):
         return np.where(solved[:, None], self.mechanism.measured(poses, twists), np.nan), turned
 
     def _where(self, motion, target):
-        """What `posed` gives, and sizes (n,) of the platform's rotation."""
+        """The result of `posed`, and sizes (n,) of the platform's rotation."""
         poses, twists = self.posed(motion, target)
         turned = poses.turned_from(self.mechanism.near(target, motion.drive).turn)
         return poses, twists, np.linalg.norm(turned, axis=1)
 
 
 def non_repeatability(generator, count):
-    """Points (count, 3) uniform in the unit ball: what clearance does from stop to stop, bounded unlike noise."""
+    """Points (count, 3) uniform in the unit ball: an error by clearance from stop to stop, bounded unlike noise."""
     direction = generator.standard_normal((count, 3))
     radius = generator.random((count, 1)) ** (1.0 / 3.0)
     return radius * direction / np.linalg.norm(direction, axis=1, keepdims=True)

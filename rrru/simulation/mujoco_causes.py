@@ -1,4 +1,4 @@
-"""Causes of a gap as MuJoCo's own elements: each changes an `Edit` at a site of the file, by a size.
+"""Causes of residual errors as MuJoCo's own elements: each changes an `Edit` at a site of the file, by a size.
 
 Sites are names in the MJCF: driven joints (a drive), joints, bodies, connects. A direction is `<name>.x` .. `.z` for
 shifts and `<name>.rx` .. `.rz` for turns: of a body's seat, or of the place where a connect or weld holds its first
@@ -38,7 +38,7 @@ def _warming(edit, site, size):
 
 
 def _actuator_stiffness(edit, site, size):
-    """A drive's servo gives: kp in N mm/rad or N/mm, damped as the file's."""
+    """A drive's servo is compliant: kp in N mm/rad or N/mm, damped as the file's."""
     actuator, (length, force) = edit.drives[_drive(edit, site)], edit.units(site)
     kp = _positive(site, size) * force / length
     actuator.biasprm[2] *= np.sqrt(kp / actuator.gainprm[0])
@@ -47,7 +47,7 @@ def _actuator_stiffness(edit, site, size):
 
 
 def _servo_lag(edit, site, size):
-    """A drive's servo is slow: damping kv of kp times this in s, which its feedforward does not know."""
+    """A drive's servo is slow: damping kv of kp times this in s, which its feedforward does not compensate."""
     actuator = edit.drives[_drive(edit, site)]
     edit.lags[site] = _positive(site, size)
     actuator.biasprm[2] -= size * actuator.gainprm[0]
@@ -67,11 +67,12 @@ def _joint_friction(edit, site, size):
 
 
 def _play(edit, site, size):
-    """Play between a drive's motor and its arm, from stop to stop: rad or mm. Friction on the base holds the arm."""
+    """Backlash between a drive's motor and its arm, full width: rad or mm. Friction on the base holds the arm."""
     joint, name = edit.spec.joint(_drive(edit, site)), f"{site} play"
     if len(joint.parent.joints) > 1:
-        others = ", ".join(one.name for one in joint.parent.joints if one.name != site)
-        raise ConfigError(f"play: {site} shares its body with {others}; allowed: a drive whose body has no other joint")
+        further = ", ".join(same.name for same in joint.parent.joints if same.name != site)
+        allowed = "a drive whose body has no other joint"
+        raise ConfigError(f"play: {site} shares its body with {further}; allowed: {allowed}")
     half, (length, _) = 0.5 * _positive(site, size), edit.units(site)
     ends = {"range": (-half * length, half * length), "limited": LIMITED}
     edit.add_joint(joint.parent.name, name, joint.type, joint.axis, pos=joint.pos, **ends)
@@ -83,15 +84,15 @@ def _play(edit, site, size):
 
 
 def _play_friction(edit, site, size):
-    """The friction that holds an arm within its play: N mm or N; absent, what its weight may need."""
+    """The friction that holds an arm within its backlash: N mm or N; by default enough for its weight."""
     tendon = edit.spec.tendon(f"{_drive(edit, site)} play")
     if tendon is None:
-        raise ConfigError(f"play_friction: {site} has no play; allowed: a drive that play names")
+        raise ConfigError(f"play_friction: {site} has no backlash; allowed: a drive under the key `play`")
     tendon.frictionloss = _positive(site, size) * edit.units(site)[1]
 
 
 def _link_stiffness(edit, site, size):
-    """A body gives against its joint, along or about a direction of its own: N/mm or N mm/rad."""
+    """A body is compliant against its joint, along or about a direction of its own: N/mm or N mm/rad."""
     body, direction = _body_place(edit, site)
     kind, length, force = (_HINGE, 1.0, 1.0 / MM) if direction > 2 else (_SLIDE, 1.0 / MM, 1.0)
     name = f"{site} spring"
@@ -111,7 +112,7 @@ def _clearance(edit, site, size):
     body.parent.add_site(name=names[0])  # where, its Shape says
     body.add_site(name=names[1], pos=joint.pos)
     edit.seats[names[0]] = names[1]
-    # joints in one body share their seat: what is loose there is loose in all directions
+    # joints in one body share their seat: clearance there acts in all directions
     alone = len(body.joints) == 1 and joint.type == _HINGE
     axes = np.linalg.svd(np.array(joint.axis)[None])[2][1:] if alone else np.eye(3)
     for number, axis in enumerate(axes, 1):
@@ -122,7 +123,7 @@ def _clearance(edit, site, size):
 
 
 def _payload(edit, site, size):
-    """A mass at a body's centre that nobody told the controller of: kg."""
+    """A mass at a body's centre that the controller does not know: kg."""
     edit.masses[_known(site, [body.name for body in edit.spec.bodies[1:]], "a body")] = _positive(site, size)
 
 
@@ -158,7 +159,7 @@ CAUSES = {
     "base_tilt": _base_tilt,
     "base_stiffness": _base_stiffness,
 }
-# what shows only while the robot moves
+# causes that act only while the robot moves
 MOVING = ("servo_lag", "speed_friction")
 
 
@@ -174,7 +175,7 @@ def apply(edit, causes):
             except ConfigError as error:
                 raise ConfigError(f"mujoco.causes.{name}: {error}") from None
     if edit.grows and edit.warming_s is None:
-        raise ConfigError("mujoco.causes.warming: no time_s; allowed: the time constant in s beside the sites")
+        raise ConfigError("mujoco.causes.warming: no time_s; allowed: the time constant in s besides the sites")
 
 
 def _known(site, allowed, what):
@@ -196,11 +197,11 @@ def _drive(edit, site):
     return _known(site, tuple(edit.drives), "a drive")
 
 
-def _joint(edit, site, what="a joint", kinds=(_HINGE, _SLIDE, _JOINT.mjJNT_BALL)):
+def _joint(edit, site, noun="a joint", kinds=(_HINGE, _SLIDE, _JOINT.mjJNT_BALL)):
     """The site, if it is a joint of the file of one of these kinds."""
     nominal = edit.nominal
     return _known(
-        site, [nominal.joint(j).name for j in range(nominal.njnt) if _JOINT(nominal.jnt_type[j]) in kinds], what
+        site, [nominal.joint(j).name for j in range(nominal.njnt) if _JOINT(nominal.jnt_type[j]) in kinds], noun
     )
 
 
@@ -214,7 +215,7 @@ def _body_place(edit, site):
 
 
 def _place(edit, site):
-    """Kind, name and number of the direction of what a placement moves."""
+    """Kind, name and number of the direction of the element that a placement moves."""
     name, _, direction = site.rpartition(".")
     held = [one.name for one in edit.spec.equalities if one.objtype == _OBJ.mjOBJ_SITE]
     if direction in DIRECTIONS and name in held:

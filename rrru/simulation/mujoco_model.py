@@ -1,7 +1,7 @@
 """An MJCF made ready to be driven and to be changed by causes: `Edit` holds its MjSpec. Files count in m, N and kg.
 
 Loops are held between named sites, so that a changed length opens the loop instead of moving the anchor. The
-constraints are as stiff as MuJoCo allows at this step: they give with the square of `solref` and with 1 - `solimp`.
+constraints are as stiff as MuJoCo allows at this step: they yield with the square of `solref` and with 1 - `solimp`.
 Contacts and keyframes are left out; home is the first keyframe's pose, else the reference configuration.
 """
 
@@ -16,7 +16,7 @@ from rrru.errors import ConfigError
 MM = 1000.0
 STEP_S = 2e-4
 SOLREF, SOLIMP = (2.0 * STEP_S, 1.0), (0.9999, 0.9999, 1e-4, 0.5, 2.0)
-# ends of a play or clearance: as stiff as loops they would chatter
+# ends of a backlash or clearance: as stiff as loops they would chatter
 SOFTER = (10.0 * STEP_S, 1.0)
 LIMITED = mujoco.mjtLimited.mjLIMITED_TRUE
 PAYLOAD, BASE = "rrru payload", "rrru base"
@@ -29,13 +29,13 @@ class Edit:
     """A model on its way from its file to what is driven.
 
     nominal: the file's compiled model; home: values of qpos by joint; by driven joint: drives, the actuators, servos,
-    their names, lengths, what its mm or rad is in m or rad, offsets in m or rad, and lags in s that its controller does
-    not know. shifts: by place, as causes name it, what it is off by in m or rad; grows: likewise, what it moves by as
-    it warms up with the time constant warming_s; masses: added to bodies in kg; tilt (3,): rotation vector of the base
-    against gravity. damped: by added joint the angular frequency in 1/s of what settles it, None for a spring's own;
+    their names, lengths, factors from its mm or rad to m or rad, offsets in m or rad, and lags in s that its controller
+    does not compensate. shifts: by place, as causes name it, its error in m or rad; grows: likewise, its motion as it
+    warms up with the time constant warming_s; masses: added to bodies in kg; tilt (3,): rotation vector of the base
+    against gravity. damped: by added joint the angular frequency in 1/s of its damper, None for a spring's own;
     leashes: by tendon the two sites that it keeps near each other; brakes: by actuator the leash whose swinging it
-    damps, and a frequency likewise; seats: by site that marks where a body is seated the
-    body's site that lies there at home. prefix: of all names in spec; payload_kg: the heaviest that will be carried.
+    damps, and a frequency likewise; seats: by site that marks where a body is seated the body's site that is there at
+    home. prefix: of all names in spec; payload_kg: the heaviest that will be carried.
     """
 
     spec: mujoco.MjSpec
@@ -60,7 +60,7 @@ class Edit:
     prefix: str = ""
 
     def units(self, joint):
-        """What a mm or rad of a joint, and a N or N mm on it, are in the file's units."""
+        """Factors from mm or rad of a joint, and from N or N mm on it, to the file's units."""
         return (1.0 / MM, 1.0) if self.spec.joint(joint).type == _JOINT.mjJNT_SLIDE else (1.0, 1.0 / MM)
 
     def add_joint(self, body, name, kind, axis, **options):
@@ -101,7 +101,7 @@ def read(file, platform, tool_mm, drives):
 
 
 def set_options(spec, gravity):
-    """Set what does not depend on the robot: step, integrator, solver, and gravity (3,) in m/s^2."""
+    """Set the options common to all robots: step, integrator, solver, and gravity (3,) in m/s^2."""
     option = spec.option
     option.timestep, option.integrator = STEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.tolerance, option.iterations = 1e-14, 200
@@ -110,14 +110,14 @@ def set_options(spec, gravity):
 
 
 def _name_all(spec):
-    """Give names to what has none, so that all can be found again."""
+    """Give names to elements without one, so that all can be found again."""
     for number, body in enumerate(spec.bodies):
         body.name = body.name or f"body {number}"
         for count, joint in enumerate(body.joints, 1):
             joint.name = joint.name or f"{body.name} joint {count}"
     for kind, every in (("equality", spec.equalities), ("actuator", spec.actuators)):
-        for number, one in enumerate(every, 1):
-            one.name = one.name or f"{kind} {number}"
+        for number, element in enumerate(every, 1):
+            element.name = element.name or f"{kind} {number}"
 
 
 def _values(model, joint, qpos):
@@ -138,22 +138,23 @@ def _servos(spec, file, drives):
 
 def _hold_between_sites(spec, nominal):
     """Make connects and welds hold two named sites together where the file's bodies meet; stiffen all equalities."""
-    for one in spec.equalities:
-        one.solref, one.solimp = SOLREF, SOLIMP
-        if one.type not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD):
+    for equality in spec.equalities:
+        equality.solref, equality.solimp = SOLREF, SOLIMP
+        if equality.type not in (_EQ.mjEQ_CONNECT, _EQ.mjEQ_WELD):
             continue
-        data, names = nominal.eq_data[nominal.equality(one.name).id], held_sites(one.name)
-        if one.objtype == _OBJ.mjOBJ_SITE:
-            sites = [spec.site(name) for name in (one.name1, one.name2)]
+        data, names = nominal.eq_data[nominal.equality(equality.name).id], held_sites(equality.name)
+        if equality.objtype == _OBJ.mjOBJ_SITE:
+            sites = [spec.site(name) for name in (equality.name1, equality.name2)]
             bodies = [site.parent.name for site in sites]
             places = [(site.pos, site.quat) for site in sites]
         else:
-            bodies, own = [name or "world" for name in (one.name1, one.name2)], (1.0, 0.0, 0.0, 0.0)
-            connect = one.type == _EQ.mjEQ_CONNECT
-            places = [(data[:3], own), (data[3:6], own)] if connect else [(data[3:6], data[6:10]), (data[:3], own)]
+            bodies, level = [name or "world" for name in (equality.name1, equality.name2)], (1.0, 0.0, 0.0, 0.0)
+            connect = equality.type == _EQ.mjEQ_CONNECT
+            places = [(data[:3], level), (data[3:6], level)]
+            places = places if connect else [(data[3:6], data[6:10]), (data[:3], level)]
         for body, name, (pos, quat) in zip(bodies, names, places, strict=True):
             spec.body(body).add_site(name=name, pos=np.array(pos), quat=np.array(quat))
-        one.objtype, one.name1, one.name2 = _OBJ.mjOBJ_SITE, *names
+        equality.objtype, equality.name1, equality.name2 = _OBJ.mjOBJ_SITE, *names
 
 
 def held_sites(equality):

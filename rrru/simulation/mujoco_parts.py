@@ -1,4 +1,4 @@
-"""What causes add to a model: springs, leashes that leave a clearance, friction that holds, a base. SI units."""
+"""Elements that causes add to a model: springs, leashes that leave a clearance, holding friction, a base. SI units."""
 
 import mujoco
 import numpy as np
@@ -7,16 +7,16 @@ from rrru.simulation.mujoco_model import BASE, LIMITED, SOFTER, SOLIMP, held_sit
 
 _JOINT, _EQ = mujoco.mjtJoint, mujoco.mjtEq
 _SLIDE = _JOINT.mjJNT_SLIDE
-# ASSUME friction holds an arm within its play against this many times its load at home and its share of all weight
+# ASSUME friction holds an arm within its backlash against this many times its load at home and its share of all weight
 _HOLDS = 2.0
-# what hangs in a clearance swings as a pendulum of that length, damped by this share of the critical
+# a body in a clearance swings as a pendulum of that length, damped by this share of the critical damping
 _SWINGING, _G = 0.5, 9.81
 # ASSUME the base is as heavy as all that stands on it, and as wide
 _BASE_RADIUS_M = 0.3
 
 
 def swinging_frequency(gap):
-    """Angular frequency in 1/s, times its damping, of what hangs in a clearance of this in m."""
+    """Angular frequency in 1/s, times its damping, of a body that hangs in a clearance of this in m."""
     return _SWINGING * np.sqrt(_G / gap)
 
 
@@ -47,7 +47,7 @@ def damp_swinging(edit, site, gap):
 
 
 def holding_friction(edit, site):
-    """Friction in N m or N that holds the arm of a drive: more than what loads it at home."""
+    """Friction in N m or N that holds the arm of a drive: more than its load at home."""
     model, data = edit.nominal, mujoco.MjData(edit.nominal)
     for number in range(model.njnt):
         name = model.joint(number).name
@@ -64,12 +64,12 @@ def holding_friction(edit, site):
 
 
 def _static_load(edit, data):
-    """What the drives bear in N m or N in a pose at rest, by joint: the bias that loops cannot bear."""
+    """Load of the drives in N m or N in a pose at rest, by joint: the bias that loops cannot bear."""
     model = edit.nominal
     dofs = [model.joint(name).dofadr[0] for name in edit.drives]
     held = np.zeros((data.ne, model.nv))
-    for row, one in zip(held, np.eye(data.nefc), strict=False):
-        mujoco.mj_mulJacTVec(model, data, row, one)
+    for row, unit in zip(held, np.eye(data.nefc), strict=False):
+        mujoco.mj_mulJacTVec(model, data, row, unit)
     bearing = np.vstack([np.eye(model.nv)[dofs], held])
     return dict(zip(edit.drives, np.linalg.lstsq(bearing.T, data.qfrc_bias)[0], strict=False))
 
@@ -82,7 +82,7 @@ def _hangs_on(model, body, first):
 
 
 def put_on_base(edit):
-    """Hang all that stands on the world on a body of its own; free bodies get slides and a ball joint instead."""
+    """Put all bodies of the world on a base body; free bodies get slides and a ball joint instead."""
     for body in edit.spec.worldbody.bodies:
         if [one.type for one in body.joints] == [_JOINT.mjJNT_FREE]:
             _unfree(edit, body)
@@ -97,14 +97,14 @@ def put_on_base(edit):
 
 def _unfree(edit, body):
     """Three slides and a ball joint of the same pose at home in place of a free joint."""
-    (free,), own = body.joints, edit.nominal.body(body.name)
+    (free,), nominal = body.joints, edit.nominal.body(body.name)
     values, name = edit.home.pop(free.name), free.name
     edit.spec.delete(free)
     turn, back, quat = np.zeros(9), np.zeros(4), np.zeros(4)
-    mujoco.mju_quat2Mat(turn, own.quat)
-    mujoco.mju_negQuat(back, own.quat)
+    mujoco.mju_quat2Mat(turn, nominal.quat)
+    mujoco.mju_negQuat(back, nominal.quat)
     mujoco.mju_mulQuat(quat, back, values[3:])
-    for letter, axis, value in zip("xyz", np.eye(3), turn.reshape(3, 3).T @ (values[:3] - own.pos), strict=True):
+    for letter, axis, value in zip("xyz", np.eye(3), turn.reshape(3, 3).T @ (values[:3] - nominal.pos), strict=True):
         edit.add_joint(body.name, f"{name} {letter}", _SLIDE, axis)
         edit.home[f"{name} {letter}"] = np.array([value])
     body.add_joint(name=f"{name} turn", type=_JOINT.mjJNT_BALL)

@@ -1,4 +1,4 @@
-"""A robot that MuJoCo simulates from its MJCF, with causes of a gap that are MuJoCo's own: a foreign real side."""
+"""A robot that MuJoCo simulates from its MJCF, with MuJoCo's own causes of errors: an independent second simulator."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -67,16 +67,17 @@ class MujocoRobot(DrivenRobot):
 def from_config(mechanism, dimensions, section):
     """The robot of a `virtual_robots:` entry with `mujoco`, of a mechanism that a `robots:` entry with `mjcf` made.
 
-    Raises ConfigError where the entry has effects of our own laws, or the mechanism is from no MJCF.
+    Raises ConfigError where the entry has effects of this package's models, or the mechanism is from no MJCF.
     """
     if "mjcf" not in dimensions:
         raise ConfigError(
             f"virtual robot: mujoco drives {mechanism.name}, which has no mjcf; allowed: a robot with one"
         )
-    own = [key for key in ("errors", "effects") if section.get(key)]
-    own += ["axis_errors"] * any(section.get("axis_errors", {}).get(key) for key in ("position_mm", "angle_rad"))
-    if own:
-        raise ConfigError(f"virtual robot: mujoco and {own[0]} in one entry; allowed: one of them, mujoco has causes")
+    present = [key for key in ("errors", "effects") if section.get(key)]
+    present += ["axis_errors"] * any(section.get("axis_errors", {}).get(key) for key in ("position_mm", "angle_rad"))
+    if present:
+        text = f"mujoco and {present[0]} in one entry; allowed: one of them, mujoco has causes"
+        raise ConfigError(f"virtual robot: {text}")
     robot = MujocoRobot(
         mechanism,
         Path(dimensions["mjcf"]),

@@ -1,7 +1,7 @@
-"""Drives a changed MJCF: from stop to stop at rest, or in time where a cause shows in motion only. SI units inside.
+"""Drives a changed MJCF: from stop to stop at rest, or in time where a cause acts in motion only. SI units inside.
 
-The path between two stops is driven, never jumped, with a smooth start and end, so that play and friction keep what
-they remember. At each point the robot has come to rest and its loops are closed, or an error says how far they are not.
+The path between two stops is driven, never jumped, with a smooth start and end, so that backlash and friction keep
+their states. At each point the robot is at rest and its loops are closed, or an error states how far they are not.
 """
 
 import mujoco
@@ -12,11 +12,11 @@ from rrru.errors import SimulationError, UnreachableError
 from rrru.simulation.mujoco_model import MM, PAYLOAD, STEP_S
 from rrru.simulation.mujoco_shape import Shape
 
-# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: what
-# friction holds creeps in MuJoCo by some um/s
+# a recorded point's loops are open by less, and its platform is slower, angles counted at an arm of half a metre: a
+# body held by friction creeps in MuJoCo by some um/s
 CLOSED_MM, REST_MM_S = 1e-3, 1e-2
 _ARM = 0.5
-# the platform is pushed by a tenth of gravity at most: friction that holds an arm in its play holds it
+# the platform is accelerated by a tenth of gravity at most, so that holding friction still holds an arm in its backlash
 _ACCELERATION = 1.0
 _ASSEMBLY_STEPS, _BLOCKS, _MOST_BLOCKS = 2500, (37, 50), 400
 # peak acceleration of the smooth step 10 s^3 - 15 s^4 + 6 s^5
@@ -51,7 +51,7 @@ class Machine:
         self._balance_leashes()
 
     def _balance_leashes(self):
-        """Tell MuJoCo how heavy what hangs on each leash is: at home it has no length and so no direction."""
+        """Set MuJoCo's inverse weight of each leash: at home a leash has no length and so no direction."""
         model, data = self.model, self._at_home()
         mujoco.mj_forward(model, data)
         for name, sites in self.edit.leashes.items():
@@ -72,13 +72,13 @@ class Machine:
         return data
 
     def _damp_added(self):
-        """Critical damping of what causes have added, so that it comes to rest."""
+        """Critical damping of the joints that causes have added, so that they come to rest."""
         model = self.model
         for name, frequency in self.edit.damped.items():
             joint = model.joint(self.edit.prefix + name)
-            dof, own = joint.dofadr[0], model.dof_M0[joint.dofadr[0]]
-            natural = np.sqrt(model.jnt_stiffness[joint.id] / own) if frequency is None else frequency
-            model.dof_damping[dof] = 2.0 * own * natural
+            dof, inertia = joint.dofadr[0], model.dof_M0[joint.dofadr[0]]
+            natural = np.sqrt(model.jnt_stiffness[joint.id] / inertia) if frequency is None else frequency
+            model.dof_damping[dof] = 2.0 * inertia * natural
         for name, (leash, frequency) in self.edit.brakes.items():
             mass = 1.0 / model.tendon_invweight0[model.tendon(self.edit.prefix + leash).id]
             model.actuator(self.edit.prefix + name).biasprm[2] = -2.0 * mass * frequency
@@ -96,8 +96,8 @@ class Machine:
                 low, high = max(low, model.actuator_ctrlrange[servo, 0]), min(high, model.actuator_ctrlrange[servo, 1])
             out = np.flatnonzero(~((result[:, number] >= low) & (result[:, number] <= high)))
             if out.size:
-                told = f"{joint} is told {result[out[0], number]:g} on its way"
-                raise UnreachableError(f"{self.file}: {told}; allowed: {low:g} to {high:g} (m, rad)")
+                text = f"{joint} is commanded to {result[out[0], number]:g} on its path"
+                raise UnreachableError(f"{self.file}: {text}; allowed: {low:g} to {high:g} (m, rad)")
         return result + [edit.offsets.get(joint, 0.0) for joint in edit.servos]
 
     def drive(self, motion, moving):
@@ -130,7 +130,7 @@ class Machine:
         return np.array(positions), np.array(turns)
 
     def _assemble(self, controls, payload_kg):
-        """Bring the robot from home to its first controls, its weight and what is off growing from nothing."""
+        """Bring the robot from home to its first controls, with weight and errors growing from zero."""
         self._weigh(payload_kg)
         home = np.concatenate([self.edit.home[joint] for joint in self.edit.servos])
         full = np.array(self.model.opt.gravity)
@@ -170,7 +170,7 @@ class Machine:
             raise SimulationError(f"{self.file}: {where}: loops are open by {open_mm:.3g} mm; allowed: {CLOSED_MM:g}")
 
     def _unburst(self, where):
-        """Raise SimulationError where the simulation has burst, after which MuJoCo began anew."""
+        """Raise SimulationError where the simulation has become unstable, after which MuJoCo resets it."""
         if any(self.data.warning[int(kind)].number for kind in _BURST):
             raise SimulationError(f"{self.file}: {where}: the simulation has become unstable; allowed: softer causes")
 

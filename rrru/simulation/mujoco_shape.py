@@ -1,4 +1,4 @@
-"""What of an MJCF's geometry is off, and what moves as it warms up: seats of bodies and of sites. SI units."""
+"""Geometric errors of an MJCF, constant and by warming up: seats of bodies and of sites. SI units."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,18 +9,18 @@ class Shape:
 
     def __init__(self, edit, model):
         self.edit, self.model = edit, model
-        self.own = {
+        self.nominal = {
             "body": (model.body_pos.copy(), model.body_quat.copy()),
             "site": (model.site_pos.copy(), model.site_quat.copy()),
         }
 
     def write(self, share, seconds):
-        """Write a share of the shifts, and what has grown after a time."""
+        """Write a share of the shifts, and the growth after a time."""
         model, warm = self.model, -np.expm1(-seconds / (self.edit.warming_s or np.inf))
-        for array, own in zip((model.body_pos, model.body_quat), self.own["body"], strict=True):
-            array[:] = own
-        for array, own in zip((model.site_pos, model.site_quat), self.own["site"], strict=True):
-            array[:] = own
+        for array, nominal in zip((model.body_pos, model.body_quat), self.nominal["body"], strict=True):
+            array[:] = nominal
+        for array, nominal in zip((model.site_pos, model.site_quat), self.nominal["site"], strict=True):
+            array[:] = nominal
         for part, places in ((share, self.edit.shifts), (warm, self.edit.grows)):
             for (kind, name, direction), size in places.items():
                 self._move(getattr(model, kind)(self.edit.prefix + name), direction, part * size)

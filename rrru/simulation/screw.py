@@ -1,4 +1,4 @@
-"""Bench of a screw: one slider turned forwards, back and forwards, an encoder beside it (paper B, Fig. 7). mm."""
+"""Bench of a screw: one slider driven forwards, back and forwards, with an encoder at it (paper B, Fig. 7). mm."""
 
 from dataclasses import dataclass
 
@@ -37,8 +37,8 @@ class ScrewBench:
 def encoder_record(robot, leg, payload_kg, bench, place_mm, generator):
     """Record of one slider, leg 1 to 3: pass, commanded_mm and encoder_mm per sample, under a payload.
 
-    The robot stands about `place_mm` (3,), the other two sliders stand still. The encoder sees the carriage, with all
-    that the robot's effects do to its drive. Raises UnreachableError where the travel leaves the reach.
+    The robot is near `place_mm` (3,), the other two sliders do not move. The encoder reads the carriage with all errors
+    of its drive by the robot's effects. Raises UnreachableError where the travel leaves the reach.
     """
     mechanism, (travel, number) = robot.mechanism, bench.path()
     sliders = np.repeat(mechanism.require_reachable(np.reshape(place_mm, (1, 3))), len(travel), axis=0)

@@ -14,7 +14,7 @@ from rrru.kinematics.robot import into_frame
 
 @dataclass(frozen=True)
 class Sees:
-    """What the tracker sees beside the tool's position.
+    """What the tracker reads besides the tool's position.
 
     targets: places (3,) in mm of reflectors on the platform by name, seen one after the other at every point instead of
     the tool; noise_rad: noise of the orientations that it reads, one sigma per axis, None where it reads none.
@@ -25,7 +25,7 @@ class Sees:
 
     @property
     def only_tool(self):
-        """Whether that is nothing."""
+        """Whether it reads nothing but the tool's position."""
         return not self.targets and self.noise_rad is None
 
     def rows(self, count):
@@ -40,20 +40,20 @@ class Sees:
         count = len(poses.position_mm)
         levers = (np.tile(np.asarray(place) - seat, (count, 1)) for place in self.targets.values())
         seen = [poses.point(seat + turned_by(tool[:, 3:], lever) + tool[:, :3]) for lever in levers]
-        return np.stack([into_frame(one, twists[:, 0]) for one in seen], axis=1).reshape(-1, 3)
+        return np.stack([into_frame(place, twists[:, 0]) for place in seen], axis=1).reshape(-1, 3)
 
     def columns(self, robot, poses, twists, generator):
-        """Columns (m,) beside the positions: target, its place, orientations commanded and measured with noise."""
+        """Columns (m,) besides the positions: target, its place, orientations measured with noise."""
         count = len(poses.position_mm)
-        told = {}
+        result = {}
         if self.targets:
-            told["target"] = np.array([*self.targets] * count, dtype=str)
-            told |= rows.vector_columns("target", np.tile([*self.targets.values()], (count, 1)).astype(float))
+            result["target"] = np.array([*self.targets] * count, dtype=str)
+            result |= rows.vector_columns("target", np.tile([*self.targets.values()], (count, 1)).astype(float))
         if self.noise_rad is not None:
             noise = Rotation.from_rotvec(self.noise_rad * generator.standard_normal((count, 3))).as_matrix()
             turns = noise @ orientation(robot, poses, twists)
-            told |= rows.turn_columns("measured", turns[self.rows(count)])
-        return told
+            result |= rows.turn_columns("measured", turns[self.rows(count)])
+        return result
 
 
 def measure(position_mm, noise_mm, generator):

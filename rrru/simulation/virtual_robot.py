@@ -1,4 +1,4 @@
-"""The virtual robot: nominal controller in front, exact closure with its effects behind."""
+"""The virtual robot: a nominal controller, and a plant of exact loop closure with effects."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,18 +14,18 @@ from rrru.kinematics.robot import Robot
 from rrru.robots.rrru3 import Rrru3
 from rrru.simulation.driven import DrivenRobot
 
-# how often loads and where they make the robot stand are found from each other: what sags by a millimetre is still then
-_SAGS = 3
+# fixed-point iterations between loads and the deflected pose: enough for a deflection of a millimetre
+_DEFLECTION_ITERATIONS = 3
 
 
 @dataclass(frozen=True)
 class VirtualRobot(DrivenRobot):
-    """A robot whose truth is known: it drives plans and is measured.
+    """A robot with known ground truth: it drives plans and is measured.
 
-    mechanism: the robot that its controller believes in; deviations: names of any of its parameters to true values;
+    mechanism: the nominal robot of its controller; deviations: names of any of its parameters to true values;
     axis_deviations (sites, 6): displacements of its axes at the robot's sites, or 0; effects: those that act;
-    non_repeatability_mm: radius of the ball in which the platform lies at random, see `non_repeatability`;
-    rotation_limit_rad: a platform turned further than this from where the nominal one stands counts as unsolved.
+    non_repeatability_mm: radius of the ball in which the platform's position is random, see `non_repeatability`;
+    rotation_limit_rad: a platform turned further than this from the nominal one counts as unsolved.
     """
 
     mechanism: Robot = field(default_factory=Rrru3)
@@ -42,21 +42,21 @@ class VirtualRobot(DrivenRobot):
         return self.mechanism.twists_of(self.deviations) + self.axis_deviations
 
     def motion(self, plan, controller):
-        """What the effects may know about a plan; the loads are those where the robot stands, off and sagged.
+        """The Motion of a plan, input of the effects; the loads are those at the true pose, with errors and deflection.
 
-        Where its platform cannot turn they are those at the commanded positions: there a millimetre changes them by a
-        share of a percent, elsewhere by several percent.
+        For a platform that cannot turn they are those at the commanded positions: there a millimetre changes them by a
+        share of a percent, for others by several percent.
         """
         course = self.course(plan, controller)
         motion, sent = make_motion(self.mechanism, self.masses, course), (course.drive, course.position_mm)
         if self.mechanism.orients and any(bears_load(active.effect) for active in self.effects):
-            for _ in range(_SAGS):
+            for _ in range(_DEFLECTION_ITERATIONS):
                 at = standing(self.mechanism, sent, self.posed(motion, course.position_mm))
                 motion = make_motion(self.mechanism, self.masses, course, at)
         return motion
 
     def posed(self, motion, target):
-        """Poses (n) near targets (n, 3), and twists (n, sites, 6) of all that is off."""
+        """Poses (n) near targets (n, 3), and twists (n, sites, 6) of all errors."""
         twists, near = self.twists + together(self.effects, motion).twists, self.mechanism.near(target, motion.drive)
         return self.mechanism.model.solve(motion.drive, near, twists), twists
 

@@ -1,4 +1,4 @@
-"""A file of results is there as a whole or not at all, whatever stops the writing."""
+"""Atomic writing: a file of results exists completely or not at all, whatever stops the writing."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -9,10 +9,10 @@ from rrru.errors import WriteError
 
 @contextmanager
 def whole(*paths: str | Path) -> Iterator[list[Path]]:
-    """Temporary paths beside the files at `paths`, to be written; at the end they take these files' places.
+    """Temporary paths in the folders of the files at `paths`, to be written; at the end they replace these files.
 
-    None is replaced before all are written, and a reader of the old ones goes on reading them. Raises WriteError where
-    the system refuses: the disk is full, the folder may not be written to.
+    None is replaced before all are written, and a reader of the old ones continues to read them. Raises WriteError
+    where the system refuses: the disk is full, the folder may not be written to.
     """
     files = [Path(path) for path in paths]
     partial = [file.parent / f".{file.name}.partial" for file in files]

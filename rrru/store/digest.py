@@ -1,4 +1,4 @@
-"""What a workflow script depends on: the import closure of its code, so that an edit reruns what it changes."""
+"""Dependencies of a workflow script: the import closure of its code, so that an edit reruns the affected jobs."""
 
 import hashlib
 import re
@@ -38,7 +38,7 @@ def code_digest(*modules: str) -> str:
 
 
 def _start(module: str) -> list[Path]:
-    """The file that a path stands for, or that of a dotted name and the `__init__.py` of every folder on the way."""
+    """The file of a path, or that of a dotted name and the `__init__.py` of every folder on the way."""
     if module.endswith(".py"):
         return [ROOT / module]
     if _file(module) is None:

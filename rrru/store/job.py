@@ -1,4 +1,4 @@
-"""What every workflow script runs in: a log file, and errors that a user can read."""
+"""Frame of every workflow script: a log file, and errors as messages for the user."""
 
 import logging
 import sys
@@ -21,7 +21,7 @@ def run(main: Callable[[dict, dict, dict], None], snakemake: Any) -> None:
     except OSError as error:
         sys.exit(f"{log}: cannot be written ({error}); allowed: results_dir in a folder that may be written to")
     logging.captureWarnings(True)
-    # what fonts are made of is of no use to anybody
+    # details of fonts do not concern the user
     logging.getLogger("fontTools").setLevel(logging.WARNING)
     try:
         main(snakemake.params.settings, dict(snakemake.input.items()), dict(snakemake.output.items()))

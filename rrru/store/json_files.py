@@ -10,7 +10,7 @@ from rrru.store.atomic_write import write_text
 
 
 def write(facts: dict[str, Any], path: str | Path) -> None:
-    """Write facts as JSON, as a whole or not at all; numbers of NumPy as plain ones, what is not finite as null."""
+    """Write facts as JSON, completely or not at all; numbers of NumPy as plain ones, non-finite ones as null."""
     text = json.dumps(_plain(facts), indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
     write_text(f"{text}\n", path)
 
@@ -21,11 +21,11 @@ def read(path: str | Path) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Nested facts as JSON can hold them."""
+    """Nested facts in the types of JSON."""
     if isinstance(value, dict):
-        return {str(key): _plain(one) for key, one in value.items()}
+        return {str(key): _plain(part) for key, part in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
+        return [_plain(part) for part in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not np.isfinite(value) else value

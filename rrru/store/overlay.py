@@ -1,4 +1,4 @@
-"""What a search found as an overlay of the configuration."""
+"""Results of a search as an overlay of the configuration."""
 
 import logging
 from pathlib import Path
@@ -9,6 +9,6 @@ from rrru.store.atomic_write import write_text
 
 
 def write(values: dict, misfit: float, path: str | Path) -> None:
-    """Write nested values as YAML with the misfit in its first line, as a whole or not at all."""
+    """Write nested values as YAML with the misfit in its first line, completely or not at all."""
     logging.info("misfit %.4f", misfit)
     write_text(f"# misfit {misfit:.4f}\n" + yaml.safe_dump(values, sort_keys=False), path)

@@ -1,4 +1,4 @@
-"""What a schema is made of, and how it is read from rows of text."""
+"""Parts of a schema, and how it is read from rows of text."""
 
 import re
 from collections.abc import Iterator
@@ -23,7 +23,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """One table: where it lies below results/, what a row is, its columns and the columns that name a row."""
+    """One table: its path below results/, the meaning of a row, its columns and the columns that name a row."""
 
     name: str
     path: str
@@ -53,8 +53,8 @@ def read_tables(text: str) -> tuple[Table, ...]:
 
     A block that begins with "## name | path | key" is a table: lines that describe it, "--", then its columns. A column
     is "name kind description {allowed, values}", continued on indented lines, its kind int, float, str or bool, with ?
-    where it may be null; {xyz} in its name makes one for each axis. A block without a heading holds columns that tables
-    share: there a line of their names stands for them.
+    where it may be null; {xyz} in its name makes one for each axis. A block without a heading has columns that tables
+    share: in a table a line of their names represents them.
     """
     shared: dict[str, tuple[Column, ...]] = {}
     tables = []
@@ -62,9 +62,9 @@ def read_tables(text: str) -> tuple[Table, ...]:
         if not block.startswith("## "):
             shared |= {line.split()[0]: tuple(_columns(line, {})) for line in _lines(block)}
             continue
-        heading, _, rest = block.removeprefix("## ").partition("\n")
+        heading, _, body = block.removeprefix("## ").partition("\n")
         name, path, key = (part.strip() for part in heading.split("|"))
-        description, _, rows = rest.partition("\n--\n")
+        description, _, rows = body.partition("\n--\n")
         columns = tuple(_columns(rows, shared))
         tables.append(Table(name, path, " ".join(description.split()), columns, tuple(key.split())))
     return tuple(tables)

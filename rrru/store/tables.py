@@ -1,4 +1,4 @@
-"""Result tables on disk: parquet with a schema that is checked on writing; a table is either whole or absent."""
+"""Result tables on disk: parquet with a schema that is checked on writing; a table is either complete or absent."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
@@ -22,7 +22,7 @@ def check(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
     """The frame with its columns in the order of a `Table`; raises TableError naming what does not fit."""
     if _fits(table, frame):
         return frame[table.names].reset_index(drop=True)
-    # it makes what can be made to fit so, and names what cannot; loading it takes longer than most tables
+    # pandera converts values where possible and names those that do not fit; loading it takes longer than most tables
     import pandera.errors
 
     try:
@@ -34,7 +34,7 @@ def check(table: Table, frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _fits(table: Table, frame: pd.DataFrame) -> bool:
-    """Whether a frame is what its schema asks for as it stands."""
+    """Whether a frame fits its schema without any conversion."""
     if sorted(frame.columns) != sorted(table.names) or not all(_typed(c, frame[c.name]) for c in table.columns):
         return False
     return not (table.key and frame.duplicated(list(table.key)).any())
@@ -60,7 +60,7 @@ def write(table: Table, frame: pd.DataFrame, path: str | Path) -> None:
 
 
 def typed(table: Table, frame: pd.DataFrame) -> arrow.Table:
-    """A frame as what a file of a `Table` holds, checked."""
+    """A frame as the Arrow table of a `Table`'s file, checked."""
     frame = check(table, frame)
     schema = arrow.schema([arrow.field(c.name, _ARROW[c.kind], c.nullable) for c in table.columns])
     return arrow.Table.from_pandas(frame, schema=schema, preserve_index=False, safe=True).replace_schema_metadata(None)
@@ -86,7 +86,7 @@ def read(
     """The table at a path as a frame, or those of one schema at paths, one below the other.
 
     columns: these alone; rows: (column, operator, value) that all have to hold, or lists of them of which one has to.
-    Of what is not asked for next to nothing is loaded.
+    Other columns and rows are hardly loaded at all.
     """
     return parquet.read_table(paths, columns=columns, filters=rows).to_pandas()
 
@@ -104,7 +104,7 @@ def gather(parts: Iterable[str | Path | arrow.Table], path: str | Path) -> None:
 
 
 def _groups(parts: Iterable[arrow.Table]) -> Iterator[arrow.Table]:
-    """Tables one below the other, cut into groups of rows; the last one has what is left, or nothing."""
+    """Tables one below the other, cut into groups of rows; the last one has the remaining rows, or none."""
     held: list[arrow.Table] = []
     count = 0
     for part in parts:

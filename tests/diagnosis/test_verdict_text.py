@@ -79,8 +79,8 @@ def test_the_sentences_say_what_acts_how_much_how_sure_and_what_next():
         "misses by 0.37 mm at points left out of it (noise taken out)",
         "60 % of that (95 %: 48 % to 78 %) is link flexure in leg 2, ",
         "flexure2 = 1.23 µm/N (95 %: 1.01 to 1.45): ",
-        "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): play ",
-        "play between motor and drive arm.",
+        "20 % (95 %: 16 % to 26 %) is backlash, width1 = width2 = 0.000404 rad (95 %: 0.000365 to 0.000443): backlash ",
+        "backlash between motor and drive arm.",
         "Causes by their share of the gap: link flexure 60 %, backlash 20 %.",
         "Probability that it acts: link flexure 0.98, backlash 0.97. Probability of exactly this answer: 0.97.",
         "10 % (95 %: 8 % to 13 %) does not repeat",
@@ -216,7 +216,7 @@ def test_a_run_that_decides_something_else_follows_what_nothing_decides():
 def test_an_effect_of_one_drive_of_an_arm_is_named_after_the_drive():
     arm = make_mechanism("arm", {"urdf": str(ROOT / "data/models/arm6.urdf")}, parameter_set="zero")
     said = " ".join(answered(drives=drive_words(arm))["sentences"])
-    assert "link flexure at axis2, " in said and " leg " not in said and "play between motor and link." in said
+    assert "link flexure at axis2, " in said and " leg " not in said and "backlash between motor and link." in said
 
 
 def test_every_cause_tells_what_to_inspect_and_what_to_do_by_the_kind_of_the_drives():

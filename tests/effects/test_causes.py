@@ -36,8 +36,11 @@ def test_of_a_drive_that_slides_nothing_is_said_about_gears_and_arms_that_turn(n
 
 def test_of_drives_of_several_kinds_those_at_fault_count():
     words = DriveWords(("a", "b", "c"), (SLIDING, TURNING, TURNING), parallel=False)
-    assert cause_texts("backlash", words, (1,)).meaning == "play between motor and slide, as in a nut, a rack or a belt"
-    assert cause_texts("backlash", words, (3,)).meaning == "play between motor and link"
+    assert (
+        cause_texts("backlash", words, (1,)).meaning
+        == "backlash between motor and slide, as in a nut, a rack or a belt"
+    )
+    assert cause_texts("backlash", words, (3,)).meaning == "backlash between motor and link"
     both = cause_texts("backlash", words).meaning
     assert "slide" in both and "motor and link" in both
 

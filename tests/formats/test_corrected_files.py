@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from rrru.formats.file_changes import Found
 from rrru.formats.mjcf_home import closed_qpos
-from rrru.formats.mjcf_reader import plays_of
+from rrru.formats.mjcf_reader import backlash_joints
 from rrru.formats.mjcf_writer import to_mjcf
 from rrru.formats.robot_file import from_mjcf, from_urdf
 from rrru.formats.urdf_writer import to_urdf
@@ -146,7 +146,7 @@ def test_the_keyframe_is_closed_and_has_a_place_for_every_joint(tmp_path):
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    assert len(plays_of(model)) == 6 and np.abs(data.efc_pos[: data.ne]).max() < 1e-11
+    assert len(backlash_joints(model)) == 6 and np.abs(data.efc_pos[: data.ne]).max() < 1e-11
     assert from_mjcf(path, "plate").parts.columns == robot.parts.columns
 
 
@@ -159,7 +159,7 @@ def test_a_corrected_file_can_be_corrected_again(tmp_path):
     before = from_mjcf(path, "plate")
     again = file_of(tmp_path, to_mjcf(path, "plate", _found(before, second, **more), tmp_path)[0], "again.xml")
     model = mujoco.MjModel.from_xml_path(str(again))
-    assert len(plays_of(model)) == model.ntendon == 1 and model.nsite == 13
+    assert len(backlash_joints(model)) == model.ntendon == 1 and model.nsite == 13
     _check(before, from_mjcf(again, "plate"), second, 10)
     tool = Found({"tool": np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])})
     arm = _written(tmp_path, to_urdf(ARM, tool, tmp_path)[0], "urdf")

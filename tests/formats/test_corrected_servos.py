@@ -8,7 +8,7 @@ import pytest
 
 from rrru.errors import ConfigError
 from rrru.formats.file_changes import Found
-from rrru.formats.mjcf_reader import plays_of
+from rrru.formats.mjcf_reader import backlash_joints
 from rrru.formats.mjcf_writer import to_mjcf
 from rrru.formats.robot_file import from_mjcf
 from rrru.formats.urdf_writer import to_urdf
@@ -53,7 +53,7 @@ def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp,
     found = Found({}, play={0: (1e-3, 1e-5)}, loads={0: load})
     path = file_of(tmp_path, to_mjcf(file, "tip", found, tmp_path)[0], "corrected.xml")
     model = mujoco.MjModel.from_xml_path(str(path))
-    assert bool(len(plays_of(model))) is not friction_alone
+    assert bool(len(backlash_joints(model))) is not friction_alone
     data, places = mujoco.MjData(model), []
     for start, end in pairwise((0.0, 0.02, 0.01, 0.0, 0.01)):
         for control in np.concatenate([np.linspace(start, end, 4000), np.full(2000, end)]):
@@ -66,7 +66,7 @@ def test_a_drive_turns_back_by_its_lost_motion_before_the_arm_does(tmp_path, kp,
 
 def test_what_the_files_cannot_hold_is_said(tmp_path):
     both = {"compliance": {1: (1e-8, 1e-9)}, "play": {4: (1e-4, 1e-6)}}
-    assert to_urdf(ARM, Found({}, **both), tmp_path)[1] == ("compliance of axis2", "play of axis5")
+    assert to_urdf(ARM, Found({}, **both), tmp_path)[1] == ("compliance of axis2", "backlash of axis5")
     file = mjcf(tmp_path, _CRANK, actuators='<motor joint="crank"/>')
     assert to_mjcf(file, "tip", Found({}, compliance={0: (1e-8, 1e-9)}), tmp_path)[1] == (
         "compliance of crank: it has 0 position servos, not one",

@@ -235,7 +235,7 @@ def _without(section, key):
     ("section", "message"),
     [
         (two_arms.section(carries={"third": ["r1"]}), "targets of 'third'; allowed: right, left"),
-        (two_arms.section(carries={"right": ["left"]}), "targets left, left; allowed: one or more a hand"),
+        (two_arms.section(carries={"right": ["left"]}), "targets left, left; allowed: one or more different names"),
         (two_arms.section(hands={"right": two_arms.section()["hands"]["right"]}), "hands right; allowed: two or more"),
         (_without(two_arms.section(carries={"right": ["r"]}), "hands"), "hands none; allowed: two or more"),
         (
@@ -250,7 +250,7 @@ def test_a_wrong_description_is_refused(section, message):
 
 
 def test_a_target_that_no_hand_carries_is_refused():
-    with pytest.raises(ConfigError, match="no hand carries the target 'third'; allowed: right, left"):
+    with pytest.raises(ConfigError, match="no end effector carries the target 'third'; allowed: right, left"):
         ROBOT.guess(DRIVES, ["third"] * COUNT)
 
 

@@ -177,7 +177,10 @@ def test_warming_links_grow_with_time_towards_their_length():
         ({"wear": {"axis2": 1.0}}, "mujoco: unknown cause 'wear'; known: zero_offset, placement"),
         ({"play": {"axis9": 1.0}}, "causes.play: 'axis9' is not a drive; allowed: axis1, axis2"),
         ({"play": {"axis2": -1.0}}, "causes.play: axis2 is -1; allowed: a positive number"),
-        ({"play_friction": {"axis2": 1.0}}, "play_friction: axis2 has no play; allowed: a drive that play names"),
+        (
+            {"play_friction": {"axis2": 1.0}},
+            "play_friction: axis2 has no backlash; allowed: a drive under the key `play`",
+        ),
         ({"clearance": {"shoulder": 1.0}}, "'shoulder' is not a hinge, ball joint or connect; allowed: axis1"),
         ({"placement": {"elbow": 1.0}}, "'elbow' is no direction of a body; allowed: one of base_link"),
         ({"link_stiffness": {"elbow.q": 1.0}}, "'elbow.q' is no direction of a body"),

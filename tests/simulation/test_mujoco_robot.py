@@ -129,7 +129,7 @@ def test_a_robot_that_is_not_at_rest_is_an_error_that_says_where_and_how_fast(mo
 
 def test_drives_beyond_their_range_are_an_error():
     robot = simulated("hexapod")
-    with pytest.raises(UnreachableError, match=r"leg\d is told .* on its way; allowed: -0\.1 to 0\.1"):
+    with pytest.raises(UnreachableError, match=r"leg\d is commanded to .* on its path; allowed: -0\.1 to 0\.1"):
         standing(robot, near_home("hexapod", (0.0, 0.0, 0.0), (0.0, 0.0, 115.0)))
 
 

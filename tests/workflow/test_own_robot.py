@@ -143,7 +143,7 @@ def test_an_arm_from_a_urdf_file_goes_the_whole_way(tmp_path):
     row = fitted.loc[error]
     assert row["true_value"] == pytest.approx(0.002)
     assert "backlash" in result["gap_verdicts"]["effects"].iloc[0]
-    assert "play of axis1" in result["gap_verdicts"]["not_in_model"].iloc[0]
+    assert "backlash of axis1" in result["gap_verdicts"]["not_in_model"].iloc[0]
     # the offset of the second drive is the turn of its joint's seat
     seat = ElementTree.parse(tmp_path / "results/campaigns/own/corrected.urdf").find("joint[@name='axis2']/origin")
     assert float(seat.get("rpy").split()[1]) == pytest.approx(0.002, abs=5e-4)

@@ -1,8 +1,8 @@
-"""Reflectors that the instrument took for others: found by distances on one body, which need no kinematics.
+"""Consistency of reflectors: readings of a wrong reflector, found by distances on one body without kinematics.
 
 Reflectors on the tool keep their distances from each other, whatever the robot does; those on the table keep their
-places in the instrument's frame. A reflector that is off from most of its body's others was taken for another one, or
-was never there. Of two that disagree nobody can tell which one is right: both are marked. Lengths in mm.
+places in the instrument's frame. A reflector that is off from most others of its body was confused with another one, or
+was never there. Of two that disagree it is unknown which one is right: both are marked. Lengths in mm.
 """
 
 import numpy as np
@@ -11,12 +11,12 @@ from rrru.campaign.outliers import MAX_ROBUST_SDS, robust_sd, unless_many
 
 # ASSUME no body bends by a millimetre, and reflectors are further apart than that
 _FAR_MM = 1.0
-# a body on which more than this share is off is none: its reflectors move against each other
+# a body on which more than this share is off is not rigid: its reflectors move against each other
 _MAX_SHARE = 0.2
 
 
 def strays(position_mm, stop, names, on_world):
-    """Which of n readings (n, 3) at stops (n,) are no reading of the reflector of that name, and what they are.
+    """Which of n readings (n, 3) at stops (n,) are no reading of the reflector of that name, and a text on each.
 
     names (n,); on_world (n,): which reflectors are fixed to the world. Returns (marked (n,), texts by row's number),
     such as "base3 lies 210 mm away, where base1 is".
@@ -31,8 +31,8 @@ def strays(position_mm, stop, names, on_world):
     marked = wrong[at, number]
     texts = {}
     for row in np.flatnonzero(marked):
-        others = np.where(fixed[:, None], places, np.where(wrong[at[row], :, None], np.nan, grid[at[row]]))
-        texts[int(row)] = _text(every, number[row], position_mm[row], others, grid)
+        right_mm = np.where(fixed[:, None], places, np.where(wrong[at[row], :, None], np.nan, grid[at[row]]))
+        texts[int(row)] = _text(every, number[row], position_mm[row], right_mm, grid)
     return marked, texts
 
 
@@ -51,7 +51,7 @@ def _apart(grid, body):
     if len(body) < 2:
         return wrong
     distance = np.linalg.norm(grid[:, body, None] - grid[:, None, body], axis=3)
-    # pairs that were never seen together tell nothing
+    # pairs that were never seen together have no usual distance
     together = np.isfinite(distance).any(axis=0)
     usual = np.zeros(together.shape)
     usual[together] = np.nanmedian(distance[:, together], axis=0)
@@ -71,15 +71,15 @@ def _outlying(off):
     return unless_many(off > max(_FAR_MM, MAX_ROBUST_SDS * robust_sd(off[np.isfinite(off)])), _MAX_SHARE)
 
 
-def _text(names, own, position, others, grid):
-    """What a reading of a reflector, by number, is; others (r, 3): where all reflectors are, NaN where unknown."""
-    away = np.linalg.norm(others - position, axis=1)
-    near = int(np.nanargmin(np.where(np.arange(len(names)) == own, np.inf, np.nan_to_num(away, nan=np.inf))))
+def _text(names, number, position, right_mm, grid):
+    """Text on a wrong reading of a reflector, by number; right_mm (r, 3): places of all, NaN where unknown."""
+    away = np.linalg.norm(right_mm - position, axis=1)
+    near = int(np.nanargmin(np.where(np.arange(len(names)) == number, np.inf, np.nan_to_num(away, nan=np.inf))))
     if away[near] < _FAR_MM:
         # on one body the two keep their distance
-        usual = np.nanmedian(np.linalg.norm(grid[:, own] - grid[:, near], axis=1))
-        far = away[own] if np.isfinite(away[own]) else usual
-        return f"{names[own]} lies {far:.3g} mm away, where {names[near]} is"
-    if np.isfinite(away[own]):
-        return f"{names[own]} lies {away[own]:.3g} mm away"
-    return f"{names[own]} does not keep its distance from the others"
+        usual = np.nanmedian(np.linalg.norm(grid[:, number] - grid[:, near], axis=1))
+        far = away[number] if np.isfinite(away[number]) else usual
+        return f"{names[number]} lies {far:.3g} mm away, where {names[near]} is"
+    if np.isfinite(away[number]):
+        return f"{names[number]} lies {away[number]:.3g} mm away"
+    return f"{names[number]} does not keep its distance from the others"

@@ -13,7 +13,7 @@ from rrru.campaign.ingest.columns import REQUIRED, convert, known_columns, resol
 from rrru.campaign.ingest.commands import with_commands
 from rrru.campaign.ingest.contradictions import find_contradiction
 from rrru.campaign.ingest.formats import read_cells
-from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, nuisance_sd
+from rrru.campaign.ingest.geometry import beyond_ranges, check_commands, check_measured, check_sizes, plausibility_notes
 from rrru.campaign.ingest.gross_errors import GrossError, find_gross_error, frame_advice
 from rrru.campaign.ingest.gross_file import ORDINARY_SHARE, GrossFile
 from rrru.campaign.ingest.guess import guess_columns
@@ -69,10 +69,10 @@ def ingest(spec: IngestSpec, mechanism: Robot) -> Ingested:
         residual = f"residual {registration.rms_mm:.4g} mm rms, {registration.max_mm:.4g} mm at most{zeros}"
         notes += [
             f"measured positions registered to the commanded ones at {registration.points} points: {residual}; the "
-            "rigid motion that is left is fitted with the calibration"
+            "remaining rigid motion is fitted with the calibration"
         ]
     if not (mounted and mounted.zeros_lost):
-        notes += _doubts_of_robot(sheet)
+        notes += _large_error_notes(sheet)
     table, more = _table(sheet, mounted, registration, digit_mm)
     if len(repeated):
         table.loc[sheet.frame.index.isin(repeated.index), "status"] = "stale"
@@ -95,7 +95,7 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
     found, extra = resolve(spec, cells, mechanism, problems, guess_columns(cells, mechanism, spec.columns))
     notes = list(cells.notes)
     if extra:
-        notes.append(f"left out, as nobody declared them: {', '.join(extra)}")
+        notes.append(f"undeclared columns left out: {', '.join(extra)}")
     drives = [*mechanism.parts.columns]
     spec.check_drives(drives)
     frame = spec.as_meant(convert(spec, mechanism, found, cells, problems), drives)
@@ -115,10 +115,10 @@ def _read(spec: IngestSpec, mechanism: Robot) -> tuple[Sheet, list[str]]:
 
 
 def _refuse_gross_error(sheet: Sheet, unit_stated: bool) -> list[str]:
-    """Raise IngestError where a mistake in the file explains why it is far from the robot, or it is of another one.
+    """Raise IngestError where a mistake in the file explains its distance from the robot, or it is of another robot.
 
-    unit_stated: whether the file's header states the unit of what was measured. A note where commanded positions and
-    drive values do not agree, whatever is changed.
+    unit_stated: whether the file's header states the unit of what was measured. Returns a note where commanded
+    positions and drive values do not agree, whatever is changed.
     """
     robot, driven = sheet.mechanism, set(sheet.drives) <= set(sheet.frame)
     contradiction = find_contradiction(sheet.frame, sheet.spec, robot, sheet.found)
@@ -155,22 +155,22 @@ def _refuse(sheet: Sheet, gross: GrossError, driven: bool) -> None:
 
 
 def _gross_file(sheet: Sheet) -> GrossFile | None:
-    """The columns of a sheet as gross mistakes are looked for in them."""
+    """The columns of a sheet in the form in which gross mistakes are searched."""
     return GrossFile.of(sheet.frame, sheet.spec, sheet.mechanism, sheet.found, unit_stated=True)
 
 
-def _doubts_of_robot(sheet: Sheet) -> Iterator[str]:
-    """A note where the nominal robot misses by more than its parts' errors usually make, wherever the instrument is."""
+def _large_error_notes(sheet: Sheet) -> Iterator[str]:
+    """A note where the nominal robot's error is larger than usual part errors make it, after registration."""
     file, size = _gross_file(sheet), sheet.mechanism.size_mm
     rms_mm = 0.0 if file is None or not len(file) else file.hypothesis(file.given).rms_mm
     if ORDINARY_SHARE * size < rms_mm < np.inf:
         share = f"{rms_mm:.3g} mm rms, {100.0 * rms_mm / size:.1f} % of the robot's size of {size:.4g} mm"
         usual = f"errors of its parts are usually below {100.0 * ORDINARY_SHARE:g} %"
-        yield f"the nominal robot misses by {share}, {usual}: see that `robot` is right"
+        yield f"the nominal robot has an error of {share}, {usual}: see that `robot` is right"
 
 
 def _notes_on_columns(sheet: Sheet) -> list[str]:
-    """What the user should know about columns that are not there or hold nothing."""
+    """Notes on columns that are missing or blank."""
     notes, frame, found = [], sheet.frame, sheet.found
     for name in ("time_s", "speed_mm_s", "payload_kg"):
         blank = f"column {found.get(name)} is blank: {name} is unknown"
@@ -192,29 +192,29 @@ def _notes_on_columns(sheet: Sheet) -> list[str]:
 def _table(
     sheet: Sheet, mounted: Mounting | None, registration: Registration | None, digit_mm: float
 ) -> tuple[pd.DataFrame, list[str]]:
-    """Frame in the form of the schema of measurements, and notes on what is strange and on outliers."""
+    """Frame in the form of the schema of measurements, and notes on implausible values and on outliers."""
     frame, drives = at_tool(sheet, mounted).frame, sheet.drives
     values, turned = sheet.actuators(command(frame)), set(TURNS["measured"]) <= set(frame)
     wrong = mounted.strays if mounted else np.zeros(len(frame), dtype=bool)
     places = partial(places_instead, sheet)
-    notes = [*nuisance_sd(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
+    notes = [*plausibility_notes(frame[~wrong], sheet.mechanism, places), *beyond_ranges(values, sheet.mechanism)]
     outlier = outliers(frame, digit_mm) | wrong
-    told = dict(zip(drives, values.T, strict=True))
+    computed = dict(zip(drives, values.T, strict=True))
     if turned or mounted or sheet.mechanism.orients:
-        told |= turn_columns("command", sheet.poses.turn)
+        computed |= turn_columns("command", sheet.poses.turn)
     if turned and registration and not mounted:
-        told |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
+        computed |= turn_columns("measured", registration.rotation @ turns(frame, "measured"))
     if mounted:
-        told |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
+        computed |= mounted.columns(frame, registration.rotation if registration else np.eye(3))
     if sheet.spec.motion:
-        told |= sheet.spec.motion.columns()
-    frame = sheet.frame.assign(**told, status=np.where(outlier, "outlier", "ok"))
+        computed |= sheet.spec.motion.columns()
+    frame = sheet.frame.assign(**computed, status=np.where(outlier, "outlier", "ok"))
     if outlier.any():
         where = ", ".join(f"row {row}" for row in frame.index[outlier][:10])
         more = ", ..." if outlier.sum() > 10 else ""
         count = int(outlier.sum())
         points = "1 point marked as outlier" if count == 1 else f"{count} points marked as outliers"
-        notes.append(f"{points}, kept and left out of fits: {where}{more}")
+        notes.append(f"{points}, in the table but not in fits: {where}{more}")
     moved = ("time_s", *COMMAND, *drives, *MEASURED, "speed_mm_s", "payload_kg")
     optional = (*TURNS["command"], *TURNS["measured"], *NOISE, "temperature_c", "target", *TARGET, "target_on")
     extra = [name for name in (*optional, "motion", "motion_between") if name in frame]

@@ -99,15 +99,15 @@ def table(names, rows, numbers, problems, commas=frozenset()):
         value = f"a header ({', '.join(names)}) and no row"
         problems.refuse_now(value=value, allowed="one row per measured point below the header")
     numbered = zip(numbers, rows, strict=False)
-    whole = [(number, row) for number, row in numbered if _is_whole(number, row, len(names), problems)]
-    if not whole:
+    complete = [(number, row) for number, row in numbered if _is_whole(number, row, len(names), problems)]
+    if not complete:
         problems.refuse()
-    columns = zip(*(row for _, row in whole), strict=True)
-    return Cells(names, [number for number, _ in whole], dict(zip(names, columns, strict=True)), commas=commas)
+    columns = zip(*(row for _, row in complete), strict=True)
+    return Cells(names, [number for number, _ in complete], dict(zip(names, columns, strict=True)), commas=commas)
 
 
 def decode(data, problems, allowed=_TEXT, others=()):
-    """Text of the bytes; a UTF-8 byte-order mark is accepted. others: encodings that are tried beside UTF-8."""
+    """Text of the bytes; a UTF-8 byte-order mark is accepted. others: encodings that are tried besides UTF-8."""
     if known := looks_like(data):
         problems.refuse_now(value=known, allowed=allowed)
     wide = data.startswith(_UTF16)

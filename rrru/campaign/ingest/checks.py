@@ -131,7 +131,8 @@ def _check_order(sheet):
 def stale(sheet, digit_mm):
     """Rows that repeat an earlier reading in every digit: a series of the earlier row's number by theirs.
 
-    At the same command only where the file is fine enough to tell; digit_mm: last digit of its positions.
+    At the same command only where the file's resolution excludes equality by chance; digit_mm: last digit of its
+    positions.
     """
     known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
     first, command = _first_alike(known, MEASURED), known[[*COMMAND]]

@@ -7,7 +7,7 @@ import numpy as np
 _ISO = "a date and a time of day, 2026-03-04 10:11:12.345"
 
 
-def tells_clock(cells, pattern):
+def is_clock(cells, pattern):
     """Whether a column of cells holds times of day, not seconds; pattern: as it is declared, None where it is not."""
     first = next((cell for cell in cells if cell is not None and cell != ""), None)
     return pattern is not None or isinstance(first, datetime) or (isinstance(first, str) and ":" in first)
@@ -17,7 +17,7 @@ def seconds(cells, rows, theirs, pattern, problems):
     """Seconds (n,) since the earliest of n cells, NaN where one is noted.
 
     pattern: of strptime, such as "%d.%m.%Y %H:%M:%S"; None takes ISO 8601 alone, as no other order of day and month
-    can be told. Local times are taken as they stand: a clock that is put back shows as time that runs backwards.
+    is unambiguous. Local times are used as they are: a clock that is put back shows as time that runs backwards.
     """
     times, allowed = [], f"{_ISO}; other forms are stated: time_format: '%d.%m.%Y %H:%M:%S'"
     if pattern:

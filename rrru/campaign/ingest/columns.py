@@ -1,4 +1,4 @@
-"""From a file's cells to columns under our names, in mm and rad; every cell that is not what it should be is noted."""
+"""From a file's cells to columns under our names, in mm and rad; every cell that is not as expected is noted."""
 
 import difflib
 import re
@@ -7,7 +7,7 @@ from decimal import Decimal
 import numpy as np
 import pandas as pd
 
-from rrru.campaign.ingest.clock import seconds, tells_clock
+from rrru.campaign.ingest.clock import is_clock, seconds
 from rrru.campaign.ingest.orientations import check_orientations
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED, NOISE, QUATERNIONS, TURNS, drive_name
 from rrru.campaign.ingest.spec import MM, RAD
@@ -50,7 +50,7 @@ def known_columns(mechanism):
 
 
 def resolve(spec, cells, mechanism, problems, guessed=None):
-    """{our name: the file's name} of the columns that a file's Cells have, and those that nobody declared.
+    """{our name: the file's name} of the columns that a file's Cells have, and the undeclared columns.
 
     guessed: {our name: the file's name} of what undeclared columns look like, which messages propose. Missing columns,
     repeated ones, other units and, unless `extra_columns` is "ignore", undeclared ones are noted.
@@ -68,7 +68,7 @@ def resolve(spec, cells, mechanism, problems, guessed=None):
         if ours in found and (stated := unit_of(found[ours])) in others:
             allowed = f"{unit}: convert the column, and its name"
             problems.add("unit", column=found[ours], value=f"the unit {stated}", allowed=allowed)
-    # drive values tell where the robot was sent as well
+    # drive values determine the commanded positions as well
     sent = set(drives) <= set(found) and not set(COMMAND) & set(found)
     for ours, theirs in wanted.items():
         if ours not in found and ((ours in REQUIRED and not (sent and ours in COMMAND)) or ours in spec.columns):
@@ -97,16 +97,16 @@ def resolve(spec, cells, mechanism, problems, guessed=None):
             shown = name or f"(no name, column {names.index(name) + 1}; pandas writes its index so)"
             advice = _advice(_nearest(name, unused), name)
             allowed = f"extra_columns: ignore, which leaves it out{advice}; known: {', '.join(wanted)}"
-            problems.add("unknown column", column=shown, value="a column that nobody declared", allowed=allowed)
+            problems.add("unknown column", column=shown, value="an undeclared column", allowed=allowed)
     return found, extra
 
 
-def convert(spec, mechanism, found, told, problems):
+def convert(spec, mechanism, found, file, problems):
     """Frame of our columns in mm and rad, indexed by the row numbers (n,); NaN, or "" as a name, where a cell is noted.
 
-    found: {our name: the file's name}; told: the file's Cells. An optional column without any value is left out.
+    found: {our name: the file's name}; file: its Cells. An optional column without any value is left out.
     """
-    cells, rows = told.cells, told.rows
+    cells, rows = file.cells, file.rows
     measured = [found[name] for name in MEASURED if name in found]
     missed = np.array([bool(measured) and all(_blank(cells[name][i]) for name in measured) for i in range(len(rows))])
     for row in np.asarray(rows)[missed]:
@@ -118,19 +118,19 @@ def convert(spec, mechanism, found, told, problems):
     filled |= set(drives) if filled & set(drives) else set()
     factor = dict.fromkeys((*COMMAND, *MEASURED, *NOISE), MM[spec.unit])
     factor |= {name: MM[spec.unit_of_drives] if unit == "mm" else RAD[spec.angle_unit] for name, unit in drives.items()}
-    factor |= {ours: told.factors[theirs] for ours, theirs in found.items() if theirs in told.factors}
+    factor |= {ours: file.factors[theirs] for ours, theirs in found.items() if theirs in file.factors}
     frame = pd.DataFrame(index=pd.Index(rows))
     blank = _blank_groups(found, cells, len(rows))
     for ours, theirs in found.items():
         if ours in _TEXT:
             names = _names(ours, cells[theirs], rows, theirs, problems)
             frame[ours] = pd.Series(names, index=frame.index, dtype=object)
-        elif ours == "time_s" and ours in filled and tells_clock(cells[theirs], spec.time_format):
+        elif ours == "time_s" and ours in filled and is_clock(cells[theirs], spec.time_format):
             frame[ours] = seconds(cells[theirs], rows, theirs, spec.time_format, problems)
         elif ours in filled and ours != "name":
             skipped = missed & (ours in MEASURED) | blank.get(ours, False)
-            scale = factor.get(ours, 1.0) * told.spreads.get(theirs, 1.0)
-            numbers = _numbers(cells[theirs], rows, theirs, skipped, problems, theirs in told.commas)
+            scale = factor.get(ours, 1.0) * file.spreads.get(theirs, 1.0)
+            numbers = _numbers(cells[theirs], rows, theirs, skipped, problems, theirs in file.commas)
             frame[ours] = scale * numbers
     _check_limits(frame, found, problems)
     return check_orientations(frame, found, problems)
@@ -217,5 +217,5 @@ def _nearest(name, candidates):
 
 
 def _advice(ours, theirs):
-    """How to say that the file's name stands for ours."""
+    """The `columns` entry that maps the file's name to ours."""
     return f'; if {theirs!r} is meant as {ours}: columns: {{{ours}: "{theirs}"}}' if ours and theirs else ""

@@ -1,7 +1,7 @@
-"""What was commanded, from a second file: lists of trackers hold what was measured alone.
+"""Commanded positions from a second file: point lists of trackers hold measured positions alone.
 
-The rows of both files are joined by the points' names where both have them, else by their order. Names that stand
-once in every trajectory, as the groups of a point list have them, are told apart by these.
+The rows of both files are joined by the points' names where both have them, else by their order. Names that occur
+once in every trajectory, as in the groups of a point list, are distinguished by the trajectory.
 """
 
 from collections import Counter
@@ -15,15 +15,15 @@ _ONE = "all"
 
 
 def with_commands(spec, measured, problems):
-    """The Cells of a file with the columns of `spec.commands` beside its own.
+    """The Cells of a file with the columns of `spec.commands` in addition to its own.
 
-    A list of a tracker in which nobody names trajectories is one. Raises IngestError where the files do not belong
+    A tracker's list without names of trajectories is one trajectory. Raises IngestError where the files do not belong
     together.
     """
     if spec.commands is not None:
-        told = Problems(spec.commands)
-        commanded = read_cells(Path(spec.commands), spec.commands_format, told)
-        told.refuse()
+        problems_of_commands = Problems(spec.commands)
+        commanded = read_cells(Path(spec.commands), spec.commands_format, problems_of_commands)
+        problems_of_commands.refuse()
         measured = _joined(spec, measured, commanded, problems)
     name = spec.columns.get("trajectory", measured.means.get("trajectory", "trajectory"))
     if measured.means and name not in measured.names and "trajectory" not in spec.columns:
@@ -35,21 +35,22 @@ def with_commands(spec, measured, problems):
 
 def _joined(spec, measured, commanded, problems):
     """Cells of both, a row per measured one; the commands' names of trajectories count before those of a list."""
-    keys, own = _keys(spec, measured, commanded)
-    for name in own:
+    keys, added = _keys(spec, measured, commanded)
+    for name in added:
         if name in measured.names:
             value = f"a column of this name here and in {spec.commands}"
             problems.add("repeated column", column=name, value=value, allowed="each name in one of the files")
     problems.refuse()
     at, note = _places(spec.commands, keys, measured, commanded, problems)
     problems.refuse()
-    problems.elsewhere(spec.commands, own, {row: commanded.rows[i] for row, i in zip(measured.rows, at, strict=True)})
+    rows = {row: commanded.rows[i] for row, i in zip(measured.rows, at, strict=True)}
+    problems.elsewhere(spec.commands, added, rows)
     group = measured.means.get("trajectory") if _column(spec, commanded, "trajectory") else None
     means = {ours: theirs for ours, theirs in measured.means.items() if theirs != group}
     return replace(
         measured,
-        names=[*measured.names, *own],
-        cells={**measured.cells, **{name: [commanded.cells[name][i] for i in at] for name in own}},
+        names=[*measured.names, *added],
+        cells={**measured.cells, **{name: [commanded.cells[name][i] for i in at] for name in added}},
         means={**commanded.means, **means},
         factors={**commanded.factors, **measured.factors},
         spreads={**commanded.spreads, **measured.spreads},
@@ -68,9 +69,9 @@ def _column(spec, cells, ours):
 def _keys(spec, measured, commanded):
     """Names of the points of both files, None where one has none, and the commands' columns that are added."""
     columns = [_column(spec, cells, "name") for cells in (measured, commanded)]
-    own = [name for name in commanded.names if name != columns[1]]
+    added = [name for name in commanded.names if name != columns[1]]
     if None in columns:
-        return None, own
+        return None, added
     files = (measured, commanded)
     names = [[str(name).strip() for name in cells.cells[column]] for cells, column in zip(files, columns, strict=True)]
     groups = [_column(spec, cells, "trajectory") for cells in files]
@@ -80,7 +81,7 @@ def _keys(spec, measured, commanded):
             [f"{str(path).strip()} {name}" for path, name in zip(each, own_names, strict=True)]
             for each, own_names in zip(paths, names, strict=True)
         ]
-    return names, own
+    return names, added
 
 
 def _places(file, keys, measured, commanded, problems):

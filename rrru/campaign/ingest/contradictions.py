@@ -1,7 +1,7 @@
 """Commanded positions and drive values of one file: whether they agree to 0.01 mm, and what makes them agree.
 
-Both are computed or printed, not measured: what is right makes them agree to the last digit, in the robot's own frame,
-so that no probability is needed. Lengths in mm, angles in rad.
+Both are computed or printed, not measured. The right settings make them agree to the last digit, in the robot's own
+frame, so that no probability is needed. Lengths in mm, angles in rad.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,13 +27,13 @@ from rrru.kinematics.robot import Robot
 
 # positions agree within this and what the last digits of the drive values move them by
 TOLERANCE_MM = 0.01
-# rows that tell, and share of them that has to agree
+# smallest number of rows that decides, and share of them that has to agree
 _LEAST_ROWS, _AGREEING = 10, 0.9
 # hypotheses from which two mistakes start
 _MOST_FOLLOWED = 3
 # steps to the zeros of the drives
 _MOST_STEPS = 20
-# a larger difference, as a share of the robot's size, is none of a controller's own calibration; assumed
+# a controller's own calibration differs from the nominal robot by less than this share of its size; assumed
 _SMALL_SHARE = 2e-3
 _STEP = {"mm": 1e-3, "rad": 1e-6}
 
@@ -59,42 +59,42 @@ def find_contradiction(
     """
     if not {*robot.parts.columns, *COMMAND} <= set(frame):
         return None
-    # a hand's tool is commanded, whatever it carries
+    # the commanded point is the tool of the end effector, whichever target it carries
     tools = {name: tuple(robot.tool_mm) for hand in robot.legs.hands for name in hand}
     unused = [*TARGET, *TURNS["measured"], *(() if tools else ("target",))]
     sent = frame.drop(columns=unused, errors="ignore").assign(**rows.vector_columns("measured", rows.command(frame)))
     file = GrossFile.of(sent, replace(spec, targets=tools, world_targets=()), robot, found, False)
     if file is None or len(file) < _LEAST_ROWS:
         return None
-    both = _Both(file)
-    if both.off_mm <= both.tolerance_mm:
+    compared = _Comparison(file)
+    if compared.off_mm <= compared.tolerance_mm:
         return None
-    small = both.off_mm <= _SMALL_SHARE * robot.size_mm
-    if (mistakes := both.mistakes(simple=small)) is not None:
-        return Contradiction(both.off_mm, both.tolerance_mm, _in_words(file, mistakes), True)
-    words = next((f"{one}; or no commanded columns: the drive values are enough" for one in both.moved()), "")
-    return Contradiction(both.off_mm, both.tolerance_mm, words, bool(words) and not (small and robot.orients))
+    small = compared.off_mm <= _SMALL_SHARE * robot.size_mm
+    if (mistakes := compared.mistakes(simple=small)) is not None:
+        return Contradiction(compared.off_mm, compared.tolerance_mm, _in_words(file, mistakes), True)
+    words = next((f"{change}; or no commanded columns: the drive values are enough" for change in compared.moved()), "")
+    return Contradiction(compared.off_mm, compared.tolerance_mm, words, bool(words) and not (small and robot.orients))
 
 
 @dataclass(frozen=True)
-class _Both:
-    """A GrossFile whose measured positions are the commanded ones."""
+class _Comparison:
+    """Commanded positions against drive values: a GrossFile whose measured positions are the commanded ones."""
 
     file: GrossFile
 
     @cached_property
     def nominal(self) -> TargetReadings | None:
-        """Of the commanded positions at the nominal poses of the drive values as they are, None where too few exist."""
+        """TargetReadings of the commanded positions at the nominal poses of the drive values, None for too few."""
         return self.file.readings(self.file.given)
 
     @cached_property
     def off_mm(self) -> float:
-        """Median distance of both as they are."""
+        """Median distance of the commanded positions from those of the drive values, without any change."""
         return float(np.median(_off(self.nominal)))
 
     @cached_property
     def tolerance_mm(self) -> float:
-        """Distance within which both agree: what the last digits of the drive values move the tool by comes on top."""
+        """Distance within which both agree, including the tool's motion by the last digits of the drive values."""
         if self.off_mm <= TOLERANCE_MM or self.nominal is None:
             return TOLERANCE_MM
         file, result = self.file, TOLERANCE_MM

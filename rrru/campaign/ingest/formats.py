@@ -21,7 +21,7 @@ _READERS = {
     "parquet": (parquet_cells, ()),
 }
 KINDS = tuple(_READERS)
-# kinds that a file's ending tells
+# kinds by the file's ending
 _ENDINGS = {".csv": "csv", ".parquet": "parquet", ".xlsx": "xlsx"}
 
 
@@ -54,7 +54,7 @@ class Format:
         return cls(section) if section is None or isinstance(section, str) else cls(**section)
 
     def kind_of(self, path: Path, problems: Problems) -> str:
-        """The kind of a file; refuses one whose ending tells none."""
+        """The kind of a file; refuses an unknown ending where no kind is stated."""
         kind = self.kind or _ENDINGS.get(path.suffix.lower())
         if kind is None:
             allowed = f"{', '.join(_ENDINGS)}, or the format stated: format: {' or '.join(KINDS)}"

@@ -6,7 +6,8 @@ With poses, centre p_i and orientation R_i of what carries a reflector, one at c
 
 with the rotation Q and shift s of the instrument's frame (identity where it is the robot's). The equations are linear
 in s, c and, its orthogonality aside, Q; from that start c and the rigid motion are fitted in turn. A reflector that is
-fixed to the world is carried by the robot's frame; where its place is not known it tells nothing of the instrument's.
+fixed to the world is carried by the robot's frame. Where its place is unknown it does not determine the instrument's
+frame.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -22,11 +23,11 @@ _TURNS, _STILL_MM = 300, 1e-9
 
 @dataclass(frozen=True)
 class Frames:
-    """What is read, whatever the poses.
+    """Readings of reflectors, independent of the poses.
 
     seen_mm (n, 3): readings in the instrument's frame; names (n,) of the reflectors; place_mm (n, 3): known places of
-    these, NaN where nobody knows; on_world (n,): which are fixed to the world; right (n,): which are readings at all;
-    registered: whether the instrument's frame is its own.
+    these, NaN where unknown; on_world (n,): which are fixed to the world; right (n,): which are readings of the named
+    reflector; registered: whether the instrument's frame is its own.
     """
 
     seen_mm: np.ndarray
@@ -36,8 +37,8 @@ class Frames:
     right: np.ndarray
     registered: bool
 
-    def of(self, rows):
-        """What is read in some rows."""
+    def select(self, rows):
+        """The readings of some rows."""
         parts = {f.name: getattr(self, f.name) for f in fields(self)}
         return Frames(**{name: part[rows] if isinstance(part, np.ndarray) else part for name, part in parts.items()})
 
@@ -47,8 +48,8 @@ class Frames:
         return np.isfinite(self.place_mm).all(axis=1)
 
     @property
-    def telling(self):
-        """Rows (n,) that tell where the instrument stands."""
+    def framing(self):
+        """Rows (n,) that determine the instrument's frame."""
         return self.right & (self.known | ~self.on_world)
 
     def carriers(self, poses):
@@ -62,13 +63,13 @@ class Frames:
         if not self.registered:
             return np.eye(3), self._placed(carriers, self.seen_mm)
         rotation, shift = self._linear(carriers)
-        place, telling = np.full(self.seen_mm.shape, np.inf), self.telling
+        place, framing = np.full(self.seen_mm.shape, np.inf), self.framing
         for _ in range(_TURNS):
             moved = self._placed(carriers, self.seen_mm @ rotation.T + shift)
             still = np.abs(moved - place).max() < _STILL_MM
             place = moved
             try:
-                found = register(self.seen_mm[telling], carriers.point(place)[telling])
+                found = register(self.seen_mm[framing], carriers.point(place)[framing])
             except FitError:
                 break
             rotation, shift = found.rotation, found.translation
@@ -79,23 +80,24 @@ class Frames:
     def framed(self, poses, fitted=None):
         """The Framed of Poses (n), of the rows that determine something; fitted: what `fitted` gives of them."""
         rotation, place = fitted or self.fitted(poses)
-        model, turned, rows = self.carriers(poses).point(place), self.seen_mm @ rotation.T, self.telling
+        model, turned, rows = self.carriers(poses).point(place), self.seen_mm @ rotation.T, self.framing
         shift = np.median(model[rows] - turned[rows], axis=0) if self.registered else 0.0
         unknown = tuple(dict.fromkeys(self.names[~self.known & rows].tolist()))
         return Framed((turned + shift)[rows], model[rows], place[rows], unknown)
 
     def _placed(self, carriers, seen_mm):
-        """Places (n, 3): those known, and of the others the medians of where they are seen, in the robot's frame."""
+        """Places (n, 3): the known ones, and medians of the readings on the carrier for the others."""
         result, known = self.place_mm.copy(), self.known
-        own = np.einsum("nji,nj->ni", carriers.turn, seen_mm - carriers.position_mm)
+        on_carrier = np.einsum("nji,nj->ni", carriers.turn, seen_mm - carriers.position_mm)
         for name in dict.fromkeys(self.names[~known].tolist()):
             its = self.names == name
-            result[its] = np.median(own[its & self.right] if (its & self.right).any() else own[its], axis=0)
+            used = its & self.right if (its & self.right).any() else its
+            result[its] = np.median(on_carrier[used], axis=0)
         return result
 
     def _linear(self, carriers):
-        """Start of `fitted`: least squares of the linear equations, the matrix of them made a rotation."""
-        rows = self.telling
+        """Start of `fitted`: least squares of the linear equations, whose matrix is projected to a rotation."""
+        rows = self.framing
         carriers, seen, names, place = carriers.of(rows), self.seen_mm[rows], self.names[rows], self.place_mm[rows]
         known = np.isfinite(place).all(axis=1)
         unknown = list(dict.fromkeys(names[~known].tolist()))

@@ -10,10 +10,10 @@ from rrru.campaign.ingest.spec import MM
 
 # Files print drive angles with six decimals and positions with three or more, sometimes two.
 DRIVE_TOLERANCE = {"rad": 1e-4, "mm": 0.01}
-# ASSUME no robot's positions are off by a twentieth of its size in the median: if they seem so, the frames differ. A
-# hundredth of it is strange enough for a note.
+# ASSUME no robot's positions are off by a twentieth of its size in the median: if they are, the frames differ. A
+# hundredth of it is implausible enough for a note.
 _FRAME_SHARE, _STRANGE_SHARE = 0.05, 0.01
-# what leaves less than this share of a distance explains it
+# a change that leaves less than this share of a distance explains it
 _SMALL_SHARE = 0.2
 # Margin beyond the farthest reachable point, where an outlier may still lie.
 _REACH_MARGIN = 1.1
@@ -21,7 +21,7 @@ _MOST, _MANY = 0.9, 0.5
 
 
 def check_commands(sheet):
-    """Note commanded positions out of reach and drive values that contradict them; whether the unit can be right."""
+    """Note commanded positions out of reach and drive values that contradict them; True where the unit can be right."""
     known = sheet.frame.dropna(subset=[*COMMAND])
     command = rows.command(known)
     if not len(known):
@@ -36,7 +36,7 @@ def check_commands(sheet):
         allowed = f"a position that the robot reaches; it is {sheet.mechanism.unreached(drive[i], as_home)}"
         sheet.note("reach", COMMAND, position_text(command[i]), allowed, known.index[i])
     flipped = _upside_down(command[reached], drive[reached], sheet)
-    # positions that were computed from the drive values tell nothing of these
+    # positions that were computed from the drive values cannot check these
     if set(COMMAND) <= set(sheet.found) and set(sheet.drives) <= set(known) and not flipped:
         _check_drives(known[reached], drive[reached], sheet)
     return True
@@ -45,7 +45,7 @@ def check_commands(sheet):
 def _check_poses(known, command, sheet):
     """Note drive values that bring the nominal robot elsewhere than commanded; True.
 
-    Of a robot that can orient its platform the commanded positions alone do not tell the drive values.
+    For a robot that can orient its platform the commanded positions alone do not determine the drive values.
     """
     back = sheet.mechanism.forward(known[[*sheet.drives]].to_numpy(), guess_mm=command)
     off, limit = np.linalg.norm(back - command, axis=1), frame_limit(sheet.mechanism)
@@ -57,10 +57,10 @@ def _check_poses(known, command, sheet):
 
 
 def check_sizes(sheet, offset_mm=0.0):
-    """Note measured positions in another unit than the commanded ones; whether both have the same.
+    """Note measured positions in another unit than the commanded ones; True where both have the same unit.
 
     Their spreads are compared, which are the same in every frame. offset_mm (n, 3): of what is measured from the tool.
-    A reflector on a platform that turns may move far less or more than the tool where nobody states its place.
+    A reflector without a stated place on a platform that turns may move far less or more than the tool.
     """
     low, high = (0.5, 2.0) if _place_stated(sheet) else (0.05, 20.0)
     known = (sheet.frame[[*COMMAND, *MEASURED]].notna()).all(axis=1).to_numpy()
@@ -72,11 +72,11 @@ def check_sizes(sheet, offset_mm=0.0):
         return True
     ratio, seems = measured / command, ""
     if not set(COMMAND) <= set(sheet.found):
-        # what was computed is in mm
+        # computed positions are in mm
         seems = next((f"; unit: {u} fits" for u, f in MM.items() if 0.9 < ratio * f / MM[sheet.spec.unit] < 1.1), "")
-    for (one, size), (other, its_size) in product(MM.items(), repeat=2):
-        if one != other and not seems and abs(ratio - size / its_size) < 0.1 * ratio:
-            seems = f", not the measured ones in {other} and the commanded ones in {one}, as it seems"
+    for (commanded_in, size), (measured_in, its_size) in product(MM.items(), repeat=2):
+        if commanded_in != measured_in and not seems and abs(ratio - size / its_size) < 0.1 * ratio:
+            seems = f", not the measured ones in {measured_in} and the commanded ones in {commanded_in}, as it seems"
     value = (
         f"measured positions that spread over {measured:.6g} mm while the commanded ones spread over {command:.6g} mm"
     )
@@ -97,9 +97,9 @@ def _place_stated(sheet):
 
 
 def check_measured(sheet, frame_advice):
-    """Note measured positions, in the robot's frame, beyond its reach or altogether elsewhere than commanded.
+    """Note measured positions, in the robot's frame, beyond its reach or far from all commanded ones.
 
-    frame_advice: without arguments to what to write where all are elsewhere, in words.
+    frame_advice: function without arguments that returns the advice, in words, where all are far off.
     """
     known = sheet.frame.dropna(subset=[*COMMAND, *MEASURED])
     command, measured = rows.command(known), rows.measured(known)
@@ -124,10 +124,10 @@ def check_measured(sheet, frame_advice):
         sheet.note("reach of measured", MEASURED, position_text(measured[i]), allowed, known.index[i])
 
 
-def nuisance_sd(frame, mechanism, places_instead):
-    """What is strange about measured positions in the robot's frame: far off in all, or one row late or early.
+def plausibility_notes(frame, mechanism, places_instead):
+    """Notes on implausible measured positions in the robot's frame: all of them far off, or one row late or early.
 
-    places_instead: of targets or tool, in words, from the distance in mm that they may leave.
+    places_instead: function from the distance in mm that may remain to places of targets or tool, in words.
     """
     command, measured, run = rows.command(frame), rows.measured(frame), frame["run"].to_numpy()
     off, notes = np.median(np.linalg.norm(measured - command, axis=1)), []
@@ -165,7 +165,7 @@ def _spread(position):
 
 
 def _wrong_unit(command, sheet):
-    """Note that another unit brings the commanded positions into reach; whether that is so."""
+    """Note that another unit brings the commanded positions into reach; True where that is so."""
 
     def reached(position):
         return np.isfinite(sheet.mechanism.inverse(position, elbow=sheet.spec.elbow)).all(axis=1).mean()
@@ -184,7 +184,7 @@ def _wrong_unit(command, sheet):
 
 
 def _upside_down(command, drive, sheet):
-    """Note that the robot stands on the other side of its base; whether that is so."""
+    """Note that the robot is on the other side of its base; True where that is so."""
     back = sheet.mechanism.forward(drive)
     flipped = np.abs(back[:, 2] + command[:, 2]) < np.abs(back[:, 2] - command[:, 2])
     if not len(command) or flipped.mean() < _MANY:
@@ -220,7 +220,7 @@ def _tolerances(mechanism):
 
 
 def _elbow_advice(given, command, sheet):
-    """Whether the drive values fit the commanded positions with the other elbow, in words, or None."""
+    """Advice, in words, where the drive values fit the commanded positions with the other elbow, or None."""
     elbow = {"out": "in", "in": "out"}[sheet.spec.elbow]
     off = np.abs(given - sheet.mechanism.inverse(command, elbow=elbow))
     fits = (off < _tolerances(sheet.mechanism)).all(axis=1).mean() > _MOST
@@ -228,7 +228,7 @@ def _elbow_advice(given, command, sheet):
 
 
 def _axes_advice(measured, command, limit):
-    """Which exchange or turning round of the file's axes makes measured positions fit, or None."""
+    """Which exchange or reversal of the file's axes makes measured positions fit, or None."""
     best, text = limit, None
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
         off = np.median(np.linalg.norm(measured[:, order] * signs - command, axis=1))

@@ -1,4 +1,4 @@
-"""What to write into the configuration, or to mend in a file, against gross mistakes, in words."""
+"""Advice against gross mistakes, in words: what to write into the configuration or to correct in the file."""
 
 from collections.abc import Iterator, Mapping
 
@@ -8,9 +8,9 @@ from rrru.campaign.ingest.gross_file import GrossFile, Hypothesis
 from rrru.campaign.ingest.mistakes import Mistakes
 from rrru.campaign.ingest.sheet import MEASURED, position_text
 
-# an axis of the instrument is one of the robot's where its component along that is more than this
+# an axis of the instrument equals one of the robot's where its component along that axis is more than this
 _ALONG_AN_AXIS = 0.95
-# commanded positions are in a right unit where they spread like the nominal robot's, by a factor of at most this
+# the unit of commanded positions is right where their spread is that of the nominal robot, up to this factor
 _ALIKE = 2.0
 
 
@@ -33,12 +33,12 @@ def of_drives(file: GrossFile, mistakes: Mistakes) -> Iterator[str]:
     drives = file.robot.parts.columns[: file.count]
     order = tuple([*drives].index(name) for name in file.spec.order) if file.spec.order and drives else file.given.order
     configured = Mistakes(tuple(file.spec.signs.get(name, 1) for name in drives), order)
-    whole = mistakes.after(configured)
-    if whole.order != configured.order:
-        named = f"order: [{', '.join(drives[k] for k in whole.order)}]"
-        yield named if whole.order != file.given.order else "no `order`"
-    if whole.signs != configured.signs:
-        turned = [f"{drives[k]}: -1" for k, sign in enumerate(whole.signs) if sign < 0]
+    combined = mistakes.after(configured)
+    if combined.order != configured.order:
+        named = f"order: [{', '.join(drives[k] for k in combined.order)}]"
+        yield named if combined.order != file.given.order else "no `order`"
+    if combined.signs != configured.signs:
+        turned = [f"{drives[k]}: -1" for k, sign in enumerate(combined.signs) if sign < 0]
         yield f"signs: {{{', '.join(turned)}}}" if turned else "no `signs`"
 
 
@@ -77,23 +77,24 @@ def place_words(places: Mapping[str, np.ndarray]) -> str:
     """The key `targets` with places (3,) in mm by name, or where the tool is, whose name is empty."""
     if "" in places:
         return f"a tool at {position_text(places[''])}"
-    each = (f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]" for name, place in places.items())
-    return f"targets: {{{', '.join(each)}}}"
+    entries = (f"{name}: [{', '.join(f'{value:.4g}' for value in place)}]" for name, place in places.items())
+    return f"targets: {{{', '.join(entries)}}}"
 
 
 def _of_axes(file: GrossFile, rotation: np.ndarray) -> str:
-    """Which measured axes to exchange, or which one to turn round, for an improper rotation (3, 3) to be a proper one.
+    """Which measured axes to exchange, or which one to reverse, to make an improper rotation (3, 3) a proper one.
 
-    Any will do, unless the axes of the instrument are those of the robot, of which two are exchanged or one is turned.
+    Any choice is right, unless the axes of the instrument are those of the robot: then two are exchanged or one is
+    reversed.
     """
     along = np.where(np.abs(rotation) > _ALONG_AN_AXIS, np.sign(rotation), 0.0)
     turned = np.flatnonzero(np.diag(along) < 0.0)
     if np.abs(along).sum() == 3.0 and (along >= 0.0).all():
-        one, other = np.flatnonzero(np.diag(along) == 0.0)
+        first, second = np.flatnonzero(np.diag(along) == 0.0)
     elif np.abs(np.diag(along)).sum() == 3.0 and len(turned) == 1:
         return f"turn the sign of {file.found.get(MEASURED[turned[0]], MEASURED[turned[0]])}"
     else:
-        one, other = 0, 1
-    pairs = (MEASURED[one], MEASURED[other]), (MEASURED[other], MEASURED[one])
+        first, second = 0, 1
+    pairs = (MEASURED[first], MEASURED[second]), (MEASURED[second], MEASURED[first])
     exchanged = ", ".join(f"{ours}: {file.found.get(theirs, theirs)}" for ours, theirs in pairs)
     return f"columns: {{{exchanged}}}"

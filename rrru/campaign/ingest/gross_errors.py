@@ -1,15 +1,15 @@
 """Gross mistakes in a file, found before anything is fitted: signs, orders, units, shifted rows, wrong targets, robots.
 
-What a mistake does to a robot's error is nothing that a calibration should explain. For the file as it is, and for
-every mistake that could be in it, the nominal robot is posed at the drive values, or at the commanded positions where a
-file has no others, the instrument is registered in closed form (`rrru.campaign.target_registration`), and the rms that
-is left is compared. A mistake is named where its posterior probability is above 0.99. The nominal robot's own errors
-have an unknown size, alike under all hypotheses, so that with k independent errors the likelihood of a residual rms r
-is proportional to r^-k (Jeffreys' prior on the size); further numbers that a hypothesis fits cost half the logarithm of
-the readings each (Schwarz, Annals of Statistics 6, 1978). The rms is in shares of the spread of the positions, so that
-no unit wins for being small. Hypotheses are looked at in the order of the evidence that a registration with any matrix
-in place of the rotation would give, which is at least their own. A file that no mistake explains, nor lost zeros of the
-drives, is not of this robot. Lengths in mm, angles in rad.
+A calibration must not explain errors that a mistake in the file makes. The file as it is, and every mistake that could
+be in it, are hypotheses. For each the nominal robot is posed at the drive values, or at the commanded positions where a
+file has no drive values. The instrument is registered in closed form (`rrru.campaign.target_registration`), and the
+residual rms is compared. A mistake is named where its posterior probability is above 0.99. The nominal robot's own
+errors have an unknown size, equal under all hypotheses. With k independent errors the likelihood of a residual rms r is
+therefore proportional to r^-k (Jeffreys' prior on the size). Each further parameter of a hypothesis costs half the
+logarithm of the number of readings (Schwarz, Annals of Statistics 6, 1978). The rms is in shares of the spread of the
+positions, so that no unit is favoured for being small. Hypotheses are evaluated in the order of an upper bound of their
+evidence: that of a registration with any matrix in place of the rotation. A file that no mistake explains, nor lost
+zero offsets of the drives, is not of this robot. Lengths in mm, angles in rad.
 """
 
 from collections.abc import Mapping
@@ -25,21 +25,21 @@ from rrru.campaign.ingest.mistakes import Mistakes, all_orders_and_signs
 from rrru.campaign.ingest.spec import IngestSpec
 from rrru.kinematics.robot import Robot
 
-# what more than this share of the robot's size is left of, with the zeros of the drives fitted, is of another robot:
+# a residual above this share of the robot's size, with the zero offsets of the drives fitted, is of another robot:
 # links are not built wrong by a fiftieth; assumed
 _FOREIGN_SHARE = 2e-2
-# the same as a share of the spread of what was measured: of a robot that moves little all is small, also what is wrong
+# the same as a share of the spread of the measured positions: for a robot that moves little all errors are small
 _FOREIGN_SPREAD_SHARE = 0.05
 # share of the rows within the ranges of the drives below which these are of another robot, where it is off as well
 _LEAST_IN_RANGE = 0.1
 _LEAST_ROWS = 10
 _CERTAIN = 0.99
-# mistakes that may be in one file together, an order of the drives being some; hypotheses of each round that are looked
-# at, more where others may be as good, and from how many of the best the next round goes on
+# mistakes that may be in one file together, an order of the drives being some; hypotheses of each round that are
+# evaluated, more where others may be as good, and number of the best from which the next round starts
 _MOST_ROUNDS, _FIRST_LOOKED_AT, _MOST_LOOKED_AT, _MOST_FOLLOWED = 6, 8, 32, 3
 # round after which all orders and signs of the drives are tried
 _SIMPLE_ROUNDS = 2
-# hypotheses that are looked at in the end, as none may be left that is as good as the best one
+# hypotheses that are evaluated at the end, since none may remain that is as good as the best one
 _MOST_SETTLED = 150
 # difference of log evidence from which on a hypothesis does not matter
 _FAR_BEHIND = 10.0
@@ -49,7 +49,7 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class GrossError:
-    """Why a file cannot be right: the rms in mm as it is and at best, and what to write, in words.
+    """Why a file cannot be right: its rms in mm as it is and at best, and the advice, in words.
 
     mistakes: the most probable ones; limit_mm: rms that a file of this robot leaves at most, where not even these
     explain it, None where they do.
@@ -101,10 +101,10 @@ def find_gross_error(
 
 
 def frame_advice(file: GrossFile | None) -> str:
-    """What may bring positions that are far off in the robot's own frame to where they belong, in words.
+    """Advice, in words, for positions that are far off in the robot's own frame.
 
-    Orders and signs of the drives that do so in this frame, and the instrument's own frame where a registration leaves
-    little. A gantry whose drives are exchanged moves as one whose frame is turned.
+    It names orders and signs of the drives that correct them in this frame, and the instrument's own frame where a
+    registration leaves a small residual. A gantry whose drives are exchanged moves as one whose frame is turned.
     """
     register = "frame: register turns another frame into the robot frame"
     if file is None or len(file) < _LEAST_ROWS:
@@ -121,7 +121,7 @@ def frame_advice(file: GrossFile | None) -> str:
 
 
 class _Search:
-    """The hypotheses of a GrossFile that were looked at, and the log evidence that others have at most."""
+    """The evaluated hypotheses of a GrossFile, and upper bounds of the log evidence of the others."""
 
     def __init__(self, file: GrossFile) -> None:
         self._file = file
@@ -134,7 +134,7 @@ class _Search:
         return max(self.found.values(), key=lambda one: one.log_evidence)
 
     def look_at(self, every) -> None:
-        """Look at the most promising of some Mistakes."""
+        """Evaluate the most promising of some Mistakes."""
         fresh = [
             one for one in dict.fromkeys(every) if one not in self.found and one not in self._at_most and one.count
         ]
@@ -147,7 +147,7 @@ class _Search:
             del self._at_most[one]
 
     def settle(self) -> None:
-        """Look at all that may be as good as the best one, up to a limit."""
+        """Evaluate all hypotheses that may be as good as the best one, up to a limit."""
         for one in sorted(self._at_most, key=self._at_most.__getitem__, reverse=True)[:_MOST_SETTLED]:
             if self._at_most[one] < self.best.log_evidence - _FAR_BEHIND:
                 break
@@ -155,15 +155,15 @@ class _Search:
             del self._at_most[one]
 
     def go_on(self) -> None:
-        """Look at what is one mistake away from the best ones."""
+        """Evaluate the hypotheses that are one mistake away from the best ones."""
         start = sorted(self.found.values(), key=lambda one: -one.log_evidence)[:_MOST_FOLLOWED]
         self.look_at(one for hypothesis in start for one in hypothesis.mistakes.further(self._file.units))
 
     @property
     def named(self) -> list[Hypothesis]:
-        """The hypotheses that explain the file and of which one is right with certainty, most probable ones first.
+        """The hypotheses that explain the file and that together have probability 0.99, most probable ones first.
 
-        Empty where the file as it is has its share in that, where one that was not looked at may have it, or where one
+        Empty where the file as it is belongs to them, where one that was not evaluated may belong to them, or where one
         explains too little.
         """
         every = sorted(self.found.values(), key=lambda one: -one.log_evidence)
@@ -176,9 +176,10 @@ class _Search:
 
 
 def _foreign(file: GrossFile, as_is: Hypothesis, best: Hypothesis) -> GrossError | None:
-    """The GrossError of a file that is far from the robot whatever the zeros of its drives; None of others.
+    """The GrossError of a file that is far from the robot with any zero offsets of its drives; None for others.
 
-    Zeros, as any mistake, explain a file only where they leave little of it: they fit the links of another robot, too.
+    Zero offsets, as any mistake, explain a file only where they leave a small residual: they fit the links of another
+    robot, too.
     """
     size = file.robot.size_mm
     limit_mm = min(_FOREIGN_SHARE * size, max(_FOREIGN_SPREAD_SHARE * file.spread_mm(), ORDINARY_SHARE * size))

@@ -1,4 +1,4 @@
-"""What a file's columns leave under mistakes that may be in it: poses, registration, rms and evidence.
+"""Residuals of a file's columns under mistakes that may be in it: poses, registration, rms and evidence.
 
 See `rrru.campaign.ingest.gross_errors`. Lengths in mm, angles in rad.
 """
@@ -22,11 +22,11 @@ from rrru.kinematics.chain import Poses
 from rrru.kinematics.readings import Readings
 from rrru.kinematics.robot import Robot
 
-# a mistake explains a file where what it leaves is less than this share of the robot's size; assumed
+# a mistake explains a file where its residual rms is less than this share of the robot's size; assumed
 EXPLAINED_SHARE = 5e-3
 # a smaller rms, as a share of the robot's size, is one of ordinary errors of its geometry; assumed
 ORDINARY_SHARE = 2e-3
-# rows that decide: enough for the rms of every hypothesis within some percent; and for which are worth a look
+# rows that decide: enough for the rms of every hypothesis within some percent; and rows that screen the hypotheses
 _MOST_ROWS, _MOST_SCREENED = 120, 40
 # share of the rows at which the nominal robot has to have a pose for a hypothesis to count
 _LEAST_POSED = 0.9
@@ -67,7 +67,7 @@ class GrossFile:
     where K is 0; None where the file has none. names, place_mm (k, 3): of the targets, NaN where no place is stated;
     chosen: rows that decide; spec: what the configuration states, which the columns have already; found: {our name: the
     file's name}; unit_stated: whether the file's header states the unit of what was measured; agreed: whether
-    commanded positions and drive values say the same, which no mistake may change.
+    commanded positions and drive values agree, which no mistake may change.
     """
 
     robot: Robot
@@ -94,8 +94,8 @@ class GrossFile:
     ) -> "GrossFile | None":
         """From a file's columns.
 
-        None where these do not say where the robot was, or which of its hands was seen, or where commanded positions
-        alone are in another unit, which `rrru.campaign.ingest.geometry` looks at.
+        None where these do not determine the robot's pose or the end effector that was seen, or where commanded
+        positions alone are in another unit, which `rrru.campaign.ingest.geometry` checks.
         """
         driven, commanded = set(robot.parts.columns) <= set(frame), set(COMMAND) <= set(frame)
         if not set(MEASURED) <= set(frame) or not (driven or (commanded and not robot.legs.hands)):
@@ -135,25 +135,25 @@ class GrossFile:
     @cached_property
     def units(self) -> tuple[dict[str, str], ...]:
         """Units other than those stated that readings and drive values may have."""
-        others = [unit for unit in MM if unit != self.spec.unit and not self.unit_stated]
-        result = [{"unit": unit} for unit in others]
+        readings = [unit for unit in MM if unit != self.spec.unit and not self.unit_stated]
+        result = [{"unit": unit} for unit in readings]
         if self.has_lengths:
             drives = [unit for unit in MM if unit != self.spec.unit_of_drives]
             result += [{"drive_unit": unit} for unit in drives]
-            result += [{"unit": unit, "drive_unit": unit} for unit in others if unit in drives]
+            result += [{"unit": unit, "drive_unit": unit} for unit in readings if unit in drives]
         if self.count and "rad" in self.robot.parts.units:
             result += [{"angle_unit": unit} for unit in RAD if unit != self.spec.angle_unit]
         return tuple(result)
 
     def evidence_at_most(self, mistakes: Mistakes) -> float:
-        """The log evidence that some Mistakes have at most, from fewer rows."""
+        """Upper bound of the log evidence of some Mistakes, from fewer rows."""
         at = self._rows(mistakes.shift)
         readings = self.readings(mistakes, at[:: max(len(at) // _MOST_SCREENED, 1)])
         share = 1.0 if readings is None else affine_rms(readings) / self._spread(readings)
         return self._log_evidence(mistakes, share, len(at))
 
     def hypothesis(self, mistakes: Mistakes) -> Hypothesis:
-        """The Hypothesis of some mistakes; of an endless rms where the nominal robot has no poses then."""
+        """The Hypothesis of some mistakes; its rms is infinite where the nominal robot has no poses then."""
         impossible = Hypothesis(mistakes, np.inf, self.place_mm, np.eye(3), self._log_evidence(mistakes, 1.0, 1))
         readings = self.readings(mistakes)
         if readings is None:
@@ -168,16 +168,17 @@ class GrossFile:
         if mistakes.free and not _NEAREST_SHARE * size < moved < _FARTHEST_SHARE * size:
             return impossible
         rms = _usual_rms(np.linalg.norm(found.residual_mm, axis=1), readings.target)
-        # of what is seen and of what moves it, so that nothing wins by making one of them small
+        # the smaller spread of readings and poses, so that no hypothesis is favoured for making one of them small
         share = rms / min(self._spread(readings), _spread(readings.measured_mm))
         return Hypothesis(
             mistakes, rms, place, found.rotation, self._log_evidence(mistakes, share, len(readings.target))
         )
 
     def _near_stated(self, place_mm: np.ndarray, turn: np.ndarray) -> np.ndarray:
-        """Places (k, 3) moved to the stated ones along axes that turns (n, 3, 3) leave where they are.
+        """Places (k, 3) moved to the stated ones along axes that turns (n, 3, 3) do not move.
 
-        Along these a shift of all targets is one of the instrument, as along z for a robot that turns about z only.
+        Along these a shift of all targets is confounded with one of the instrument, as along z for a robot that turns
+        about z only.
         """
         if not self._stated.any():
             return place_mm
@@ -186,7 +187,7 @@ class GrossFile:
         return place_mm + still @ still.T @ np.median((self.place_mm - place_mm)[self._stated], axis=0)
 
     def with_zeros(self) -> Hypothesis:
-        """The Hypothesis of no mistake, with the lost zeros of the drives found that explain most."""
+        """The Hypothesis of no mistake, with the lost zero offsets of the drives that explain most."""
         readings = self.readings(self.given) if self.count else None
         if readings is None:
             return self.hypothesis(self.given)
@@ -199,7 +200,7 @@ class GrossFile:
         return replace(self, drive=self.drive + zeros).hypothesis(self.given)
 
     def spread_mm(self) -> float:
-        """Of the measured positions in the rows that decide."""
+        """Spread of the measured positions in the rows that decide."""
         return _spread(self.measured_mm[self.chosen])
 
     @property
@@ -213,12 +214,12 @@ class GrossFile:
         return len([*self.given.further(self.units)])
 
     def _spread(self, readings: TargetReadings) -> float:
-        """Of what carries the targets, turns as far as they move a target at the robot's arm."""
+        """Spread of the poses that carry the targets; turns count by the robot's characteristic length."""
         turn = self.robot.angle_arm_mm * _spread(readings.body_turn.reshape(-1, 9)) / np.sqrt(2.0)
         return float(np.hypot(_spread(readings.body_mm), turn))
 
     def _log_evidence(self, mistakes: Mistakes, share: float, count: int) -> float:
-        """Of an rms in shares of the positions' spread, from so many rows."""
+        """Log evidence of an rms in shares of the positions' spread, from `count` rows."""
         independent = min(max(len(self.robot.parameters), _LEAST_INDEPENDENT), 3 * len(self) // 2)
         fitted = 3 * np.isin(np.flatnonzero(self._stated), self.target[self.chosen]).sum() * mistakes.free
         cost = 0.5 * fitted * np.log(3.0 * max(count, 1))
@@ -277,7 +278,7 @@ class GrossFile:
         away = np.abs(values - self.robot.legs.home_drives) / np.where(lengths, self.robot.size_mm, 2.0 * np.pi)
         if np.median(away.max(axis=1)) > _MOST_AWAY or not (mistakes == self.given or self._in_range(values)):
             return np.full((len(at), 3), np.nan), np.zeros((len(at), 3, 3))
-        # poses that do not exist are an answer here
+        # poses that do not exist are expected here
         with np.errstate(all="ignore"):
             body, turn = _closed(self.robot.solve(values, self._guess(values, at)))
             if self.command_mm is not None and np.isnan(body).any():
@@ -347,12 +348,12 @@ def _labels(frame: pd.DataFrame) -> np.ndarray:
 
 
 def _factor(units: Mapping[str, float], right: str | None, stated: str) -> float:
-    """What brings numbers that were read in a stated unit to the right one, if that is another."""
+    """Factor from the stated unit, in which numbers were read, to the right one, if that is another."""
     return units[right or stated] / units[stated]
 
 
 def _usual_rms(off: np.ndarray, target: np.ndarray) -> float:
-    """Rms of distances (n,) without spoilt readings, which are far off beside others of their target (n,)."""
+    """Rms of distances (n,) without spoilt readings, which are far off compared with others of their target (n,)."""
     _, number = np.unique(target, return_inverse=True)
     medians = np.array([np.median(off[number == k]) for k in range(number.max() + 1)])
     return float(np.sqrt((off[off <= _SPOILT * medians[number]] ** 2).mean()))

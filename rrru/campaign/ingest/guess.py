@@ -5,7 +5,7 @@ from datetime import datetime
 from difflib import SequenceMatcher
 
 from rrru.campaign.ingest.cells import decode, separator_of
-from rrru.campaign.ingest.clock import tells_clock
+from rrru.campaign.ingest.clock import is_clock
 from rrru.campaign.ingest.columns import known_columns
 from rrru.campaign.ingest.sheet import COMMAND, MEASURED
 from rrru.campaign.ingest.spec import MM
@@ -43,9 +43,9 @@ _NAMED = {
     "temperature_c": ("temperature", "temp", "measurement temperature", "temperatur"),
     "target": ("target", "reflector", "marker", "reflektor"),
 }
-# what drives are called where they are numbered only
+# names of drives that are only numbered
 _DRIVES = ("q", "j", "a", "l", "joint", "axis", "achse", "theta", "motor", "leg", "gelenk")
-# what counts, beside what may be a text
+# columns of whole numbers, which similar names of text columns must not match
 _COUNTS = ("run", "point")
 _CLOCKS = (
     *("%d.%m.%Y %H:%M:%S", "%m/%d/%Y %H:%M:%S", "%d/%m/%Y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%Y/%m/%d %H:%M:%S"),
@@ -70,7 +70,7 @@ def guess_format(path, problems):
     stated = {"separator": separator} if separator != "," else {}
     if stated and re.search(r"\d,\d", "".join(lines[at + 1 : at + 20])):
         stated["decimal"] = ","
-    # lines above, or units beside, the names of the axes
+    # lines above the names of the axes, or units next to them
     names = _fields(head)
     leica = names_axes(names) and (at > 0 or any(unit_of(name) for name in names))
     kind = "leica" if leica else "csv"
@@ -84,13 +84,13 @@ def guess_units(cells, found, mechanism):
 
     Columns whose unit the format knows, and units of which there are several, are left out.
     """
-    told = {"unit": set(), "angle_unit": set()}
+    stated = {"unit": set(), "angle_unit": set()}
     for ours, theirs in found.items():
         if ours in (*COMMAND, *MEASURED) and theirs not in cells.factors:
-            told["unit"].add(_LENGTH_UNITS.get(LENGTHS.get(_stated(theirs))))
+            stated["unit"].add(_LENGTH_UNITS.get(LENGTHS.get(_stated(theirs))))
         elif ours in mechanism.parts.columns:
-            told["angle_unit"].add(_ANGLE_UNITS.get(_stated(theirs)))
-    known = {key: units - {None} for key, units in told.items()}
+            stated["angle_unit"].add(_ANGLE_UNITS.get(_stated(theirs)))
+    known = {key: units - {None} for key, units in stated.items()}
     return {key: units.pop() for key, units in known.items() if len(units) == 1}
 
 
@@ -101,7 +101,7 @@ def _stated(name):
 
 
 def _separator(line):
-    """What stands between the fields of a line; bars stand in names, too."""
+    """The separator of the fields of a line; bars occur in names, too."""
     return separator_of([line]) if ";" in line or "\t" in line else separator_of([line.replace("|", "")])
 
 
@@ -130,12 +130,12 @@ def _numbered(drives, found, free):
 
     None where a drive has its column already, a column states a unit of another kind, or two kinds are numbered so.
     """
-    ours, others = [drive.column for drive in drives], LENGTHS if drives[0].unit == "rad" else _ANGLE_UNITS
+    ours, wrong_units = [drive.column for drive in drives], LENGTHS if drives[0].unit == "rad" else _ANGLE_UNITS
     kinds = {}
     for name in free:
-        word, digits, rest = re.fullmatch(r"([^\d]*)(\d*)(.*)", _plain(name)).groups()
-        if digits and word.strip() in _DRIVES and _stated(name) not in others:
-            kinds.setdefault((word, rest), {})[int(digits)] = name
+        word, digits, ending = re.fullmatch(r"([^\d]*)(\d*)(.*)", _plain(name)).groups()
+        if digits and word.strip() in _DRIVES and _stated(name) not in wrong_units:
+            kinds.setdefault((word, ending), {})[int(digits)] = name
     counted = [names for names in kinds.values() if len(names) == len(ours) == max(names) - min(names) + 1]
     if len(counted) != 1 or set(ours) & set(found):
         return {}
@@ -153,7 +153,7 @@ def guess_clock(cells, theirs):
     Of several that fit the one of the shortest campaign whose times never run backwards.
     """
     texts = [cell for cell in cells.cells.get(theirs, ()) if isinstance(cell, str) and cell.strip()]
-    if not texts or not tells_clock(texts, None) or all(_reads(text, None) for text in texts[:20]):
+    if not texts or not is_clock(texts, None) or all(_reads(text, None) for text in texts[:20]):
         return None
     fitting = []
     for pattern in (f"{one}{fraction}" for one in _CLOCKS for fraction in ("", ".%f", ",%f")):

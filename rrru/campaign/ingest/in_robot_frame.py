@@ -50,7 +50,7 @@ def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> R
         value = (
             f"positions in a left-handed frame ({mirrored:.6g} mm rms off when registered, a fifth of that if mirrored)"
         )
-        sheet.refuse_now(MEASURED, value, "a right-handed frame: turn the sign of one axis round")
+        sheet.refuse_now(MEASURED, value, "a right-handed frame: reverse the sign of one axis")
     if result.rms_mm > (limit := frame_limit(sheet.mechanism)):
         value = f"a residual of {result.rms_mm:.6g} mm rms after registration at {result.points} points"
         sheet.refuse_now(MEASURED, value, f"at most {limit:g} mm rms: the same points in both frames")
@@ -58,7 +58,7 @@ def register_sheet(sheet: Sheet, mounted: Mounting | None, digit_mm: float) -> R
 
 
 def _off_as_mirrored(seen: np.ndarray, target: np.ndarray) -> float:
-    """Residual in mm rms of measured positions (n, 3) that fit far better with an axis turned round, else 0."""
+    """Residual in mm rms of measured positions (n, 3) that fit far better with one axis reversed, else 0."""
     try:
         straight, mirrored = (register(seen * [1.0, 1.0, sign], target).rms_mm for sign in (1.0, -1.0))
     except FitError:

@@ -1,10 +1,10 @@
-"""Zeros of the drives that are lost: found together with frame and reflectors, where these alone leave far too much.
+"""Initial values of lost zero offsets, fitted together with frame and reflectors where these leave a large residual.
 
-A robot whose mastering is lost is off by tens of millimetres, so that a frame fitted with the nominal drives is wrong
-and good points look like outliers. Where frame and places of reflectors leave a large residual, the drives' zeros are
-fitted with them, from the nominal ones and, where that does not end well, from others; for each start the frame comes
-first. What a frame or a reflector imitates, such as the first drive of an arm, stays nominal. Lengths in mm, angles
-in rad.
+A robot that has lost its zero references is off by tens of millimetres. A frame fitted with the nominal drives is then
+wrong, and good points look like outliers. Where frame and places of reflectors leave a large residual, the drives' zero
+offsets are fitted with them: from the nominal zeros and, where that does not converge well, from other starts. For each
+start the frame is fitted first. A zero offset that is confounded with a frame or a reflector, such as that of an arm's
+first drive, stays nominal. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +15,8 @@ from scipy.optimize import least_squares
 from rrru.kinematics.base_parameters import MeasurementConfig, candidates_of, choose, direction, open_numbers
 from rrru.kinematics.readings import lacking
 
-# shares of the robot's size: from the first on a residual may be one of zeros, above the second one of nothing else;
-# what leaves less than the third of it explains it
+# shares of the robot's size: from the first on a residual may be due to zero offsets, above the second only to these;
+# a fit that leaves less than the third share of the residual explains it
 _MAY_BE, _LOST, _EXPLAINED = 5e-4, 2e-3, 0.5
 # an assembly sets zeros better than this, in rad and in mm
 LARGE = {"rad": 5e-3, "mm": 2.0}
@@ -26,14 +26,14 @@ _STARTS, _SPREAD, _ENOUGH = 16, {"rad": 0.4, "mm": 80.0}, 0.1
 _EVALUATIONS = 60
 # residual from which on a reading counts less
 _LOOSE_MM = 5.0
-# what counts where a pose is lost
+# residual of a reading whose pose does not close
 _LOST_MM = 1e4
-# share of a drive's zero that poses must leave beside frame and reflectors
+# share of a zero offset's effect that must be independent of frame and reflectors
 _LEAST = 1e-2
 
 
 def lost_zeros(robot, driven, seen, frames):
-    """Offsets (K,) of the actuator values that explain what frames leave; zero where they explain nothing.
+    """Zero offsets (K,) of the actuator values that explain the residual of the frames; zero where they do not.
 
     driven: actuator values (n, K) and nominal positions (n, 3); seen: Readings in the instrument's frame; frames: from
     Poses to a Framed.
@@ -57,8 +57,8 @@ def lost_zeros(robot, driven, seen, frames):
 
 @dataclass(frozen=True)
 class Framed:
-    """What a frame makes of poses: readings (n, 3) in the robot's frame, the model's (n, 3), places (n, 3) of what was
-    read, and names of the reflectors whose places are not known.
+    """Poses in a fitted frame: readings (n, 3) in the robot's frame, those of the model (n, 3), places (n, 3) of the
+    reflectors read, and names of the reflectors whose places are not known.
     """
 
     position_mm: np.ndarray
@@ -88,11 +88,11 @@ def _fitted(robot, driven, seen, frames, zeros):
     reads = MeasurementConfig(tuple(dict.fromkeys(seen.reflectors.tolist())), framed.unknown, frame=True)
     robot = robot.reading(reads)
     readings = replace(seen, position_mm=framed.position_mm, place_mm=framed.place_mm)
-    # frame and reflectors first: the drives are what is left
+    # frame and reflectors first: the drives explain the remainder
     opened = open_numbers(reads)
     numbers = (*opened, *candidates_of(robot.legs, robot.parts)[: len(robot.parts.drives)])
-    scale = np.array([1.0 if one.unit == "mm" else 1.0 / robot.angle_arm_mm for one in numbers])
-    directions = scale * np.stack([direction(robot.legs, one) for one in numbers], axis=-1)
+    scale = np.array([1.0 if number.unit == "mm" else 1.0 / robot.angle_arm_mm for number in numbers])
+    directions = scale * np.stack([direction(robot.legs, number) for number in numbers], axis=-1)
     columns = robot.map(values, poses, robot.twists(), readings).columns(directions)
     chosen, _ = choose(columns.reshape(-1, len(numbers)), [True] * len(numbers), _LEAST)
     directions = directions[..., chosen]

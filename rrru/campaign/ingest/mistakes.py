@@ -46,8 +46,8 @@ class Mistakes:
         turned = sum(sign < 0 for sign in self.signs)
         turned = 1 if turned == len(self.signs) and turned else turned
         lengths = len({self.unit, self.drive_unit} - {None})
-        others = self.shift != 0, self.free, self.mirrored, self.angle_unit is not None
-        return turned + self._reordered + lengths + sum(others)
+        single = self.shift != 0, self.free, self.mirrored, self.angle_unit is not None
+        return turned + self._reordered + lengths + sum(single)
 
     @property
     def of_readings(self) -> bool:
@@ -119,7 +119,7 @@ def usual_orders(count: int) -> tuple[tuple[int, ...], ...]:
 
 @cache
 def all_orders_and_signs(count: int) -> tuple[Mistakes, ...]:
-    """All orders and all signs of so many drives, but the right ones; none where they are too many."""
+    """All orders and all signs of so many drives, except the right ones; none where they are too many."""
     if count > _MOST_PERMUTED:
         return ()
     given = Mistakes.none(count)

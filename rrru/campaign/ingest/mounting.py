@@ -1,6 +1,6 @@
-"""Where the reflectors of a file sit on the platform or beside the robot, stated or found from the file.
+"""Registration of the targets: places of a file's reflectors on the platform or in the world, stated or estimated.
 
-The poses are the robot's nominal ones, or those of the zeros that its drives have lost. Lengths in mm, angles in rad.
+The poses are the robot's nominal ones, or those with the lost zero offsets of its drives. Lengths in mm, angles in rad.
 """
 
 from dataclasses import dataclass
@@ -23,12 +23,12 @@ from rrru.kinematics.readings import Readings
 _UNNAMED = "tool"
 # orientations that differ by less are the same
 _NEVER_TURNS = 1e-6
-# places explain what zeros of the drives do where they leave at most so many times as much
+# places explain the same residual as zero offsets of the drives where they leave at most so many times as much
 _AS_GOOD, _FAR_BETTER = 2.0, 0.5
 # cosine from which on an axis is one of the body's
 _ALONG = 0.9999
-# rows that tell which zeros are lost; the calibration fits what is found to all of them
-_TELLING = 200
+# rows from which lost zero offsets are estimated; the calibration fits the result to all of them
+_MAX_ROWS = 200
 # ASSUME no platform is off by more than this where the file's frame is the robot's
 _MOST_TURNED_RAD = 0.2
 # ASSUME no robot's platform turns so much otherwise than its nominal model, about 6 degrees in the median
@@ -57,7 +57,7 @@ class Mounting:
 
     @property
     def framing(self):
-        """Rows (n,) that tell where the instrument stands."""
+        """Rows (n,) that determine the instrument's frame."""
         return ~self.strays & ~self.on_world
 
     def columns(self, frame, rotation):
@@ -74,17 +74,17 @@ class Mounting:
 
 
 def mounting(sheet):
-    """The Mounting of a sheet without problems, None where the tool itself is read of a robot that knows its zeros."""
+    """The Mounting of a sheet without problems, None where the tool itself is read and no zero offset is lost."""
     frame, registered = sheet.frame, sheet.spec.frame == "register"
-    turned, told = set(TURNS["measured"]) <= set(frame), set(sheet.drives) <= set(frame)
+    turned, driven = set(TURNS["measured"]) <= set(frame), set(sheet.drives) <= set(frame)
     named = "target" in frame or (turned and registered)
-    if not named and not (told and registered):
+    if not named and not (driven and registered):
         return None
     poses, command = sheet.poses, rows.command(frame)
     if not poses.closed.all():
         sheet.refuse_now(None, f"{int((~poses.closed).sum())} poses that the nominal robot cannot take", "known poses")
     frames, notes = _frames(sheet, named)
-    zeros = _zeros(sheet, frames, command) if told else np.zeros(len(sheet.drives))
+    zeros = _zeros(sheet, frames, command) if driven else np.zeros(len(sheet.drives))
     if not (named or zeros.any()):
         return None
     if zeros.any():
@@ -96,7 +96,7 @@ def mounting(sheet):
         notes += _in_words(sheet, zeros, left_mm)
     free = ~frames.known & ~frames.on_world
     if registered and free.all() and np.ptp(poses.turn, axis=0).max() < _NEVER_TURNS:
-        # a platform that never turns does not tell them from the frame's shift: they lie about the tool
+        # for a platform that never turns they are confounded with the frame's shift: their mean is set to the tool
         place = place + np.asarray(sheet.mechanism.tool_mm) - np.unique(place, axis=0).mean(axis=0)
     turn, notes = np.eye(3), notes + (_found(sheet, frames, place, _precision(frames, poses, left_mm)) if named else ())
     if turned:
@@ -131,13 +131,13 @@ def _frames(sheet, named):
 
 
 def _zeros(sheet, frames, command):
-    """Zeros (K,) that the drives have lost, see `rrru.campaign.ingest.mastering`."""
-    chosen = np.flatnonzero(frames.telling)
-    if len(chosen) > _TELLING:
-        chosen = np.sort(np.random.default_rng(0).choice(chosen, _TELLING, replace=False))
+    """Lost zero offsets (K,) of the drives, see `rrru.campaign.ingest.mastering`."""
+    chosen = np.flatnonzero(frames.framing)
+    if len(chosen) > _MAX_ROWS:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, _MAX_ROWS, replace=False))
     seen = Readings(frames.seen_mm, frames.names, frames.place_mm, on_world=frames.on_world).of(chosen)
-    told = frames.of(chosen)
-    return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, told.framed)
+    framed = frames.select(chosen).framed
+    return lost_zeros(sheet.mechanism, (sheet.actuators(command)[chosen], command[chosen]), seen, framed)
 
 
 def _refuse_places(sheet, left_mm):
@@ -161,9 +161,9 @@ def places_instead(sheet, most_mm):
         names = frame["target"].astype(str).to_numpy()
     open_places, right = np.full(seen.shape, np.nan), np.isfinite(seen).all(axis=1) & poses.closed
     frames = Frames(seen, names, open_places, np.isin(names, sheet.spec.world_targets), right, registered=False)
-    if not frames.telling.any():
+    if not frames.framing.any():
         return ""
-    found, names = frames.framed(poses), names[frames.telling]
+    found, names = frames.framed(poses), names[frames.framing]
     places = {name: found.place_mm[names == name][0] for name in dict.fromkeys(names.tolist())}
     return place_words(places) if found.off_mm <= most_mm else ""
 
@@ -181,8 +181,8 @@ def _in_words(sheet, zeros, left_mm):
     lost = f"zeros of {count} drives are" if count > 1 else "the zero of 1 drive is"
     found = f"found with the frame, fitted by the calibration, {left_mm:.2g} mm remain in the median"
     places = places_instead(sheet, _AS_GOOD * left_mm)
-    others = f"{places}, or `robot` is another one" if places else "`robot` is another one or a stated place is wrong"
-    return (f"{lost} lost, by {most} at {drive.site}: {found}; if the drives are referenced, {others}",)
+    instead = f"{places}, or `robot` is another one" if places else "`robot` is another one or a stated place is wrong"
+    return (f"{lost} lost, by {most} at {drive.site}: {found}; if the drives are referenced, {instead}",)
 
 
 def check_turned(sheet):
@@ -233,7 +233,7 @@ def _check_turned(sheet, turn):
 
 
 def _known(sheet, names):
-    """Stated places (n, 3) of the reflectors, NaN where nobody states them; notes those that the file lacks."""
+    """Stated places (n, 3) of the reflectors, NaN where not stated; notes those that the file lacks."""
     stated = dict(sheet.spec.targets)
     for name in sorted(set(stated) - set(names)):
         there = ", ".join(sorted(set(names)))
@@ -260,12 +260,12 @@ def _found(sheet, frames, place, precision):
 
 
 def _precision(frames, poses, residual):
-    """Axes (3, 3) of the platform, in columns, and how far (3,) along each of them a place that was found may be off.
+    """Axes (3, 3) of the platform, in columns, and the error (3,) that an estimated place may have along each of them.
 
     The nominal robot's own errors make the residual in mm and may move a place by as much, however many readings there
     are. Infinite along axes on which the readings do not determine the places.
     """
-    if not frames.registered or (frames.known & frames.telling).any():
+    if not frames.registered or (frames.known & frames.framing).any():
         return np.eye(3), np.full(3, residual)
     axes, turned = axes_by_turning(poses.turn)
     with np.errstate(divide="ignore"):

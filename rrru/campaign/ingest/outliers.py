@@ -1,6 +1,6 @@
-"""Points that the instrument got wrong (a broken beam): found by comparing each with its neighbours along the run.
+"""Gross errors of the instrument (a broken beam): found by comparing each point with its neighbours along the run.
 
-A play that turns over gives a step, a geometric error a smooth curve, a drive a ripple, a loose joint steps back and
+A backlash at reversal gives a step, a geometric error a smooth curve, a drive a ripple, joint clearance steps back and
 forth: all of these are the robot's. A broken beam gives one to three points that fit neither side. Lengths in mm.
 """
 
@@ -31,7 +31,7 @@ def flag_outliers(deviation_mm, run, noise_mm=None, threshold=6.0, place=None):
 
     A block of one to three points is marked where each of its points lies off the curve through the two points before
     and the two after the block, and off the running median of seven points, which follows steps. A block at a run's end
-    is marked where it lies off all that the next three points foretell. Runs with fewer than seven points are not
+    is marked where it is off all predictions from the next three points. Runs with fewer than seven points are not
     judged. Raises ValueError for arguments of the wrong shape.
     """
     deviation, run = np.asarray(deviation_mm, dtype=float), np.asarray(run)
@@ -55,28 +55,28 @@ def reproduced(marked, deviation_mm, command_mm, run, tolerance_mm=0.6):
     deviation, command, run = np.asarray(deviation_mm), np.asarray(command_mm), np.asarray(run)
     result = np.zeros(len(deviation), dtype=bool)
     for i in np.flatnonzero(marked):
-        others = (run != run[i]) & (np.abs(command - command[i]) < 1e-3).all(axis=1)
-        result[i] = (np.linalg.norm(deviation[others] - deviation[i], axis=1) < tolerance_mm).any()
+        repeats = (run != run[i]) & (np.abs(command - command[i]) < 1e-3).all(axis=1)
+        result[i] = (np.linalg.norm(deviation[repeats] - deviation[i], axis=1) < tolerance_mm).any()
     return result
 
 
 def _bad_points(place, deviation, noise_mm, threshold):
     """Indices of the bad points of one run: the worst block first, then again without it, until none is left.
 
-    A good point beside bad ones can be taken with them: each is put back once to see whether it fits the good ones.
+    A good point next to bad ones can be marked with them: each is put back once to see whether it fits the good ones.
     """
 
     def worst(rows):
         return _worst_block(place[rows], deviation[rows], noise_mm, threshold) if len(rows) >= _WINDOW else None
 
-    kept, bad = np.arange(len(deviation)), []
-    while (block := worst(kept)) is not None:
-        bad.extend(kept[block])
-        kept = np.delete(kept, block)
-    for one in sorted(bad) if len(kept) >= _WINDOW else ():
-        again = np.sort(np.append(kept, one))
-        kept = again if worst(again) is None else kept
-    return np.setdiff1d(np.arange(len(deviation)), kept)
+    good, bad = np.arange(len(deviation)), []
+    while (block := worst(good)) is not None:
+        bad.extend(good[block])
+        good = np.delete(good, block)
+    for row in sorted(bad) if len(good) >= _WINDOW else ():
+        again = np.sort(np.append(good, row))
+        good = again if worst(again) is None else good
+    return np.setdiff1d(np.arange(len(deviation)), good)
 
 
 def _worst_block(place, deviation, noise_mm, threshold):
@@ -125,10 +125,10 @@ def _off_curve(place, deviation, blocks, nodes):
 
 
 def _end_blocks(place, deviation, jump, noise_mm, threshold):
-    """Per end and length: the block's least distance from what the next points foretell, its limit, its indices.
+    """Per end and length: the block's least distance from the predictions, its limit, its indices.
 
-    Foretold are the next point, the line through two and the parabola through three. Errors grow fast towards a
-    singularity, where runs often end: twice the growth between the next two points is allowed.
+    The next point, the line through the next two and the parabola through the next three predict the block. Errors grow
+    fast towards a singularity, where runs often end: twice the growth between the next two points is allowed.
     """
     for order in (1, -1):
         index, steps, gaps = np.arange(len(place))[::order], jump[::order], np.diff(place)[::order]

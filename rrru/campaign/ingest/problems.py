@@ -9,7 +9,7 @@ _LENGTH = 500
 
 
 class Problems:
-    """Problems of one file by kind; each kind lists the first 20 and counts the rest."""
+    """Problems of one file by kind; each kind lists the first 20 and counts all."""
 
     def __init__(self, file):
         self._file = str(file)

@@ -14,7 +14,7 @@ _LEAST_WIDTH = 0.05
 
 @dataclass(frozen=True)
 class Registration:
-    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,); what it leaves at `points` points.
+    """Rigid motion: robot = rotation (3, 3) @ instrument + translation (3,), and its residuals at `points` points.
 
     placed_mm (n, 3): the measured positions in the robot's frame; off_mm (n,): how far these are from the commanded.
     """
@@ -31,7 +31,7 @@ class Registration:
     def covariance(self):
         """Covariance (6, 6) of the translation in mm and the rotation vector in rad.
 
-        If what is left were random and alike at all points; NaN where three points leave no freedom.
+        It holds for residuals that are random and of one size at all points; NaN for three points (no freedom).
         """
         return _covariance(self.placed_mm, self.off_mm, self.rotation, self.translation)
 
@@ -51,9 +51,9 @@ def register(measured_mm, command_mm):
     """Registration that best maps measured (n, 3) to commanded positions (n, 3), both in mm (least squares; Kabsch's
     solution).
 
-    The commanded positions stand for where the robot was, which they only nearly are: whatever part of the robot's own
-    errors looks like a rigid motion leaks into the registration and is gone from the residuals. A frame error of the
-    robot's base cannot be seen in positions registered this way; to see it, give points measured on the base itself.
+    The commanded positions replace the true ones, which they only approximate. The registration therefore absorbs every
+    part of the robot's own errors that is a rigid motion. A frame error of the robot's base is not identifiable from
+    positions registered this way; to identify it, give points measured on the base itself.
 
     Raises FitError for fewer than three points and for points on one line, and ValueError for arguments of the wrong
     shape.
@@ -76,10 +76,10 @@ def register(measured_mm, command_mm):
 
 
 def _covariance(placed, off, rotation, translation):
-    """Covariance (6, 6) of translation and rotation vector from points (n, 3) and what is left of them (n,), mm, rad.
+    """Covariance (6, 6) of translation and rotation vector from points (n, 3) and residual distances (n,), mm, rad.
 
     A small motion (s, w) in the robot's frame moves a point p by s + w x p; least squares has the covariance
-    v (J^T J)^-1 of (s, w) with the variance v of what is left (3 n - 6 degrees of freedom).
+    v (J^T J)^-1 of (s, w) with the variance v of the residuals (3 n - 6 degrees of freedom).
     """
     from scipy.spatial.transform import Rotation
 
@@ -100,9 +100,9 @@ def _covariance(placed, off, rotation, translation):
 
 def _require_spread(name, position):
     """Raise FitError unless the points (n, 3) span a plane well enough."""
-    count, others, distinct = len(position), position, 0
-    while distinct < 3 and len(others):
-        others, distinct = others[(others != others[0]).any(axis=1)], distinct + 1
+    count, remaining, distinct = len(position), position, 0
+    while distinct < 3 and len(remaining):
+        remaining, distinct = remaining[(remaining != remaining[0]).any(axis=1)], distinct + 1
     if distinct < 3:
         raise FitError(f"{distinct} different {name} positions; allowed: at least 3, not on one line")
     along, off, _ = np.linalg.svd(position - position.mean(axis=0), compute_uv=False) / np.sqrt(count)

@@ -11,7 +11,7 @@ from rrru.kinematics.robot import Robot
 
 AXES = ("x", "y", "z")
 COMMAND = tuple(f"command_{axis}_mm" for axis in AXES)
-# orientations by what they belong to: rotation vectors, and quaternions that stand for them
+# orientations, commanded and measured: rotation vectors, and quaternions that replace them
 TURNS = {name: tuple(f"{name}_r{axis}_rad" for axis in AXES) for name in ("command", "measured")}
 QUATERNIONS = {name: tuple(f"{name}_q{part}" for part in "xyzw") for name in TURNS}
 _DRIVE_NAMES = {frozenset({"rad"}): "drive angles", frozenset({"mm"}): "slider positions"}

@@ -32,13 +32,13 @@ class IngestSpec:
     "inch"; speeds are mm/s, payloads kg). drive_unit: of drive values that are lengths, None as `unit`. angle_unit:
     "rad" or "deg". frame: of the measured positions; "register" solves the six numbers between it and the robot frame
     from `registration_points`, pairs (run, point), none for all.
-    extra_columns: "refuse" or "ignore" what nobody declared. elbow: assembly of the legs, "out" or "in". targets: known
-    places of reflectors on the platform in mm, by name; others are found from the file. world_targets: names of those
-    that stand beside the robot, their places in its frame. format: how the file is written; commands: a second file
-    with what was commanded, and its format, see `rrru.campaign.ingest.commands`; time_format: of strptime, of times of
-    day in `time_s`. signs: drive -> -1 where the file counts its values the other way round; order: names of the drives
-    to which the file's columns of drive values belong, in their order, none for the robot's own order. motion: how the
-    robot moved between the rows, None where nobody states it.
+    extra_columns: "refuse" or "ignore" undeclared columns. elbow: assembly of the legs, "out" or "in". targets: known
+    places of reflectors on the platform in mm, by name; others are estimated from the file. world_targets: names of
+    those that are fixed next to the robot, their places in its frame. format: how the file is written; commands: a
+    second file with the commanded positions, and its format, see `rrru.campaign.ingest.commands`; time_format: of
+    strptime, of times of day in `time_s`. signs: drive -> -1 where the file counts its values in the opposite sense;
+    order: names of the drives to which the file's columns of drive values belong, in their order, none for the robot's
+    own order. motion: how the robot moved between the rows, None where not stated.
     """
 
     path: str
@@ -102,7 +102,7 @@ class IngestSpec:
         given = {entry.name: section[entry.name] for entry in fields(cls)[1:] if entry.name in section}
         points = tuple(tuple(pair) for pair in given.pop("registration_points", ()))
         places = {name: tuple(place) for name, place in given.pop("targets", {}).items()}
-        beside, order = tuple(given.pop("world_targets", ())), tuple(given.pop("order", ()))
+        on_world, order = tuple(given.pop("world_targets", ())), tuple(given.pop("order", ()))
         commands = given.pop("commands", None)
         if "motion" in given:
             given["motion"] = _stated(section)
@@ -111,7 +111,7 @@ class IngestSpec:
             section["ingest"],
             registration_points=points,
             targets=places,
-            world_targets=beside,
+            world_targets=on_world,
             order=order,
             format=Format.from_config(given.pop("format", None)),
             commands=commands["file"],

@@ -1,9 +1,9 @@
-"""The cells of point lists as trackers' programs write them: names, units and spreads by what their headers say.
+"""The cells of point lists as trackers' programs write them: names, units and uncertainties from their headers.
 
 A list of SpatialAnalyzer is text with comment lines, "// ..", above rows of point names and coordinates, whose last
-comment names the columns. A Leica-style list is CSV with units in the names of its columns and, beside each coordinate,
-its expanded uncertainty U(95), which is twice the standard deviation: coverage factor k = 2, JCGM 100:2008 (GUM), 6.3
-and G.6.6.
+comment names the columns. A Leica-style list is CSV with units in the names of its columns. After each coordinate it
+has the expanded uncertainty U(95), which is twice the standard deviation: coverage factor k = 2, JCGM 100:2008 (GUM),
+6.3 and G.6.6.
 """
 
 import json
@@ -161,9 +161,11 @@ def _one_clock(names, rows):
     if not {"date", "time"} <= set(keys):
         return names, rows
     day, time = keys.index("date"), keys.index("time")
-    kept = [k for k in range(len(names)) if k not in (day, time)]
+    unchanged = [k for k in range(len(names)) if k not in (day, time)]
 
     def joined(row):
-        return [*(row[k] for k in kept), f"{row[day]} {row[time]}".strip()] if len(row) == len(names) else row[:-1]
+        if len(row) != len(names):
+            return row[:-1]
+        return [*(row[k] for k in unchanged), f"{row[day]} {row[time]}".strip()]
 
-    return [*(names[k] for k in kept), "Date Time"], [joined(row) for row in rows]
+    return [*(names[k] for k in unchanged), "Date Time"], [joined(row) for row in rows]

@@ -1,4 +1,4 @@
-"""The cells of files that keep numbers as numbers: Excel workbooks and parquet."""
+"""The cells of files with typed numbers: Excel workbooks and parquet."""
 
 import io
 import re

@@ -26,8 +26,8 @@ class Distances:
     """Distances of n places from the first one.
 
     mechanism: its `parameters` are estimated; actuators (n, K), measured_mm (n, 3): actuator values and places in any
-    one frame. Every distance carries the first place's noise too; unless `alike`, residuals are multiplied by
-    `whitener`, which leaves them independent and with the noise of one axis each. The paper counts all distances alike.
+    one frame. Every distance has the first place's noise too. Unless `alike`, residuals are multiplied by `whitener`,
+    which makes them independent with the noise of one axis each. The paper gives all distances equal weight.
     Raises FitError where a number is not finite.
     """
 

@@ -6,7 +6,7 @@ platform's orientation in the robot's frame and M the sensor's on the platform, 
     s = M' R' B' u,    roll = atan2(s_y, s_z),    pitch = atan2(-s_x, hypot(s_y, s_z))
 
 (Pedley, Tilt sensing using a three-axis accelerometer, Freescale application note AN3461, 2013, eqs. 25 and 26). An
-instrument whose frame is registered to the robot alone does not see B, gravity does.
+instrument whose frame is registered to the robot alone does not determine B; readings against gravity do.
 """
 
 from dataclasses import dataclass

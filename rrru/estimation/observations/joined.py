@@ -18,7 +18,7 @@ class Part:
 
     observations: with residuals (n, a) in their own unit; whiten: makes their errors independent with unit variance,
     from (n, a, ...) to (n, a, ...), such as a `WhiteNoise` of their standard deviation; places: where in the joint
-    values the values lie that these readings depend on, None for all.
+    values the values are that these readings depend on, None for all.
     """
 
     observations: Observations
@@ -26,8 +26,8 @@ class Part:
     places: slice | None = None
 
     @property
-    def own(self) -> slice:
-        """Where in the joint values its own lie."""
+    def columns(self) -> slice:
+        """Where in the joint values its values are."""
         return slice(None) if self.places is None else self.places
 
 
@@ -45,15 +45,15 @@ class Joined:
 
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Whitened readings minus predictions (N, 1) at values (p,)."""
-        rows = [part.whiten(part.observations.residual(values[part.own])).reshape(-1, 1) for part in self.parts]
+        rows = [part.whiten(part.observations.residual(values[part.columns])).reshape(-1, 1) for part in self.parts]
         return np.concatenate(rows)
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
         """Derivative (N, 1, p) of the residual by the values (p,)."""
         rows = []
         for part in self.parts:
-            own = part.whiten(part.observations.jacobian(values[part.own]))
-            whole = np.zeros((own.shape[0] * own.shape[1], 1, len(values)))
-            whole[:, 0, part.own] = own.reshape(len(whole), -1)
-            rows.append(whole)
+            white = part.whiten(part.observations.jacobian(values[part.columns]))
+            padded = np.zeros((white.shape[0] * white.shape[1], 1, len(values)))
+            padded[:, 0, part.columns] = white.reshape(len(padded), -1)
+            rows.append(padded)
         return np.concatenate(rows)

@@ -1,10 +1,10 @@
-"""Where the estimation of anchors from lengths alone starts: closed forms of the lengths, without a guess.
+"""Start values of anchors estimated from lengths alone: closed forms of the lengths, without a guess.
 
 With the first anchor at the origin, L_ij^2 - L_i0^2 = |a_j|^2 - 2 p_i . a_j has, less its mean over the rows, rank d:
 its singular vectors are anchors and places up to a linear map, and L_i0^2 = |p_i|^2 is linear in the square of this
 map (Crocco, Del Bue, Murino, A bilinear approach to the position self-calibration of multiple sensors, IEEE
-Transactions on Signal Processing 60, 2012). So lengths that miss nothing give the machine in closed form. In space
-five anchors in one plane leave this map open for good, since any place's height above them makes up for it.
+Transactions on Signal Processing 60, 2012). So lengths without a missing part give the machine in closed form. In space
+five anchors in one plane do not determine this map, since it is confounded with the places' heights above them.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def propose_anchors(
 
 
 def solve_anchors(squares: FloatArray, dimensions: int) -> FloatArray | None:
-    """Anchors (n, d) of squared distances (N, n) in mm^2, the first at the origin; None where they do not tell."""
+    """Anchors (n, d) of squared distances (N, n) in mm^2, the first at the origin; None where undetermined."""
     less = squares[:, 1:] - squares[:, :1]
     left, size, right = np.linalg.svd(less - less.mean(axis=0), full_matrices=False)
     if len(size) < dimensions or size[dimensions - 1] <= 1e-9 * size[0]:
@@ -69,7 +69,7 @@ def align_to_frame(anchors: FloatArray, points: FloatArray | None = None) -> Flo
     """Points (m, d), by default the anchors, turned, moved and mirrored into the frame that the anchors (n, d) fix.
 
     The first anchor is the origin, the second is on the positive x axis, the third above it, in space in the plane of x
-    and y; lengths do not tell a space from its mirror image, and the fourth is put at positive z.
+    and y. Lengths do not distinguish a space from its mirror image, so the fourth is put at positive z.
     """
     origin = anchors[0]
     axes, upper = np.linalg.qr((anchors[1 : anchors.shape[1] + 1] - origin).T)

@@ -70,7 +70,7 @@ class Lengths:
 
     @property
     def eliminated(self) -> int:
-        """Number of parameters that every row brings."""
+        """Number of eliminated parameters of every row."""
         return self.dimensions if self.places_mm is None else 0
 
     @cached_property
@@ -145,7 +145,7 @@ class Lengths:
         return np.asarray(columns - by_place @ (gain @ columns))
 
     def place_leverage(self, values: FloatArray) -> FloatArray:
-        """Share (N, k) of every reading's variance that the eliminated place of its row takes, at values (p,)."""
+        """Share (N, k) of every reading's variance that the eliminated place of its row absorbs, at values (p,)."""
         if not self.eliminated:
             return np.zeros(self.counted.shape)
         by_place = self.slopes(values)[1]
@@ -154,17 +154,17 @@ class Lengths:
     def normalization(self, values: FloatArray) -> tuple[int, float]:
         """Number of readings in use less that of eliminated places' coordinates, and the log of a constant factor.
 
-        The factor is that of the density of the readings, the places integrated out under a flat prior of density 1
-        per mm, but for exp(-|whitened residual|^2 / 2) and a factor (2 pi)^-1/2 for each of that number:
-        noise^-used |J' J / noise^2|^-1/2, J (k, d) the derivative by the place. Rows that do not tell their place
-        count for nothing.
+        The density of the readings, with the places integrated out under a flat prior of density 1 per mm, is this
+        factor times exp(-|whitened residual|^2 / 2) times (2 pi)^-1/2 for each of that number. The factor is
+        noise^-used |J' J / noise^2|^-1/2, J (k, d) the derivative by the place. Rows that do not determine their place
+        do not count.
         """
         used = self.weight.sum(axis=1)
         if not self.eliminated:
             return int(used.sum()), -float(used.sum() * np.log(self.noise_mm))
-        telling = used >= self.eliminated
-        by_place = self.slopes(values)[1][telling] * self.weight[telling][..., None]
-        count = int(used[telling].sum()) - self.eliminated * int(telling.sum())
+        determined = used >= self.eliminated
+        by_place = self.slopes(values)[1][determined] * self.weight[determined][..., None]
+        count = int(used[determined].sum()) - self.eliminated * int(determined.sum())
         size = np.linalg.svd(by_place, compute_uv=False)
         return count, -float(np.log(np.maximum(size, 1e-9)).sum()) - count * float(np.log(self.noise_mm))
 

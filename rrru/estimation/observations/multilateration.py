@@ -19,7 +19,7 @@ MIN_DISTANCE_MM = 1e-9
 _STEP_TOLERANCE_MM, _MAX_STEPS = 1e-6, 60
 # damping after a step that does not lower the loss, and at least, in units of the row's curvature
 _FIRST_DAMPING, _MIN_DAMPING = 1e-3, 1e-12
-# weight in the linear solution of a reading that is not used: where the others have two solutions it says which
+# weight in the linear solution of a reading that is not used: it decides where the others have two solutions
 _UNUSED_WEIGHT = 1e-3
 # anchors whose least spread is a smaller share of the next are nearly in a plane: both sides of it are searched
 _FLAT_SPREAD = 0.2
@@ -52,7 +52,7 @@ class Multilateration:
     def least_squares(self) -> FloatArray:
         """Places (N, d) of least squares.
 
-        Anchors near a plane tell badly on which side of it a place is: both are tried, the positive one first.
+        Anchors near a plane hardly determine on which side of it a place is: both are tried, the positive one first.
         """
         weight, solutions = self.used.astype(float), self._linear_solutions()
         found = [self._minima(start, weight, np.inf) for start in solutions]
@@ -69,12 +69,12 @@ class Multilateration:
         if not len(poor):
             return places
         count = self.used.shape[1]
-        # the others of such a row without each reading in turn
+        # such a row without each reading in turn
         row, bad = np.tile(poor, count), np.repeat(np.arange(count), len(poor))
-        others = Multilateration(self.anchors, self.heights_mm, self.lengths[row], self.used[row])
+        repeated = Multilateration(self.anchors, self.heights_mm, self.lengths[row], self.used[row])
         without = self.used[row] & (np.arange(count) != bad[:, None])
         starts = Multilateration(self.anchors, self.heights_mm, self.lengths[row], without).least_squares()
-        found, losses = others._minima(starts, self.used[row].astype(float), cauchy_mm)
+        found, losses = repeated._minima(starts, self.used[row].astype(float), cauchy_mm)
         best = losses.reshape(count, -1).argmin(axis=0)
         better = losses.reshape(count, -1)[best, np.arange(len(poor))] < loss[poor]
         places[poor[better]] = found.reshape(count, len(poor), -1)[best, np.arange(len(poor))][better]
@@ -129,7 +129,7 @@ class Multilateration:
     def _linear_solutions(self) -> list[FloatArray]:
         """Places (N, d) that solve the linear equations: one, of flat anchors two that mirror each other.
 
-        Of flat anchors |p|^2 tells how far off their plane a place is.
+        For flat anchors |p|^2 determines the distance of a place from their plane.
         """
         middle = self.anchors.mean(axis=0)
         _, spread, axes = np.linalg.svd(self.anchors - middle)

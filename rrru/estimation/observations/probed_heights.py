@@ -1,4 +1,4 @@
-"""Heights that a probe touches and distances between two places that calipers see, one number per reading.
+"""Heights by a probe and distances between two places by calipers, one number per reading.
 
 Both are one kind because a printer's calibration weighs them against each other by one factor.
 """
@@ -67,7 +67,7 @@ class ProbedHeights:
 
     @last_kept
     def places(self, deviations: FloatArray) -> FloatArray:
-        """Where the robot stands, (n + 2 m, 3), at `actuators` under deviations (p,)."""
+        """Positions (n + 2 m, 3) of the robot at `actuators` under deviations (p,)."""
         return self.mechanism.forward(self.actuators, deviations)
 
     def predicted_mm(self, deviations: FloatArray) -> FloatArray:
@@ -77,7 +77,7 @@ class ProbedHeights:
         return np.concatenate([places[:n, 2], np.linalg.norm(places[n : n + m] - places[n + m :], axis=1)])
 
     def gradient(self, places: FloatArray) -> FloatArray:
-        """Derivative (n + m, n + 2 m, 3) of the readings by the places (n + 2 m, 3) at which the robot stands."""
+        """Derivative (n + m, n + 2 m, 3) of the readings by the robot's positions (n + 2 m, 3)."""
         n, m = len(self.height_mm), len(self.distance_mm)
         between = places[n : n + m] - places[n + m :]
         slope = np.zeros((n + m, n + 2 * m, 3))

@@ -60,7 +60,7 @@ class Shape:
         return (self._fixed_frame @ (self.measured_mm - moved).ravel())[:, None]
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
-        """Derivative (3n - 6, 1, p) of the residual; the projection removes how the best rotation follows."""
+        """Derivative (3n - 6, 1, p) of the residual; the projection removes the change of the best rotation."""
         _, turn, places = self._aligned(values)
         slope = turn @ self.mechanism.parameter_jacobian(places, self.actuators, values)
         return -(self._fixed_frame @ slope.reshape(-1, slope.shape[-1]))[:, None]

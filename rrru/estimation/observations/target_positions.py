@@ -1,4 +1,4 @@
-"""Positions of targets that an instrument sees, with the orientations that it reads at the same stops.
+"""Positions of targets that an instrument measures, with the orientations that it measures at the same stops.
 
     residual = measured - predicted,    n rows of positions in mm, then k rows of rotation vectors times an arm
 
@@ -28,9 +28,9 @@ class TargetPositions:
     """Targets seen at n poses.
 
     mechanism: its `parameters` are estimated; actuators (n, K), measured_mm, start_mm: (n, 3) actuator values, measured
-    positions and positions near which the tool's are found (the commanded ones); readings: the measured positions with
-    what else was read, None where the tool's positions are all. Raises FitError where a number is not finite or the
-    nominal robot cannot take a pose.
+    positions and positions near which the tool's are found (the commanded ones); readings: the measured positions
+    together with all other readings, None where only the tool's positions were read. Raises FitError where a number is
+    not finite or the nominal robot cannot take a pose.
     """
 
     # ASSUME a laser tracker on a small machine; a calibration takes the campaign's noise
@@ -104,7 +104,7 @@ class TargetPositions:
             return self.mechanism.mean_distance(self.actuators, self.nominal_mm, self.measured_mm)
 
         def evaluate(deviations: FloatArray) -> FloatArray:
-            off = np.array([np.linalg.norm(self.residual(one), axis=1) for one in deviations])
+            off = np.array([np.linalg.norm(self.residual(row), axis=1) for row in deviations])
             return np.where(np.isfinite(off).all(axis=1), off.mean(axis=1), np.inf)
 
         return evaluate

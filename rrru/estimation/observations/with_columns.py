@@ -15,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class WithColumns:
-    """Readings of another kind and what k more parameters change in them; the values are its own, then these k.
+    """Readings of another kind with k more linear parameters; the values are those of the readings, then these k.
 
     columns (n, a, k): change of the readings, in their unit, per unit of each parameter. Raises FitError where one is
     not finite.
@@ -42,10 +42,10 @@ class WithColumns:
 
     def residual(self, values: FloatArray, /) -> FloatArray:
         """Readings minus prediction (n, a) at values (p + k,)."""
-        own, effects = self._split(values)
-        return self.observations.residual(own) - self.columns @ effects
+        parameters, effects = self._split(values)
+        return self.observations.residual(parameters) - self.columns @ effects
 
     def jacobian(self, values: FloatArray, /) -> FloatArray:
         """Derivative (n, a, p + k) of the residual by the values."""
-        own, _ = self._split(values)
-        return np.concatenate([self.observations.jacobian(own), -self.columns], axis=-1)
+        parameters, _ = self._split(values)
+        return np.concatenate([self.observations.jacobian(parameters), -self.columns], axis=-1)

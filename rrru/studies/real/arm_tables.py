@@ -21,7 +21,7 @@ _FUNCTION, _WAVES, _SHOWN = ("drive_error_function", 0), ("transmission_orders",
 # a reading held out is far off from so many medians on; so many are told
 _FAR, _TOLD = 20.0, 6
 # what ingest says of every such series
-_USUAL = ("no column", "left out, as nobody declared them", "no commanded positions")
+_USUAL = ("no column", "undeclared columns left out", "no commanded positions")
 
 
 def tables(studied: Studied) -> dict[str, pd.DataFrame]:

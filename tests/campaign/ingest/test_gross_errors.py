@@ -319,4 +319,4 @@ def test_columns_that_look_like_the_drives_are_proposed_as_such(tmp_path):
         ingest(replace(_SPEC, path=str(path)), robot)
     text = str(refused.value)
     assert f'columns: {{{drives[0]}: "J1 [rad]", {drives[1]}: "J2 [rad]"' in text
-    assert "extra_columns: ignore" in text.split("remark")[1] and "J1 [rad]: got a column that nobody" not in text
+    assert "extra_columns: ignore" in text.split("remark")[1] and "J1 [rad]: got an undeclared column" not in text

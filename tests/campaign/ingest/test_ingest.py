@@ -147,7 +147,7 @@ def test_a_blank_optional_column_counts_as_missing(field, tmp_path):
 def test_columns_nobody_declared_can_be_left_out(field, expected, tmp_path):
     result = ingest(IngestSpec(written(field.assign(humidity=40.0), tmp_path / "f.csv"), extra_columns="ignore"), ROBOT)
     same(result.measurements, expected)
-    assert result.notes == ("left out, as nobody declared them: humidity",)
+    assert result.notes == ("undeclared columns left out: humidity",)
 
 
 def test_text_files_of_other_systems_are_taken(expected, tmp_path):
@@ -179,7 +179,7 @@ def test_a_broken_beam_is_kept_and_marked(field, tmp_path):
     frame.loc[[40, 200], "measured_z_mm"] += [12.0, -30.0]
     result = ingest(IngestSpec(written(frame, tmp_path / "f.csv")), ROBOT)
     assert np.flatnonzero(result.measurements["status"] == "outlier").tolist() == [40, 200]
-    assert result.notes == ("2 points marked as outliers, kept and left out of fits: row 42, row 202",)
+    assert result.notes == ("2 points marked as outliers, in the table but not in fits: row 42, row 202",)
     assert result.measurements["measured_z_mm"].to_list() == frame["measured_z_mm"].to_list()
 
 

@@ -45,5 +45,5 @@ def test_the_markers_of_both_hands_and_the_frame_are_found(tmp_path):
 def test_rows_have_to_say_which_hand_they_are_of(tmp_path):
     with pytest.raises(IngestError, match="column target: got no such column; allowed: right, left"):
         _ingested(_file().drop(columns="target"), tmp_path)
-    with pytest.raises(IngestError, match=r"head.*what a hand carries: right, left"):
+    with pytest.raises(IngestError, match=r"head.*a target on an end effector: right, left"):
         _ingested(_file().assign(target=["head", "left"] * 40), tmp_path)

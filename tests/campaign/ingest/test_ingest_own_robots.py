@@ -106,7 +106,7 @@ def test_angles_alone_in_another_unit_than_stated_are_one_problem(factor, stated
 
 def test_a_column_of_another_robot_is_refused_with_the_names_of_this_one(tmp_path):
     """theta1_rad is no joint of the arm."""
-    with pytest.raises(IngestError, match=r"theta1_rad.*nobody declared"):
+    with pytest.raises(IngestError, match=r"theta1_rad.*an undeclared column"):
         _ingested(_file().assign(theta1_rad=0.0), tmp_path)
 
 

@@ -84,5 +84,5 @@ def test_a_robot_that_stands_on_its_head_is_refused(tmp_path):
 def test_the_other_kind_of_drives_is_an_unknown_column(measured, tmp_path):
     name, robot, table = measured
     other = DRIVES["delta" if name == "ptt3" else "ptt3"]
-    with pytest.raises(IngestError, match=rf"(?s)unknown column.*{other[0]}|{other[0]}.*nobody declared"):
+    with pytest.raises(IngestError, match=rf"(?s)unknown column.*{other[0]}|{other[0]}.*an undeclared column"):
         _taken(table.rename(columns=dict(zip(DRIVES[name], other, strict=True))), robot, tmp_path)

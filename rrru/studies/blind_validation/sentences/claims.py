@@ -97,7 +97,7 @@ _NOTES = {
     "how the file was driven": r"corrected model not driven: .*",
     "a part of a sentence": r"closed at its drive values instead|allowed: .*|corrected_drives holds all .*"
     r"|an effect is found .*|the others are .*",
-    "the file cannot hold play": r"play of (?P<names>.*)",
+    "the file cannot hold play": r"backlash of (?P<names>.*)",
     "the file cannot hold compliance": r"compliance of (?P<names>.*)",
     "the file cannot hold an effect": r"(?P<name>[a-z]+(?:_[a-z]+)*)",
 }
@@ -113,10 +113,10 @@ _READ = {
     "orientations are turned": rf"orientations are read turned by {_X} rad from the platform's",
     "zeros are lost": r"(zeros of|the zero of) (?P<count>\d+) drives? (are|is) lost, "
     rf"by {_X} (?P<unit>degrees|mm) at (?P<site>[^:]+): .*",
-    "far from ordinary errors": rf"the nominal robot misses by {_X} mm rms, {_Y} % of the robot's size of .*",
+    "far from ordinary errors": rf"the nominal robot has an error of {_X} mm rms, {_Y} % of the robot's size of .*",
     "points are outliers": r"(?P<count>\d+) points? marked as outliers?, .*",
     "stale readings": r"(?P<count>\d+) stale readings, .*",
-    "undeclared columns": r"left out, as nobody declared them: (?P<names>.*)",
+    "undeclared columns": r"undeclared columns left out: (?P<names>.*)",
     "beyond a range": r"(?P<count>\d+) of (?P<rows>\d+) points are outside of the range of .*",
     "rows may be shifted": r".*: the rows may be shifted",
     "far from the commands": r"measured positions are .* from the commanded ones in the median: .*",
