@@ -10,15 +10,15 @@ from rrru.diagnosis.problem import GEOMETRY
 def why_no_answer(inference, stated_mm=None):
     """Why no cause can be named, in words; empty where the fit of the best answer may be read.
 
-    A fit whose geometric errors end at their bounds has its minimum where no robot is, and one that leaves many times
-    the noise has a model of another robot, or readings of another campaign. stated_mm: noise per axis, None where
-    nobody states it.
+    A fit whose geometric errors end at their bounds has its minimum outside of all plausible robots. A fit with
+    residuals of many times the noise has a model of another robot, or readings of another campaign. stated_mm: noise
+    per axis, None where it is not stated.
     """
     return "; ".join(filter(None, (_at_bounds(inference), _far_off(inference, stated_mm))))
 
 
 def _at_bounds(inference):
-    """Which geometric errors bounds hold, in words; empty where none."""
+    """Which geometric errors end at bounds, in words; empty where none."""
     estimate, parameters = inference.fit.estimate, inference.case.mechanism.parameters
     held = np.flatnonzero(estimate.at_bound[estimate.parameters.places[GEOMETRY]])
     if not len(held):

@@ -25,7 +25,7 @@ WITH_LEGS = EFFECTS.keys() - _OF_ALL
 
 
 def _stub(explained=0.0, library=EFFECTS):
-    """Evidence that tells how much a hypothesis explains, in units of the noise."""
+    """Evidence with the part that a hypothesis explains, in units of the noise."""
     return SimpleNamespace(
         library=library,
         explained=lambda h, effects: explained if h.effects & set(effects) else 0.0,
@@ -183,7 +183,7 @@ def _decided(*entries):
     return decide(Posterior(hypotheses, np.log(np.maximum(weights, 1e-300)), unexplained), EFFECTS)
 
 
-LAG, PLAY, TILT, HEAT = (EffectTerm(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
+LAG, BACKLASH, TILT, HEAT = (EffectTerm(name) for name in ("servo_lag", "backlash", "axis_tilt", "thermal_growth"))
 
 
 def test_nothing_is_decided_where_nothing_is_most_probable():
@@ -197,7 +197,7 @@ def test_nothing_is_decided_where_nothing_is_most_probable():
 
 def test_what_probably_acts_is_named_and_the_probability_is_that_of_exactly_this():
     verdict = _decided(
-        ((LAG, PLAY), 0.73, False), ((PLAY,), 0.24, False), ((), 0.01, False), ((PLAY, HEAT), 0.02, False)
+        ((LAG, BACKLASH), 0.73, False), ((BACKLASH,), 0.24, False), ((), 0.01, False), ((BACKLASH, HEAT), 0.02, False)
     )
     assert verdict.label == "backlash+servo_lag" and verdict.confusable_with == ()
     assert verdict.probability == pytest.approx(0.73)
@@ -208,35 +208,35 @@ def test_what_probably_acts_is_named_and_the_probability_is_that_of_exactly_this
 def test_a_name_needs_all_sets_together_and_not_one_that_is_probable():
     """No set of it is the most probable one, and it acts in most of them."""
     more = {(): 0.2, (LAG,): 0.2, (TILT,): 0.2, (LAG, TILT): 0.16}
-    verdict = _decided(*(((PLAY, *others), p, False) for others, p in more.items()), ((HEAT,), 0.24, False))
+    verdict = _decided(*(((BACKLASH, *others), p, False) for others, p in more.items()), ((HEAT,), 0.24, False))
     assert verdict.effects == ("backlash",) and verdict.probability == pytest.approx(0.2)
 
 
 def test_hypotheses_of_one_set_add_up():
     legs = [EffectTerm("servo_lag", 0, leg) for leg in (1, 2, 3)]
-    verdict = _decided(*(((leg,), 0.25, False) for leg in legs), ((PLAY,), 0.25, False))
+    verdict = _decided(*(((leg,), 0.25, False) for leg in legs), ((BACKLASH,), 0.25, False))
     assert verdict.label == "servo_lag" and verdict.probability == pytest.approx(0.75)
     assert verdict.confusable_with == ("backlash",) and verdict.groups == ()
 
 
 def test_what_is_unexplained_adds_up_over_sets():
-    verdict = _decided(((), 0.35, True), ((LAG,), 0.25, True), ((PLAY,), 0.15, False), ((TILT,), 0.25, False))
+    verdict = _decided(((), 0.35, True), ((LAG,), 0.25, True), ((BACKLASH,), 0.15, False), ((TILT,), 0.25, False))
     assert verdict.label == "unexplained" and verdict.probability == pytest.approx(0.6)
     assert verdict.confusable_with == ("axis_tilt", "servo_lag", "backlash")
 
 
 @pytest.mark.parametrize(("probability", "expected"), [(0.75, "servo_lag+unexplained"), (0.6, "unexplained")])
-def test_beside_the_unexplained_the_same_rule_holds(probability, expected):
+def test_with_something_unexplained_the_same_rule_holds(probability, expected):
     verdict = _decided(((LAG,), probability, True), ((), 1.0 - probability, True))
     assert verdict.label == expected
     assert ("servo_lag" in verdict.confusable_with) is (expected == "unexplained")
 
 
 def test_causes_that_exclude_each_other_are_a_group():
-    verdict = _decided(((LAG, TILT), 0.55, False), ((LAG, PLAY), 0.43, False), ((LAG,), 0.02, False))
+    verdict = _decided(((LAG, TILT), 0.55, False), ((LAG, BACKLASH), 0.43, False), ((LAG,), 0.02, False))
     (group,) = verdict.groups
     assert group.names == ("axis_tilt", "backlash") and group.probability == pytest.approx(0.98)
-    # the most probable one stands for it in the model
+    # the most probable one represents it in the model
     assert set(verdict.effects) == {"servo_lag", "axis_tilt"} and verdict.probability == pytest.approx(0.55)
     decisions = [verdict.decision(name) for name in ("servo_lag", "axis_tilt", "backlash", "thermal_growth")]
     assert decisions == ["named", "group", "group", "excluded"]
@@ -244,8 +244,8 @@ def test_causes_that_exclude_each_other_are_a_group():
 
 
 def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_is_called_possible():
-    single = [((PLAY,), 0.2, False), ((LAG,), 0.2, False), ((TILT,), 0.1, False)]
-    verdict = _decided(((LAG, PLAY), 0.36, False), *single, ((), 0.14, True))
+    single = [((BACKLASH,), 0.2, False), ((LAG,), 0.2, False), ((TILT,), 0.1, False)]
+    verdict = _decided(((LAG, BACKLASH), 0.36, False), *single, ((), 0.14, True))
     assert set(verdict.effects) == {"servo_lag", "backlash"} and verdict.groups == ()
     assert {verdict.decision(name) for name in verdict.effects} == {"possible"} and verdict.sure < 0.7
     assert not set(verdict.confusable_with) & set(verdict.effects)
@@ -254,21 +254,24 @@ def test_where_no_cause_is_probable_enough_the_most_probable_answer_stands_and_i
 def test_causes_that_have_nothing_to_do_with_each_other_are_no_group():
     """Two of 0.6 each, independent: neither is named with the other in one breath."""
     verdict = _decided(
-        ((LAG, TILT, PLAY), 0.36, False), ((LAG, TILT), 0.24, False), ((LAG, PLAY), 0.24, False), ((LAG,), 0.16, False)
+        ((LAG, TILT, BACKLASH), 0.36, False),
+        ((LAG, TILT), 0.24, False),
+        ((LAG, BACKLASH), 0.24, False),
+        ((LAG,), 0.16, False),
     )
     assert verdict.groups == () and verdict.effects == ("servo_lag",)
     assert set(verdict.confusable_with) == {"axis_tilt", "backlash"}
 
 
 def test_a_group_has_as_few_causes_as_make_it_sure():
-    entries = [((TILT,), 0.5, False), ((PLAY,), 0.42, False), ((HEAT,), 0.08, False)]
+    entries = [((TILT,), 0.5, False), ((BACKLASH,), 0.42, False), ((HEAT,), 0.08, False)]
     assert _decided(*entries).groups[0].names == ("axis_tilt", "backlash")
-    entries = [((TILT,), 0.36, False), ((PLAY,), 0.34, False), ((HEAT,), 0.3, False)]
+    entries = [((TILT,), 0.36, False), ((BACKLASH,), 0.34, False), ((HEAT,), 0.3, False)]
     assert _decided(*entries).groups[0].names == ("axis_tilt", "backlash", "thermal_growth")
 
 
-def test_two_groups_stand_beside_each_other():
-    one, other = [(TILT,), (PLAY,)], [(HEAT,), (LAG,)]
+def test_there_may_be_two_groups():
+    one, other = [(TILT,), (BACKLASH,)], [(HEAT,), (LAG,)]
     entries = [((*a, *b), 0.25, False) for a in one for b in other]
     assert {frozenset(group.names) for group in _decided(*entries).groups} == {
         frozenset({"axis_tilt", "backlash"}),
