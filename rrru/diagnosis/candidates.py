@@ -33,7 +33,7 @@ class Candidates:
 
     @cached_property
     def _blocks(self):
-        """Of the terms of few coefficients: columns' numbers (n,), ends (c + 1,), deviations (s, n), positive (n,)."""
+        """Terms of few coefficients: columns' numbers (n,), ends (c + 1,), deviations (s, n), positive (n,)."""
         few = self.terms[: len(self.terms) - len(self._broad)]
         priors = [self._evidence.priors_of((term,)) for term in few]
         sizes = [sum(len(prior.index) for prior in of_term) for of_term in priors]

@@ -1,8 +1,8 @@
 """Basis of the model discrepancy: smooth functions with many free coefficients each.
 
 They compete with the library on the same data. An effect that acts has few parameters and wins. Where a function wins,
-the gap depends on the drives, the time, the place or the load in a way that the library does not hold, and the verdict
-says "unexplained".
+the gap depends on the drives, the time, the place or the load in a way that the library does not hold. The verdict then
+is "unexplained".
 """
 
 from dataclasses import dataclass, replace

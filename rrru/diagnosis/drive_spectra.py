@@ -187,8 +187,8 @@ def likeliest(data, columns, spectra, fitted):
 def _likeliest_factor(gram, moment, square, count):
     """Highest log likelihood over the factor of all coefficients, and that factor.
 
-    Of a sum of squares with so many degrees of freedom, a Gram matrix (c, c) and moments (c,) of columns of unit
-    coefficients. For each ratio of factor and noise the likeliest noise is known.
+    square: sum of squares with so many degrees of freedom; gram (c, c), moment (c,): of columns of unit coefficients.
+    For each ratio of factor and noise the likeliest noise is known.
     """
     value, turned = np.linalg.eigh(gram)
     value, power = np.maximum(value, 0.0), (turned.T @ moment) ** 2

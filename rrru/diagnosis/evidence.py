@@ -4,13 +4,13 @@ Along each run the data d (one axis, k points) are
 
     d = B b + X c + w + e,   w ~ N(0, level^2 sigma^2 K),   c ~ N(0, (prior_scale sigma)^2 S)
 
-with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior), the
-effects' coefficients c, and a model discrepancy w for whatever the library does not hold (Kennedy and O'Hagan, Bayesian
-calibration of computer models, 2001): K is diagonal in the cosine basis of the run and falls with the frequency, so
-that w is smooth along the path, plus a small part that is not. S is scaled so that `prior_scale` is the rms of the
-effect's part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the positive
-half of it. Prior scales are averaged over a grid, even in their logarithm. None makes a prior wider than the upper
-bound of the effect.
+with noise e as in `rrru.estimation.noise_model`, of mean variance sigma^2, the geometric errors b (weak prior) and the
+effects' coefficients c. The model discrepancy w is for whatever the library does not hold (Kennedy and O'Hagan,
+Bayesian calibration of computer models, 2001). K is diagonal in the cosine basis of the run and falls with the
+frequency. So w is smooth along the path, plus a small part that is not. S is scaled so that `prior_scale` is the rms of
+the effect's part of the gap per axis over sigma, the calibration's share taken out; positive coefficients have the
+positive half of it. Prior scales are averaged over a grid, even in their logarithm. None makes a prior wider than the
+upper bound of the effect.
 
 The shape parameters of an effect may lie between the points of their grid: each has a coefficient N(0, 1) on
 `LinearizedProblem.shape_columns`. So have payload and tilt wherever a compliant effect acts

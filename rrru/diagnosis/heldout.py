@@ -107,8 +107,8 @@ class HeldOut:
     def gains(self, terms, prior_scales, level):
         """Log predictive score that each of the terms adds to that of the others, at these prior scales.
 
-        Without the term its coefficients t are zero. Of a normal distribution with mean m and covariance C the others
-        then have the mean m - C_.t C_tt^-1 m_t and the covariance C - C_.t C_tt^-1 C_t. .
+        Without the term its coefficients t are zero. The others then have the mean m - C_.t C_tt^-1 m_t and the
+        covariance C - C_.t C_tt^-1 C_t. of a normal distribution with mean m and covariance C.
 
         Readings at which a term lacks what it needs do not count.
         """

@@ -138,7 +138,7 @@ def _fewer_blocks(linear, blocks, library):
 
 
 def _best_shapes(linear, blocks):
-    """Of each effect the block of columns that leaves least of the data together with the calibration."""
+    """For each effect the block of columns with the smallest residuals together with the calibration."""
     basis, _ = np.linalg.qr(linear.base.reshape(linear.data.size, -1))
     best = {}
     for key, columns in blocks.items():
@@ -270,8 +270,8 @@ def _rounds(case, calibrated, prior, stated):
             hypothesis, level = posterior.best()
             shaped = any(len(case.library[term.effect].coordinates.shapes) > 1 for term in hypothesis.terms)
             discrepant = not hypothesis.effects.isdisjoint(UNKNOWN)
-            # where a discrepancy function wins, a second linearisation at its fit shows nothing else, unless the model
-            # is nonlinear on the way there or the shape of an effect is still to be fitted
+            # where a discrepancy function wins, a second linearisation at its fit is needed only if the model is
+            # nonlinear on the way there, or the shape of an effect is still to be fitted
             settled = discrepant and small and not shaped
             # try the effect models before the discrepancy basis
             named = posterior.best_of(hypothesis.effects - set(UNKNOWN)) if discrepant and (small or shaped) else None

@@ -30,6 +30,9 @@ from rrru.effects.protocol import PATH, complete_rows, known_values
 from rrru.errors import FitError
 from rrru.estimation.starts import register_measurements
 
+# which points are used, in words
+_USABLE = "allowed: measured points within reach that are no outliers"
+
 
 def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singularity=True, arm_mm=np.nan):
     """The case of a measurement table.
@@ -39,7 +42,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     Raises FitError for an empty table.
     """
     if not len(measurements):
-        raise FitError("the campaign has no points")
+        raise FitError("the campaign has no points; allowed: at least one row: check the file of measurements")
     measurements = register_measurements(measurements, mechanism)
     actuators, command = rows.actuators(measurements, mechanism), rows.command(measurements)
     stop, (course, unknown) = stops(measurements), _course(measurements, mechanism, actuators)
@@ -48,7 +51,7 @@ def make_case(measurements, mechanism, masses, noise_mm, library, use_near_singu
     used = rows.usable(measurements, use_near_singularity) & np.isfinite(motion.position_mm).all(axis=1)
     used &= np.isfinite(mechanism.forward(actuators, guess_mm=command)).all(axis=1)
     if not used.any():
-        raise FitError("the campaign has no point that a diagnosis can use")
+        raise FitError(f"the campaign has no point that a diagnosis can use; {_USABLE}: check the column status")
     testable, untestable = _tested(library, motion, used, _count_numbers(measurements, used, stop))
     for name, function in unknown_functions(mechanism).items():
         if not _lacking(function, motion, used):

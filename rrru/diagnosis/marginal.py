@@ -1,11 +1,11 @@
 """Marginalisation over the many coefficients of a broad term, which leaves a problem in the other columns.
 
-With the whitened Gram matrix G, moments g and prior sizes s of the term's own columns (z) the average over them is that
-of a problem in the other columns (x) alone:
+G is the whitened Gram matrix, g are the moments and s the prior sizes of the term's own columns (z). The average over
+their coefficients is a problem in the other columns (x) alone:
 
     G' = G_xx - G_xz A^-1 G_zx,  g' = g_x - G_xz A^-1 g_z,  A = G_zz + diag(s^-2)
 
-and their evidence in addition to its evidence is 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
+to whose log evidence the term adds 1/2 g_z A^-1 g_z - 1/2 log |I + diag(s) G_zz diag(s)|.
 """
 
 from functools import cached_property

@@ -20,7 +20,7 @@ class Prior(NamedTuple):
 
     @classmethod
     def normal(cls, index):
-        """Of columns of unit deviation, which no prior scale scales."""
+        """Prior of columns of unit deviation, which no prior scale changes."""
         nothing = np.zeros(len(index))
         return cls(index, nothing + 1.0, nothing + np.inf, nothing > 0.0)
 
@@ -54,7 +54,7 @@ class MarginalProblem:
 
     @classmethod
     def of(cls, priors, count, grams):
-        """Of the Priors of so many terms, and after them of their shapes.
+        """The problem with the Priors of so many terms, and after them of their shapes.
 
         grams: from numbers (k,) of columns to their Gram matrices (levels, k, k) and moments (levels, k).
         """

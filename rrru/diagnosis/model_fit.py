@@ -214,9 +214,9 @@ class ModelFit:
         return self.model.terms
 
     def effect_covariance(self, term):
-        """Names of the fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
+        """Names of the q fitted shape parameters of a term's effect, and the covariance (k + q, k + q).
 
-        Of the term's k coefficients, and after them of these q parameters.
+        The covariance is of the term's k coefficients, and after them of these q parameters.
         """
         chosen, shapes = self._places_of(term)
         return shapes, self.estimate.covariance[np.ix_(chosen, chosen)]

@@ -130,8 +130,8 @@ class DiagnosisOptions:
     min_named_probability: float = 0.7
     # with something unexplained an effect that makes less of the gap by itself may be a part of that; the usual 5 %
     min_share_with_unexplained: float = 0.05
-    # an effect that follows the variable of the remainder has to be so many times as large, or it may be a part of that
-    # which has the effect's form by chance; assumed
+    # an effect that follows the variable of the remainder has to be so many times as large: a smaller one may be a part
+    # of the remainder that has its form by chance; assumed
     min_size_per_remainder: float = 2.0
     # causes of less probability are excluded; the usual 5 %
     min_possible_probability: float = 0.05
@@ -227,8 +227,8 @@ class DiagnosisOptions:
     max_mentioned_share: float = 1.5
 
     # --- experiment design: the next runs and poses ---
-    # speed of a fast pass where no `limits` state it, and mass that a loaded pass adds where neither they nor the
-    # efforts of the robot's file say how much; assumed
+    # speed of a fast pass where no `limits` state it, and mass that a loaded pass adds where neither `limits` nor the
+    # efforts of the robot's file determine it; assumed
     default_fast_pass_mm_s: float = 300.0
     default_added_payload_kg: float = 5.0
     # a payload that is not stated is at most this share of what the robot itself moves, and at least so much; assumed

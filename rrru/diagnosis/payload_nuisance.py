@@ -10,8 +10,8 @@ Payload and tilt are common to all effects and no effects themselves: without co
 is averaged over four cases: the mass is as stated or not, and the base is level or not.
 
 The columns of payload and tilt are a linearisation about the coefficients found under weak priors. `nuisance_evidence`
-has the exact product. On a 3-RRRU and a six-axis arm the log evidence, averaged over prior scales, is 0.25 nats off at
-most where the compliant effect acts, and 1.2 nats where another one acts or none.
+has the exact product. The error of the log evidence, averaged over prior scales, was computed for a 3-RRRU and a
+six-axis arm. It is 0.25 nats at most where the compliant effect acts, and 1.2 nats where another one acts or none.
 
 ASSUME even odds of each. Masses come from a scale or a drawing, good to 3 %, or are guessed within 30 % of what hangs
 at the platform. Where no mass is stated there, the error is a tenth of all that moves, as an arm is made to carry. The
@@ -69,8 +69,8 @@ def as_found(problem, prior_scales):
 def with_nuisance(problem, count, blocks, steps, found, grams):
     """The MarginalProblem of so many terms with the errors of payload and tilt as further coefficients.
 
-    blocks: by number of a compliant term the matrix (c, k) of its own k coefficients' coordinates, and the numbers
-    (q, c) of the columns by which a step of each of q nuisance parameters changes its columns; steps: of the nuisance
+    blocks: by number of a compliant term the matrix (c, k) from its k coefficients to coordinates, and the numbers
+    (q, c) of the columns of its changes by a step of each of q nuisance parameters; steps: of the nuisance
     parameters, see `rrru.diagnosis.state.LinearizedProblem`; found (k,): the coefficients that such a step changes,
     the same at all levels; grams: as in `MarginalProblem.of`.
     """

@@ -43,9 +43,9 @@ class Posterior:
 
     @classmethod
     def of(cls, weighed, apart=0.0, expanded=1.0):
-        """Of a list of Weighed hypotheses: single effects, and sets that are not negligible.
+        """The Posterior of a list of Weighed hypotheses without negligible sets of several effects.
 
-        Single effects stay, however improbable: tables show what each does alone.
+        Single effects stay, however improbable: tables show each of them alone.
         """
         least = max(one.height for one in weighed) - OPTIONS.negligible_nats
         chosen = [one for one in weighed if one.height > least or len(one.hypothesis.terms) <= 1]

@@ -1,11 +1,11 @@
 """The unexplained part of a gap: which variable it depends on, how smoothly, and how large it is.
 
-A Gaussian process of one variable at a time is fitted to what the verdict's model and its calibration leave: a function
-f of a drive's value, which makes J f of the positions (J: derivative by the drive), or a function of the place, the
-time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its covariance is
-a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams, Gaussian
-Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. What it
-predicts of a fold, a fifth of all stretches of five points, comes from the others.
+A Gaussian process of one variable at a time is fitted to the residuals of the verdict's model with its calibration. It
+is a function f of a drive's value, which moves the positions by J f (J: derivative by the drive). Or it is a function
+of the place, the time, the payload or the speed for each axis, or steps with the sense of motion of the drives. Its
+covariance is a^2 exp(-d^2 / (2 l^2)) of the distance d, by its values at inducing points (C. Rasmussen and C. Williams,
+Gaussian Processes for Machine Learning, 2006, sec. 8.3); a and l have the highest marginal likelihood of a grid. Each
+fold, a fifth of all stretches of five points, is predicted from the others.
 """
 
 from dataclasses import dataclass

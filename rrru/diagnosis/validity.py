@@ -28,7 +28,7 @@ def _at_bounds(inference):
         f"{parameters.names[k]} = {values[k]:.3g} {parameters.units[k]}" for k in held[: OPTIONS.max_listed_numbers]
     ]
     more = f" and {len(held) - len(shown)} more" if len(held) > len(shown) else ""
-    return f"the fit ends at bounds of the calibration's numbers ({', '.join(shown)}{more})"
+    return f"the fit ends at bounds of calibration parameters ({', '.join(shown)}{more})"
 
 
 def _far_off(inference, stated_mm):
@@ -40,4 +40,4 @@ def _far_off(inference, stated_mm):
     noise = float(np.sqrt(3.0) * axis_mm)
     if left <= OPTIONS.max_left_per_noise * noise:
         return ""
-    return f"the best answer leaves {left:.3g} mm rms, {left / noise:.0f} times the noise of {noise:.2g} mm"
+    return f"the residual of the best answer is {left:.3g} mm rms, {left / noise:.0f} times the noise of {noise:.2g} mm"

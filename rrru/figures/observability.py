@@ -19,9 +19,9 @@ _ROOM_FOR = 9
 
 @style.printed
 def observability(tables, options):
-    """What every set of trajectories can see: directions of parameter space from the best seen to the worst, what
-    each is made of (weights below 0.15, or of more than nine parameters, are not written), the half width of
-    the 95 % interval along it, and its singular value.
+    """Observability by every set of trajectories: directions of parameter space from the best seen to the worst. Each
+    has its weights (those below 0.15, or of more than nine parameters, are not written), the half width of the 95 %
+    interval along it, and its singular value.
     """
     rows = choose.of_campaign(tables, "observability", options["campaign"], "observability")
     rows = rows.assign(half_mm=_QUANTILE_95 * rows["standard_error_mm"])

@@ -49,7 +49,7 @@ def read(folder, campaign, name):
     """The Side of a campaign in a folder of results; raises ConfigError where it is not there or is not calibrated."""
     folder = Path(folder)
     if not folder.is_dir():
-        raise ConfigError(f"compare: there is no folder {folder}")
+        raise ConfigError(f"compare: there is no folder {folder}; allowed: a folder of results")
     place = folder / "campaigns" / campaign
     known = calibrated(folder)
     if campaign not in known:
@@ -97,11 +97,13 @@ def check(first, second):
         values = [nominal["dimensions"].get(key) for nominal in (one, other)]
         if values[0] != values[1]:
             what = f"{first.name} has {key} {values[0]}, {second.name} {values[1]}"
-            raise ConfigError(f"compare: the nominal robots differ: {what}; deviations count from these")
+            raise ConfigError(
+                f"compare: the nominal robots differ: {what}; allowed: the same dimensions, from which deviations count"
+            )
     read = _read_in(first), _read_in(second)
     if read[0] != read[1]:
         what = f"of {first.name} {read[0]}, of {second.name} {read[1]}"
-        raise ConfigError(f"compare: other things were read: {what}; allowed: campaigns with the same readings")
+        raise ConfigError(f"compare: the readings differ: {what}; allowed: campaigns with the same readings")
 
 
 def _read_in(side):
@@ -142,7 +144,7 @@ def _other_numbers(sides, names):
             f"of {without.name} it is not; give both campaigns the same `frame`: robot or register"
         )
     lists = _listed(sides, (names_of or ["nothing more"] for names_of in only))
-    return f"calibrated with different numbers; {lists}"
+    return f"calibrated with different parameters; {lists}"
 
 
 def _estimate(side, calibration):

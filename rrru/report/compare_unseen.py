@@ -43,11 +43,11 @@ def same_points(first, second):
 
 
 def unseen(first, second, calibration):
-    """The Unseen of each campaign that has points which neither side has seen.
+    """The Unseen of each campaign that has points which neither side has used.
 
-    A point is predicted by the other campaign's calibration, which has not used it, and by its own, fitted again
-    without the trajectory of the point (the run or the stretch where there are few of them). Points that both have
-    measured are left out of both.
+    A point is predicted by the other campaign's calibration, which has not used it. It is also predicted by its own,
+    fitted again without the trajectory of the point (the run or the stretch where there are few of them). Points that
+    both have measured are left out of both.
     """
     found = [(place, _prediction_errors(place, (first, second), calibration)) for place in _places(first, second)]
     return [_compared(place.campaign, frame) for place, frame in found if len(frame)]

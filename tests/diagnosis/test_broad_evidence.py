@@ -242,7 +242,7 @@ def test_evidence_where_the_payload_is_fitted_is_that_of_the_exact_product(size,
     assert (gained[~likely] < max(exact) - 1.0).all()
 
 
-def test_alone_it_is_averaged_over_all_strengths_and_levels():
+def test_alone_it_is_averaged_over_all_prior_scales_and_levels():
     evidence = _evidence(2, smooth=True)
     found, grid = evidence.over_strengths((ROUGH,))
     assert found.shape == (len(DISCREPANCY_SCALES), len(PRIOR_SCALES)) and grid[:, 0].tolist() == PRIOR_SCALES.tolist()
@@ -382,7 +382,7 @@ def test_an_average_is_an_integral_over_the_coefficients():
     np.testing.assert_allclose(found, expected, rtol=1e-8)
 
 
-def test_of_sizes_that_the_campaign_has_chosen_one_strength_is_just_these():
+def test_of_sizes_that_the_campaign_has_chosen_one_prior_scale_is_just_these():
     """Many coefficients determine their common size far better than the grid of prior scales."""
     plain, rough = _evidence(8), LIBRARY["rough"].coordinates
     for factor in (0.01, 0.17, 1.0, 2.3):

@@ -259,7 +259,7 @@ def test_the_coefficients_mean_keeps_positive_ones_positive_and_is_optimal_there
     assert 0.5 * mean @ precision @ mean - mean @ moment[0] <= cost.min() + 1e-6 * abs(cost.min())
 
 
-def test_no_strength_makes_a_prior_wider_than_its_law_allows():
+def test_no_prior_scale_makes_a_prior_wider_than_its_effect_allows():
     """A coefficient that the calibration nearly absorbs would else have an estimate of metres."""
     free = _evidence()
     shape = free.library["free"].coordinates

@@ -103,29 +103,29 @@ def test_without_data_the_probabilities_are_the_prior(arm):
     """
     prior, library = Prior((0.3, 0.5, 0.2, 0.0001), 0.1, 0.1, share=0.0), _arm() if arm else EFFECTS
     every = [_hypothesis(*terms) for size in range(3) for terms in _all(size, library)]
-    beliefs = posterior(_stub(1.5, library), every, prior)
-    assert beliefs.weights.sum() == pytest.approx(1.0)
-    sets = beliefs.sets()
+    found = posterior(_stub(1.5, library), every, prior)
+    assert found.weights.sum() == pytest.approx(1.0)
+    sets = found.sets()
     effects = len(library)
     pairs = effects * (effects - 1) // 2
     for size, count, kinds in ((0, 0.3, 1), (1, 0.5, effects), (2, 0.2, pairs)):
-        found = {key: p for key, p in sets.items() if len(key[0]) == size and not key[1]}
-        assert len(found) == kinds
-        np.testing.assert_allclose(list(found.values()), 0.9 * count / kinds, rtol=1e-9)
+        of_size = {key: p for key, p in sets.items() if len(key[0]) == size and not key[1]}
+        assert len(of_size) == kinds
+        np.testing.assert_allclose(list(of_size.values()), 0.9 * count / kinds, rtol=1e-9)
     assert sum(p for (_, flag), p in sets.items() if flag) == pytest.approx(0.1)
     assert list(sets.values()) == sorted(sets.values(), reverse=True)
-    assert beliefs.marginal("backlash") == pytest.approx(0.5 / effects + 0.2 * (effects - 1) / pairs)
-    assert beliefs.marginal("nothing of the kind") == 0.0
+    assert found.marginal("backlash") == pytest.approx(0.5 / effects + 0.2 * (effects - 1) / pairs)
+    assert found.marginal("nothing of the kind") == 0.0
 
 
 def test_legs_have_the_prior_of_their_kinds():
-    beliefs = posterior(_stub(), [_hypothesis(*terms) for size in range(2) for terms in _all(size)], Prior())
+    found = posterior(_stub(), [_hypothesis(*terms) for size in range(2) for terms in _all(size)], Prior())
     np.testing.assert_allclose(
-        [beliefs.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9]
+        [found.legs("backlash")[k] for k in (EACH, SAME, 1, 2, 3)], [1 / 3, 1 / 3, 1 / 9, 1 / 9, 1 / 9]
     )
-    np.testing.assert_allclose([beliefs.legs("axis_tilt")[k] for k in (EACH, 1, 2, 3)], [1 / 2, 1 / 6, 1 / 6, 1 / 6])
-    assert beliefs.legs("unknown") == {}
-    assert sum(beliefs.legs("axis_tilt").values()) == pytest.approx(1.0)
+    np.testing.assert_allclose([found.legs("axis_tilt")[k] for k in (EACH, 1, 2, 3)], [1 / 2, 1 / 6, 1 / 6, 1 / 6])
+    assert found.legs("unknown") == {}
+    assert sum(found.legs("axis_tilt").values()) == pytest.approx(1.0)
 
 
 def test_evidence_multiplies_the_prior():
@@ -136,18 +136,18 @@ def test_evidence_multiplies_the_prior():
         for terms in _all(size)
     ]
     flat = posterior(_stub(20.0), [_hypothesis(*h.terms) for h in hypotheses], Prior())
-    beliefs = posterior(_stub(20.0), hypotheses, Prior())
+    found = posterior(_stub(20.0), hypotheses, Prior())
     log_weight = np.log(flat.weights) + np.array([h.evidence for h in hypotheses])
-    np.testing.assert_allclose(beliefs.weights, np.exp(log_weight - logsumexp(log_weight)), rtol=1e-9)
-    row, level = np.unravel_index(beliefs.weights.argmax(), beliefs.weights.shape)
-    assert beliefs.best() == (hypotheses[row], level)
+    np.testing.assert_allclose(found.weights, np.exp(log_weight - logsumexp(log_weight)), rtol=1e-9)
+    row, level = np.unravel_index(found.weights.argmax(), found.weights.shape)
+    assert found.best() == (hypotheses[row], level)
 
 
 def test_a_discrepancy_counts_as_unexplained_beyond_the_tolerated_share():
     hypotheses = [_hypothesis(), _hypothesis(EffectTerm("servo_lag"))]
-    beliefs = posterior(_stub(35.0), hypotheses, Prior(tolerance=0.1))
-    np.testing.assert_array_equal(beliefs.unexplained[0], DISCREPANCY_SCALES > 0.0)
-    np.testing.assert_array_equal(beliefs.unexplained[1], DISCREPANCY_SCALES > 3.5)
+    found = posterior(_stub(35.0), hypotheses, Prior(tolerance=0.1))
+    np.testing.assert_array_equal(found.unexplained[0], DISCREPANCY_SCALES > 0.0)
+    np.testing.assert_array_equal(found.unexplained[1], DISCREPANCY_SCALES > 3.5)
 
 
 def test_the_best_of_a_set_is_its_heaviest_hypothesis():
@@ -156,11 +156,11 @@ def test_the_best_of_a_set_is_its_heaviest_hypothesis():
         _hypothesis(EffectTerm("axis_tilt")),
         _hypothesis(EffectTerm("axis_tilt", 0, 2), evidence=5.0),
     ]
-    beliefs = posterior(_stub(1.5), hypotheses, Prior())
-    assert beliefs.best_of(frozenset({"axis_tilt"})) == (hypotheses[2], 0)
-    assert beliefs.best_of(frozenset({"axis_tilt"}), True)[1] > 0
-    assert beliefs.best_of(frozenset({"axis_tilt"}), False) == (hypotheses[2], 0)
-    assert beliefs.best_of(frozenset({"backlash"})) is None
+    found = posterior(_stub(1.5), hypotheses, Prior())
+    assert found.best_of(frozenset({"axis_tilt"})) == (hypotheses[2], 0)
+    assert found.best_of(frozenset({"axis_tilt"}), True)[1] > 0
+    assert found.best_of(frozenset({"axis_tilt"}), False) == (hypotheses[2], 0)
+    assert found.best_of(frozenset({"backlash"})) is None
 
 
 def test_improbable_pairs_are_forgotten_and_single_effects_stay():
@@ -170,8 +170,8 @@ def test_improbable_pairs_are_forgotten_and_single_effects_stay():
         _hypothesis(EffectTerm("axis_tilt"), evidence=far),
         _hypothesis(EffectTerm("axis_tilt"), EffectTerm("backlash"), evidence=far),
     ]
-    beliefs = posterior(_stub(), hypotheses, Prior())
-    assert [len(h.terms) for h in beliefs.hypotheses] == [0, 1] and beliefs.weights.sum() == pytest.approx(1.0)
+    found = posterior(_stub(), hypotheses, Prior())
+    assert [len(h.terms) for h in found.hypotheses] == [0, 1] and found.weights.sum() == pytest.approx(1.0)
 
 
 def _decided(*entries):

@@ -67,7 +67,7 @@ def test_the_search_finds_what_an_enumeration_of_all_sets_finds(acting):
 
 
 @pytest.mark.parametrize("count", [2, 3])
-def test_strengths_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
+def test_prior_scales_averaged_one_by_one_are_near_the_average_over_all_combinations(count):
     case = case_of(measure((strong("servo_lag", 6.0), strong("backlash", 3.0))), _library(*FEW))
     evidence = case.evidence(case.linearise(calibrate(case)))
     terms = tuple(EffectTerm(name) for name in FEW[-count:])

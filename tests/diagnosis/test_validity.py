@@ -58,7 +58,7 @@ def test_of_a_file_that_is_not_the_robot_s_no_cause_is_named(turned):
 def test_numbers_that_bounds_hold_are_the_headline():
     """The zero of a leg is off by more than a calibration looks for."""
     found = campaigns.diagnosed(campaigns.measure(deviations=campaigns.ERRORS | {"dtheta1": 0.302}), details=True)
-    assert "ends at bounds of the calibration's numbers (dtheta1 = 0.3 rad" in found.verdict["no_answer"]
+    assert "ends at bounds of calibration parameters (dtheta1 = 0.3 rad" in found.verdict["no_answer"]
     numbers = found.tables["gap_parameters"].query("effect == 'calibration'").set_index("parameter")
     assert numbers["at_bound"].to_dict()["dtheta1"] and not numbers["at_bound"].drop("dtheta1").any()
     assert _answered(found)[1].lead.startswith("No cause is named: ")

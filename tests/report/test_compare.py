@@ -174,7 +174,7 @@ def others(tmp_path_factory):
             "{1}:framed",
             r"of framed the instrument's frame is calibrated, too \(world_x\), of a it is not",
         ),
-        ("{0}:a", "{1}:turned", "other things were read: of a the tool, of turned ball; allowed"),
+        ("{0}:a", "{1}:turned", "the readings differ: of a the tool, of turned ball; allowed"),
         ("{0}:a", "{1}:bare", "lacks verdict.json; run `snakemake` for it first"),
         ("nothing", "{0}:a", "'nothing' is no folder, and no calibrated campaign of results"),
     ],

@@ -96,7 +96,7 @@ def test_a_corrected_file_that_is_the_diagnosed_robot_is_off_by_no_rounding(fold
 
 
 def test_without_an_answer_that_is_the_headline_and_no_cause_is_on_the_card(folder):
-    why = "the best answer leaves 12 mm rms, 600 times the noise of 0.02 mm"
+    why = "the residual of the best answer is 12 mm rms, 600 times the noise of 0.02 mm"
     text = _with_file(folder, effects="unexplained", no_answer=why, not_in_model=f"not corrected: {why}")
     card = text[text.index(f'id="answer-{CAMPAIGN}"') : text.index("</article>")]
     assert f'<p class="lead">No cause is named: {why}.</p>' in card and "corrected.urdf" not in card

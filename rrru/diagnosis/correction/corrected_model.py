@@ -29,8 +29,8 @@ _WITHOUT_ROWS = ("robot", "path_drive", "load_slopes")
 def write_corrected(diagnosis, section, masses, file, seed=0):
     """The Diagnosis with residual errors of its robot's corrected file, and `corrected_drives`; writes the file.
 
-    A file that cannot be corrected, or that is no robot after it, as where a loop of bodies does not close, becomes an
-    empty one that says why, as does `not_in_model`. section: the robot's entry in the configuration; masses: the
+    A file that cannot be corrected, or whose loops of bodies do not close afterwards, becomes an empty one with the
+    reason in a comment and in `not_in_model`. section: the robot's entry in the configuration; masses: the
     robot's; seed: of the fresh poses at which file and diagnosis are compared.
     """
     file, inference = Path(file), diagnosis.inference

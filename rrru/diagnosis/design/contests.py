@@ -22,11 +22,11 @@ class Contest:
 def contests_of(inference, verdict, sizes):
     """Up to `OPTIONS.max_advised_rivals` Contests of a Verdict, in the order in which they matter.
 
-    First the members of each group, the set with its most probable one against the set with another one in its place;
-    then the verdict against the most probable answer with, or without, the uncertain cause with the largest part of the
-    gap; then, of a verdict that is not sure, that against its nearest rivals. Of a verdict with something unexplained
-    the groups alone: an effect outside of the library makes no data. sizes: by effect the rms in mm of its part of the
-    gap.
+    First come the members of each group: the set with its most probable one against the set with another one instead.
+    Then comes the verdict against the most probable answer with, or without, the uncertain cause of the largest part of
+    the gap. Last come the nearest rivals of a verdict that is not sure. A verdict with something unexplained has those
+    of groups alone: an effect outside of the library cannot be simulated. sizes: by effect the rms in mm of its part of
+    the gap.
     """
     found = {}
     for pair in _pairs(inference.posterior, verdict, sizes):

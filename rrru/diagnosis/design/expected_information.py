@@ -28,7 +28,7 @@ class Sums:
 
     @classmethod
     def of(cls, design, data, noise_mm):
-        """Of a design (n, 3, k) and data (n, 3) under a noise per axis."""
+        """The Sums of a design (n, 3, k) and data (n, 3) under a noise per axis."""
         flat, target = design.reshape(-1, design.shape[-1]) / noise_mm, data.ravel() / noise_mm
         return cls(flat.T @ flat, flat.T @ target, float(target @ target))
 

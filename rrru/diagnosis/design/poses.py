@@ -159,10 +159,10 @@ def _target(used):
 
 
 def _oriented(start_mm, end_mm, known, mechanism):
-    """Orientations (n, 3, 3) of passes, those commanded next to their starts, and actuator values (n p, K) within the
-    drives' ranges that bring the platform there, from those of the same pose on; NaN out of reach.
+    """Orientations (n, 3, 3) of passes, and actuator values (n p, K) within the drives' ranges that reach them.
 
-    known: positions (m, 3) and actuator values (m, K) that were commanded.
+    The orientations are those commanded next to the starts. The solution begins at the drive values of the same pose;
+    values are NaN out of reach. known: positions (m, 3) and actuator values (m, K) that were commanded.
     """
     from scipy.spatial import cKDTree
 

@@ -109,11 +109,11 @@ def rivals():
     case = case_of(measure((strong("drive_compliance", 6.0),), plan=plan_of(trajectories=LINES[1:])), library)
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = explore(evidence, Prior())
+    posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
-    verdict = decide(beliefs, library)
+    verdict = decide(posterior, library)
     assert {*verdict.effects, *verdict.confusable_with} >= set(library) and verdict.probability < 0.6
     return found, verdict
 
@@ -194,9 +194,9 @@ def test_poses_are_advised_for_an_arm_with_the_orientation_to_command():
     case = arms.case_of(frame, library=library)
     calibrated = calibrate(case)
     evidence = case.evidence(case.linearise(calibrated))
-    beliefs = explore(evidence, Prior())
+    posterior = explore(evidence, Prior())
     found = InferenceResult(
-        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, beliefs, *beliefs.best()
+        case, calibrated, calibrated, fit_model(case, [calibrated]), evidence, posterior, *posterior.best()
     )
     rivals = ((frozenset(["compliance_outside"]), False, 0.4),)
     verdict = Verdict(("drive_compliance",), False, 0.5, 0, ("compliance_outside",), rivals)
